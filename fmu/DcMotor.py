@@ -1,9 +1,8 @@
 """The FMU DcMotor: ``pythonfmu build -f fmu/DcMotor.py``, see README.md beside this file."""
 
 from chainunit.drives import dc_motor
-from chainunit.fmu.slave import ModelSlave, hold
+from chainunit.fmu.slave import ModelSlave
 
 
-@hold(globals())
 class DcMotor(ModelSlave):
     model = dc_motor.DcMotor

@@ -8,7 +8,6 @@ the force (of a sliding joint the force across its line and the moment about the
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
@@ -27,10 +26,10 @@ def rotation(angle):
 
 
 class Multibody:
-    """A linkage from the text of its description; `inputs` have values by name."""
+    """A linkage from its description; `inputs` have values by name."""
 
-    def __init__(self, text, inputs=None):
-        data = self.data = json.loads(text)
+    def __init__(self, data, inputs=None):
+        self.data = data
         self.values = {each["name"]: each["value"] for each in (*data["parameters"], *data["inputs"])}
         self.values |= {"g": data["common"].get("g", 9.81), "ratio": 1.0}
         for link in data["links"]:

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import casadi
 import numpy as np
 import pytest
 from machines import random_loads, random_machine, random_state
+from test_wasm import OFTEN, QUICK, REST, Points, compare
 
 from chainunit.core import engines
+from chainunit.core.native import python_math
+from chainunit.core.native.kernels import kernels
+from chainunit.core.native.python_code import python_text
+from chainunit.core.symbolic_trace import outputs_of, trace
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.models import MODELS
 
 MODEL = ChamberForces
 
@@ -116,3 +124,50 @@ def test_the_lesser_of_two_duals_is_one_of_them(a, b):
     xp = engines.dual(engines.MATH)
     lesser = xp.minimum(engines.Dual(a, 5.0), engines.Dual(b, 7.0))
     assert (engines.value(lesser), engines.slope(lesser)) == ((a, 5.0) if a < b else (b, 7.0))
+
+
+def printed(model):
+    """The functions of a model as printed Python, by name."""
+    t = trace(model)
+    derived = model.derive(engines.casadi_(), t.p) if model.derived_count else []
+    names = vars(math) | vars(python_math)
+    exec(python_text(kernels(t, derived, False, [v.name for v in outputs_of(model)])), names)
+    return names
+
+
+@pytest.mark.second
+@pytest.mark.parametrize(
+    "name",
+    [
+        *QUICK,
+        *(n if n in OFTEN or n in MODELS else pytest.param(n, marks=pytest.mark.slow) for n in REST),
+    ],
+)
+def test_printed_python_is_the_equations(name):
+    """Outputs and derivatives at a thousand states, against numpy."""
+    points = Points(name, 1000)
+    model, functions = points.model, printed(points.model)
+    p = model.parameter_layout.values(points.p)
+    more = (functions["derive"](p),) if model.derived_count else ()
+    states = [(p, u, x, *more) for u, x in zip(points.u.T.tolist(), points.x.T.tolist(), strict=True)]
+    values, rates = points.by_numpy()
+    outputs = outputs_of(model)
+    assert np.isfinite(values).all()
+    got = np.array([functions["values"](*state) for state in states]).T
+    compare(got, values, [v.name for v in outputs], [v.unit for v in outputs])
+    if layout := model.state_layout:
+        got = np.array([functions["derivatives"](*state) for state in states]).T
+        compare(got, rates, layout.names, [v.unit for v in layout.variables])
+
+
+def test_what_is_printed_to_be_computed_once_has_no_errors():
+    """As C: a later requirement may be undefined where an earlier one is not met."""
+    assert python_math.Quotient(-1.0, 0.0) == python_math.Quotient(1.0, -0.0) == -math.inf
+    assert math.isnan(python_math.Quotient(0.0, 0.0)) and python_math.Quotient(3.0, 2.0) == 1.5
+    assert math.isnan(python_math.Sqrt(-1.0)) and python_math.Exp(1e4) == math.inf
+    model = MODELS["KnifeDrive"]
+    values = model.parameter_layout.values(model.parameter_layout.from_names({"r": 0.9}))
+    functions = printed(model)
+    derived = functions["derive"](values)
+    value, low, high = np.reshape(functions["requirements"](values, derived), (-1, 3)).T
+    assert np.isnan(derived).any() and not ((low < value) & (value < high)).all()

@@ -235,7 +235,7 @@ def test_the_command_leaves_the_signals_as_they_were(monkeypatch, capsys):
 @posix
 @pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize("command", ["study", "export"])
-@pytest.mark.parametrize("at", ["chainunit.study.config.load", "chainunit.fmu.export._build"])
+@pytest.mark.parametrize("at", ["chainunit.study.config.load", "chainunit.fmu.export.printed_model"])
 def test_an_early_end_is_told_and_leaves_nothing(sent, status, command, at, tmp_path, monkeypatch, capsys):
     """While the file is read, and while an FMU is made, into folders that were not there."""
     from chainunit.app import cli

@@ -24,8 +24,7 @@ from chainunit.core.quantities import declaration, group, quantity
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
 from chainunit.fmu.description import Interface, model_description, model_description_3, terminals
-from chainunit.fmu.recipe import script_with_names
-from chainunit.fmu.script import Script
+from chainunit.fmu.script import Script, script_with_names
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.system import System, ssp
@@ -40,7 +39,7 @@ native = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 def both(model):
     """The interface with structured names, and that with flat ones."""
-    return Interface(model, {}), Interface(model, {}, script_with_names(model, "flat"))
+    return Interface(model, {}), Interface(model, {}, script_with_names("flat"))
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ DEPENDENCIES = {
 
 
 TIPPER = str(Path(__file__).parents[1] / "examples" / "linkages" / "tipper.toml")
-OF_FILES = {"typer", "rich", "numpy", "pydantic", "pythonfmu"}
+OF_FILES = {"typer", "rich", "numpy", "pydantic"}
 """What a command needs that reads a study file or a linkage file."""
 
 

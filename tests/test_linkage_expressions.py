@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import re
 from pathlib import Path
@@ -227,7 +226,7 @@ def test_any_entry_of_another_kind_is_read_or_refused_in_lines(path):
 
 
 def test_groups_may_be_listed_and_are_checked():
-    assert json.loads(description_of(toml(PRESS + GROUPS), "press"))["groups"] == [["RRP", ["ram", "rod"]]]
+    assert description_of(toml(PRESS + GROUPS), "press")["groups"] == [["RRP", ["ram", "rod"]]]
     machine(PRESS + GROUPS)
     machine(PRESS + GROUPS.replace('kind = "RRP"\n', ""))
 

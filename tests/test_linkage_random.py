@@ -96,7 +96,7 @@ def shuffled(data, rng):
     """The same file with links, joints and points in another order."""
 
     def mixed(table):
-        return {name: table[name] for name in rng.permutation([*table])}
+        return {name: table[name] for name in rng.permutation([*table]).tolist()}
 
     links = {name: {**link, "points": mixed(link["points"])} for name, link in mixed(data["links"]).items()}
     return {**data, "ground": mixed(data["ground"]), "links": links, "joints": mixed(data["joints"])}

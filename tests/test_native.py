@@ -39,7 +39,7 @@ from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.generate import rules
 from chainunit.fmu.native.platforms import HEADERS, KERNELS
-from chainunit.fmu.recipe import Experiment, script_of
+from chainunit.fmu.recipe import Experiment
 from chainunit.fmu.reference import INPUTS, READ, REFERENCE, SMOKE_TEST, STANDARD, STEPPED, excitation
 from chainunit.fmu.reference import reference_results as reference_results_of
 from chainunit.machines.chain_unit import ChamberForces
@@ -822,7 +822,7 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
 def test_euler_keeps_near_at_the_declared_step(native, name):
     """In a second of the reference inputs it errs by less than a fifth of a state's size; at 100 times the step by
     more than half of one: the models need a step, and the declared one is short enough."""
-    model, reference = MODELS[name], Experiment(**script_of(MODELS[name]).experiment)
+    model, reference = MODELS[name], Experiment(**MODELS[name].fmu_data.experiment)
     for fmi in (2, 3):
         default = fmpy.read_model_description(str(native[name, fmi][0])).defaultExperiment
         given = (default.stepSize, default.stopTime, default.tolerance)

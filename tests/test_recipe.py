@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
 import fmpy
@@ -14,11 +15,11 @@ from chainunit.core.model import Model, Part, Terminal
 from chainunit.core.native.kernels import frequent_outputs
 from chainunit.core.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flanges, load_terminal
 from chainunit.core.quantities import Value, declaration, group, quantity
-from chainunit.fmu import export as python
+from chainunit.fmu import backends, recipe
 from chainunit.fmu.description import Interface
-from chainunit.fmu.recipe import icon, script_of
+from chainunit.fmu.native import export as native
+from chainunit.fmu.recipe import icon
 from chainunit.fmu.reference import excitation
-from chainunit.fmu.script import Script
 from chainunit.models import MODELS
 
 
@@ -110,18 +111,19 @@ def test_icons_follow_from_the_terminals():
     assert shown(other)["svg"] == "machine.svg"
 
 
-def test_values_that_do_not_follow_stand_in_the_script():
-    assert script_of(Gear) is Script and script_of(Gear).experiment == {}
-    assert script_of(MODELS["InductionMotor"]).experiment == {"step": 5e-5, "stop": 2.0}
-    assert script_of(MODELS["InductionMotor"]).model is MODELS["InductionMotor"]
-    for name in MODELS:
-        assert set(script_of(MODELS[name]).sizes) <= set(MODELS[name].input_layout.names)
+def test_values_that_do_not_follow_stand_in_the_model():
+    assert Interface(Gear, {}).experiment == {}
+    assert Interface(MODELS["InductionMotor"], {}).experiment == {"step": 5e-5, "stop": 2.0}
+    for model in MODELS.values():
+        assert set(model.fmu_data.sizes) <= set(model.input_layout.names)
 
 
-@pytest.mark.second
-@pytest.mark.parametrize("name", ["DcMotor", "ChainUnitFlexible"])
-def test_a_model_without_a_script_becomes_a_python_fmu(name, fmus, tmp_path, monkeypatch):
-    monkeypatch.setattr(python, "script_file", lambda model: None)
-    file = python.export(MODELS[name], tmp_path / "a.fmu")
-    rows = [fmpy.simulate_fmu(str(f), stop_time=0.01, output_interval=0.005) for f in (file, fmus[name])]
-    assert rows[0].dtype == rows[1].dtype and rows[0].tolist() == rows[1].tolist()
+@pytest.mark.parametrize("backend", ["python", "native"])
+def test_an_export_runs_no_script(backend, tmp_path, monkeypatch):
+    """A native export found its default experiment by running the script of a Python FMU."""
+    monkeypatch.setattr(recipe, "recipes", lambda: pytest.fail("the scripts are for pythonfmu"))
+    monkeypatch.setitem(sys.modules, "pythonfmu", None)
+    native.recipes()  # the C layer lies there, too
+    backends.export(MODELS["InductionMotor"], tmp_path / "a.fmu", backend=backend)
+    experiment = fmpy.read_model_description(str(tmp_path / "a.fmu")).defaultExperiment
+    assert (experiment.stepSize, experiment.stopTime) == ("5e-05", "2")

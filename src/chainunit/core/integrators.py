@@ -6,7 +6,7 @@ that could give up in the middle of a step, and with steps well below the model'
 error (fourth order) lies far below that of the coupling (second order).
 
 `controlled`, the pair of Dormand and Prince of orders 5 and 4 with control of the error: for a model that is slow
-most of the time and now and then jerks. Standard library only.
+most of the time and now and then jerks. Python FMUs carry this file.
 """
 
 from __future__ import annotations
@@ -14,25 +14,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from .quantities import Value, declaration, quantity
-
-
-@declaration
-class Solver:
-    """Limits of the internal integrator, a parameter of each model with states."""
-
-    max_steps: Value = quantity(
-        "1",
-        "most steps of its own that a communication step may take; the step is discarded where it takes more",
-        default=500_000,
-        min=1,
-        max=1_000_000_000,
-        type="Integer",
-    )
-
-
 MAX_STEPS = "solver.max_steps"
-"""Full name of the parameter `Solver.max_steps`."""
+"""Full name of the parameter `chainunit.core.solver.Solver.max_steps`."""
 
 
 SAME_TIME, ROUNDED, ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53

@@ -2,8 +2,7 @@
 
 Python formats these texts. The native code of FMUs has them as macros
 (`chainunit.fmu.native.generate.rules`), where the fields of a text are arguments in the order of the text. A
-`unit` has a blank before it; a pure number has no unit and no blank. Standard library only: FMUs carry this
-file.
+`unit` has a blank before it; a pure number has no unit and no blank. Python FMUs carry this file.
 """
 
 from __future__ import annotations

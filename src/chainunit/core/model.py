@@ -1,7 +1,4 @@
-"""A model: declarations, and equations written for any engine `xp`.
-
-Standard library only: FMUs carry this file.
-"""
+"""A model: declarations, and equations written for any engine `xp`."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-from . import messages
+from .bounds import refusal
 from .engines import MATH
 from .errors import GeometryError, InputError
 from .quantities import Layout, Variable, violations, within_bounds
@@ -37,23 +34,8 @@ class Requirement:
 
     def refusal(self, value: float, low: float, high: float, values: Mapping[str, float]) -> str:
         """The line that refuses `value`."""
-        unit = messages.unit_behind(self.unit)
-        formats = (messages.FIRST_PARAMETER, *[messages.NEXT_PARAMETER] * len(self.context))
-        those = "".join(
-            f.format(name=n, value=values[n]) for f, n in zip(formats, self.context, strict=False)
-        )
-        sides = math.isfinite(low), math.isfinite(high)
-        limits = {(True, False): messages.ABOVE, (False, True): messages.BELOW}.get(sides, messages.BETWEEN)
-        return messages.REQUIREMENT.format(
-            subject=self.subject,
-            value=value,
-            unit=unit,
-            why=self.why,
-            parameters=those,
-            limits=(limits if low < high else messages.NO_VALUE).format(
-                low=low, high=high, unit=unit, remedy=self.remedy
-            ),
-        )
+        context = {name: values[name] for name in self.context}
+        return refusal(self.subject, self.unit, self.why, self.remedy, context, (value, low, high))
 
 
 @dataclass(frozen=True)
@@ -89,19 +71,17 @@ class FmuData:
     about: About | None = None
     """who made the model, where its user did; None for the models of this package"""
     experiment: Mapping[str, float] = field(default_factory=dict)
-    """``step`` and ``stop`` [s] of the default experiment, where the maker of the model knows them"""
+    """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, in place of the usual ones"""
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    """sizes of inputs in the reference results, by name, in place of the usual ones"""
 
 
-@dataclass(frozen=True)
-class Making:
-    """How a class is made that no module names: the `call` as text of Python, the same as `function` and `arguments`,
-    by which another process gets the class, and further `modules` of this package that the call imports by name,
-    such as ``drives.dc_motor``."""
+class Making(NamedTuple):
+    """The call of a function of a module that makes a class that no module names: by it another process gets the
+    class."""
 
-    call: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    modules: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -162,7 +142,7 @@ def _pickled_form(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]
     """A model as pickle stores it: by its name, or, for a class that has no name in a module, by the call
     that makes it."""
     made = vars(model).get("made")
-    return model.__qualname__ if made is None else (made.function, made.arguments)
+    return model.__qualname__ if made is None else tuple(made)
 
 
 copyreg.pickle(ModelType, _pickled_form)
@@ -242,11 +222,6 @@ class Model(metaclass=ModelType):
         cls.input_layout = Layout(cls.Inputs)
         cls.state_layout = Layout(cls.States) if cls.States else None
 
-    @classmethod
-    def expression(cls) -> str:
-        """The expression of Python that gives this class in its module."""
-        return cls.made.call if cls.made else cls.__qualname__
-
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """Value, lower limit and upper limit of each requirement of `required`, in order. A later one may be
@@ -269,9 +244,9 @@ class Model(metaclass=ModelType):
         return ready
 
     @classmethod
-    def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
-        """The parameters `with_derived`, with the values `derived` if they are given. Parameters that are out of
-        bounds, or with which the machine does not work, are refused.
+    def check(cls, p: Any) -> Any:
+        """The parameters `with_derived`. Parameters that are out of bounds, or with which the machine does not work,
+        are refused.
 
         Raises
         ------
@@ -284,7 +259,7 @@ class Model(metaclass=ModelType):
             raise InputError(line)
         p = within_bounds(cls.parameter_layout, p)
         try:
-            p = cls.with_derived(MATH, p, derived)
+            p = cls.with_derived(MATH, p)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
             p = cls.with_derived(MATH, p, [math.nan] * cls.derived_count)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .integrators import Solver
 from .model import Terminal
 from .quantities import Layout, Value, declaration, group, quantity
+from .solver import Solver
 
 
 @declaration

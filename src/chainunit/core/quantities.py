@@ -3,7 +3,7 @@
 A model states its quantities as frozen dataclasses whose fields come from `quantity` (one
 scalar) or `group` (a nested dataclass, whose fields have a prefix: ``crank.m``).
 Everything else - modelDescription.xml, config validation, tables, netCDF attributes - is
-generated from these declarations. Standard library only: FMUs carry this file.
+generated from these declarations.
 
 Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer behind a name is its power:
 ``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number. Several factors in the denominator stand in brackets:
@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
-from . import messages
+from . import bounds, messages
 from .descriptions import Described
 
 T = TypeVar("T")
@@ -237,9 +237,7 @@ class Quantity(Described):
     def admits(self, x: Any) -> Any:
         """Whether the number `x`, or each of an array, is finite and inside the bounds, or beyond one by rounding
         only; of a count or a switch, whether it is a whole number, too."""
-        above = x > self.low if self.open_low else x >= self.low - self.slack
-        whole = self.type == "Real" or x % 1 == 0
-        return (abs(x) < math.inf) & above & (x <= self.high + self.slack) & whole
+        return bounds.admits(x, self.low, self.high, self.slack, self.open_low, self.type != "Real")
 
     def within_bounds(self, x: float) -> float:
         """The admitted number `x`, set to the bound where it is beyond it by rounding."""
@@ -503,10 +501,5 @@ def within_bounds(layout: Layout, instance: Any) -> Any:
 def complaint(variable: Variable, x: Any) -> str:
     """The line that says what is wrong with the value `x` of `variable`."""
     q = variable.quantity
-    free = math.isinf(q.low) and math.isinf(q.high)
-    finite = messages.NUMBER if free else messages.FINITE.format(allowed=q.allowed_range)
-    allowed_text = q.allowed_range if math.isfinite(x) else finite
-    line = messages.VALUE.format(
-        name=variable.name, value=x, unit=messages.unit_behind(q.unit), allowed=allowed_text
-    )
-    return f"{line} ({variable.description})"
+    bounded = math.isfinite(q.low) or math.isfinite(q.high)
+    return bounds.complaint(variable.name, x, q.unit, q.allowed_range, bounded, variable.description)

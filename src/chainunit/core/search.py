@@ -1,4 +1,4 @@
-"""The search for the least value of a function of one number. Standard library only: FMUs carry this file."""
+"""The search for the least value of a function of one number."""
 
 from __future__ import annotations
 

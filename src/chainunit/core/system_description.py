@@ -1,8 +1,8 @@
 """A system of models as one: declarations side by side, and equations in the order of their dependencies.
 
-The description of a system is a text in JSON, from which another process, or an FMU, makes the same model
+The description of a system is data as JSON has them, from which another process makes the same model
 (`chainunit.core.system_model.system_model`); `chainunit.system.compiled` writes it. Each component is a group: the
-names are the full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
+names are the full names of the system, such as ``motor.armature.R``.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from operator import attrgetter
 from typing import Any
 
 from .errors import InputError
-from .integrators import MAX_STEPS, Solver
+from .integrators import MAX_STEPS
 from .model import Model, Requirement, Terminal
 from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
+from .solver import Solver
 
 _SOLVER = MAX_STEPS.partition(".")[0]
 RESERVED = (_SOLVER, "derived", "of_components")
@@ -83,16 +84,9 @@ def model_at(place: Mapping[str, Any]) -> Any:
     thing = attrgetter(name)(import_module(module, __package__))
     if "arguments" not in place:
         return thing
-    return thing(*(model_at(each) if isinstance(each, dict) else each for each in place["arguments"]))
-
-
-def modules_of(place: Mapping[str, Any]) -> set[str]:
-    """The modules of this package that a `reference` names, such as ``drives.dc_motor``."""
-    own = {place["of"].partition(":")[0]}
-    own = {module.removeprefix(".") for module in own if module.startswith(".")}
-    inner = [each for each in place.get("arguments", ()) if isinstance(each, dict)]
-    made = model_at(place).made
-    return own.union(*map(modules_of, inner), made.modules if made else ())
+    return thing(
+        *(model_at(each) if isinstance(each, dict) and "of" in each else each for each in place["arguments"])
+    )
 
 
 # -- the parts of a system

@@ -1,21 +1,17 @@
-"""The model of a system of models: `system_model` makes it from a description (`core.system_description`).
-
-Standard library only: FMUs carry this file.
-"""
+"""The model of a system of models: `system_model` makes it from a description (`core.system_description`)."""
 
 from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
 from .errors import GeometryError, refusal_prefix
 from .model import About, FmuData, Making, Model, Part, StartProblem, keep
 from .quantities import Layout
-from .system_description import SystemDescription, SystemPoint, model_at, modules_of
+from .system_description import SystemDescription, SystemPoint, model_at
 
 
 class SystemModel(Model):
@@ -62,10 +58,10 @@ class SystemModel(Model):
         return [v for name, model in cls._components() for v in model.derive(xp, own[name])]
 
     @classmethod
-    def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
+    def check(cls, p: Any) -> Any:
         """See `Model.check`; where a model has more to say on its geometry, the refusal says it."""
         try:
-            return super().check(p, derived)
+            return super().check(p)
         except GeometryError as error:
             own = cls.system.parameters(p)
             for name, model in cls._components():
@@ -220,17 +216,38 @@ class SystemModel(Model):
         return values
 
 
-def system_model(text: str) -> type[SystemModel]:
-    """The model of a description."""
+_MODELS: dict[Any, type[SystemModel]] = {}
+
+
+def system_model(data: Mapping[str, Any]) -> type[SystemModel]:
+    """The model of a description; equal descriptions of the same components have one model."""
     # a class that was defined anew, as in a notebook, makes a new model
-    return _system_model(text, *(model_at(each) for _, each in json.loads(text)["components"]))
+    models = tuple(model_at(each) for _, each in data["components"])
+    key = json.dumps(data, sort_keys=True), models
+    if key not in _MODELS:
+        _MODELS[key] = _system_model(SystemDescription(data, models))
+    return _MODELS[key]
 
 
-@cache
-def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
-    of = SystemDescription(json.loads(text), models)
-    references = [each for _, each in of.data["components"]]
-    apart, modules = of.by_differences(), set[str]().union(*map(modules_of, references))
+def _shortest(models: Iterable[type[Model]]) -> dict[str, float]:
+    """The shortest step and stop, and the least tolerance, of the components' default experiments."""
+    experiment: dict[str, float] = {}
+    for model in models:
+        own = model.fmu_data.experiment
+        experiment = {key: min(x, experiment.get(key, x)) for key, x in {**experiment, **own}.items()}
+    return experiment
+
+
+def _sizes(of: SystemDescription) -> dict[str, float]:
+    """The components' sizes of the free inputs."""
+    free = set(Layout(of.Inputs).names)
+    sizes = {f"{name}.{key}": x for name, m in of.models.items() for key, x in m.fmu_data.sizes.items()}
+    return {name: x for name, x in sizes.items() if name in free}
+
+
+def _system_model(of: SystemDescription) -> type[SystemModel]:
+    models = of.models.values()
+    apart = of.by_differences()
     about = of.data["about"]
     members: dict[str, Any] = {
         "__module__": __name__,
@@ -239,7 +256,7 @@ def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
         "description": of.data["title"],
         "system": of,
         "components": MappingProxyType(of.models),
-        "made": Making(f"system_model({text!r})", system_model, (text,), tuple(sorted(modules))),
+        "made": Making(system_model, (of.data,)),
         "Parameters": of.Parameters,
         "Inputs": of.Inputs,
         "States": of.States if of.has_states else None,
@@ -251,7 +268,8 @@ def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
         ),
         "fmu_data": FmuData(
             about=None if about is None else About(**about),
-            experiment=MappingProxyType(of.data["experiment"]),
+            experiment=MappingProxyType(_shortest(models) | of.data["experiment"]),
+            sizes=MappingProxyType(_sizes(of)),
         ),
         "repeated": {
             f"{own}.{name}": f"{own}.{one}"

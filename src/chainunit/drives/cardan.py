@@ -13,7 +13,9 @@ import dataclasses
 import math
 from typing import Any, NamedTuple
 
-from ..core.engines import MATH, Dual, dual, slope, value
+import numpy as np
+
+from ..core.engines import MATH, Dual, dual, numpy_, slope, value
 from ..core.errors import InputError
 from ..core.quantities import Layout, Value, declaration, quantity, violations
 
@@ -145,9 +147,6 @@ def frequency_band(p: Cardan, points: int = 3600) -> FrequencyBand:
     InputError
         see `check`.
     """
-    import numpy as np
-
-    from ..core.engines import numpy_
 
     check(p)
     xp = numpy_()

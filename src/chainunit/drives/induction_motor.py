@@ -26,7 +26,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
-from ..core.model import Part, Requirement
+from ..core.model import FmuData, Part, Requirement
 from ..core.planar import Vec2
 from ..core.ports import LoadInput, measured_terminal
 from ..core.quantities import Value, declaration, group, quantity
@@ -366,6 +366,8 @@ class InductionMotor(Motor):
     """
 
     name = "InductionMotor"
+    # the flux at switching on turns at the supply's frequency and hardly decays
+    fmu_data = FmuData(experiment={"step": 5e-5, "stop": 2.0})
     description = (
         "Squirrel-cage induction motor (dynamic dq model), direct on line, with a soft starter or V/f inverter; "
         "takes a load port"

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from ..core.errors import InputError
 from ..reading.results import part, result
 
@@ -62,8 +64,6 @@ def _tuned_margin(share: float) -> tuple[float, float]:
 def _margin(rise: Any, plant: Any) -> tuple[float, float]:
     """Phase margin [deg] and crossover of the open loop that is the quotient of these polynomials in s, the highest
     power first. A test has the same of python-control, whose import takes a second."""
-    import numpy as np
-
     # |rise|^2 = |plant|^2 in X = -w^2, as a polynomial times its mirror is even
     squares = [
         np.polymul(each, each * (-1.0) ** np.arange(len(each))[::-1]) for each in map(np.array, (rise, plant))
@@ -109,7 +109,6 @@ def loop(motor: Any, inertia: float) -> Loop:
 
     A test has the same of python-control.
     """
-    import numpy as np
     from scipy.linalg import expm
 
     armature, current = motor.armature, motor.current_control

@@ -16,7 +16,7 @@ from ..core.errors import InputError
 from ..core.model import About, Model
 from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
 from ..core.symbolic_trace import Trace, trace
-from .recipe import Experiment, script_of
+from .recipe import Experiment
 from .script import Script, name_in_fmu, text_in_fmu
 
 RELEASED = "2026-11-27"
@@ -47,7 +47,7 @@ class Interface:
         Parameters
         ----------
         start : start values in place of the declared ones
-        script : the class of the user's script; by default the class of the model's script in `fmu/`
+        script : values in place of those of the model; by default none
 
         Raises
         ------
@@ -55,7 +55,9 @@ class Interface:
             for a name in `start` that is neither parameter nor input.
         """
         self.model = model
-        self.script = script or script_of(model)
+        self.script = script or Script
+        self.experiment = {**model.fmu_data.experiment, **self.script.experiment}
+        self.sizes = {**model.fmu_data.sizes, **self.script.sizes}
         self.parameters = model.parameter_layout.variables
         self.inputs = model.input_layout.variables
         self.states = model.state_layout.variables if model.state_layout else ()
@@ -437,7 +439,7 @@ def _definitions(
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
         SubElement(categories, "Category", name=name)
-    e = Experiment(**interface.script.experiment)
+    e = Experiment(**interface.experiment)
     values = {"startTime": 0.0, "stopTime": e.stop, "tolerance": e.tolerance, "stepSize": e.step}
     SubElement(root, "DefaultExperiment", {name: f"{value:g}" for name, value in values.items()})
 

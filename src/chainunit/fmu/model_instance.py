@@ -1,66 +1,88 @@
-"""An instance of a model inside a pythonfmu FMU: its values, its states, its time, and its outputs.
+"""An instance of a model inside a pythonfmu FMU: its values, its states, its time, and its outputs. The FMU carries
+this file, and the model as the module that `chainunit.fmu.printed_model` prints.
 
-It computes with `math`, so that the importing Python (3.11 or later) needs only the standard library. It never
-raises: a reason is logged, outputs become NaN, and a step is refused. Outputs are evaluated when they are read, part
-by part, once per state.
+It never raises: a reason is logged, outputs become NaN, and a step is refused. Outputs are evaluated when they are
+read, once per state: those at the terminals alone, if no others are read.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
-from ..core import messages
-from ..core.engines import MATH
-from ..core.errors import InputError
-from ..core.integrators import ADDED_UP, MAX_STEPS, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
-from ..core.model import Model
-from ..core.quantities import complaint
+from ..core import bounds, messages
+from ..core.integrators import ADDED_UP, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
 
 NAN = float("nan")
 _IDENTITY = __name__.partition(".")[0]
 """Inside an FMU: the name of its package, which has a hash of all contents of the FMU."""
+_SETTABLE, _STATES, _AT_TERMINALS, _ALL = range(4)
+"""Variables whose values are known: parameters and inputs, also the states, the outputs at the terminals, and all."""
 
 
-class References:
-    """The value references of a model: of its `settable` variables, the parameters and then the inputs, from 0 on; of
-    its states, from `first_state` on; and of its outputs, from `first_output` on. `parts` has the first reference of
-    each part of the outputs and the reference behind its last one; `types` the type of FMI by reference."""
+class Settable(NamedTuple):
+    """A parameter or an input: its name, unit and description, its bounds (see `chainunit.core.quantities.Quantity`),
+    its type in FMI and its start value."""
 
-    def __init__(self, model: type[Model]) -> None:
-        parameters, states = model.parameter_layout.variables, model.state_layout
-        state_variables = states.variables if states else ()
-        self.settable = (*parameters, *model.input_layout.variables)
-        self.first_input, self.first_state = len(parameters), len(self.settable)
-        self.first_output = at = self.first_state + len(state_variables)
-        self.parts: list[tuple[int, int]] = []
-        for part in model.parts:
-            self.parts.append((at, at + len(part.layout.names)))
-            at = self.parts[-1][1]
-        outputs = [v for part in model.parts for v in part.layout.variables]
-        self.types = {i: v.type for i, v in enumerate((*self.settable, *state_variables, *outputs))}
+    name: str
+    unit: str
+    description: str
+    allowed: str
+    low: float
+    high: float
+    slack: float
+    open_low: bool
+    tunable: bool
+    type: str
+    start: float
+
+    def admits(self, x: float) -> bool:
+        """Whether the value is allowed, or beyond a bound by rounding only."""
+        whole = self.type != "Real"
+        return bool(bounds.admits(x, self.low, self.high, self.slack, self.open_low, whole))
+
+    def within_bounds(self, x: float) -> float:
+        """The allowed value, set to the bound where it is beyond it by rounding."""
+        return self.low if x < self.low else self.high if x > self.high else x
+
+    def complaint(self, x: float) -> str:
+        """The line that refuses the value."""
+        bounded = math.isfinite(self.low) or math.isfinite(self.high)
+        return bounds.complaint(self.name, x, self.unit, self.allowed, bounded, self.description)
+
+
+class _RefusedError(Exception):
+    """The values make no model."""
 
 
 class ModelInstance:
-    """An instance of a `model` with these `start` values by name; `log` gets each line for the user."""
+    """An instance of the printed `model`; `log` gets each line for the user. Variables are known by their value
+    references: parameters, inputs, states, outputs."""
 
-    def __init__(self, model: type[Model], start: dict[str, float], log: Callable[[str], None]) -> None:
-        self.model, self.references, self._log = model, References(model), log
-        self._set: list[float] = [
-            float(start.get(v.name, v.quantity.start or 0.0)) for v in self.references.settable
-        ]
-        self._out = [NAN] * (len(self.references.types) - self.references.first_state)
-        self._fresh = [False] * len(model.parts)
-        self._shared: Any = None
-        self._p: Any = None
-        self._derived: Any = None  # from the fixed parameters, which do not change after the initialization
-        self._u: Any = None
-        self._x: list[float] = []  # empty before the start of the states
+    def __init__(self, model: Any, log: Callable[[str], None]) -> None:
+        self.model, self._log = model, log
+        self.settable = [Settable(*row) for row in model.SETTABLE]
+        self.first_input, self.first_state = model.PARAMETERS, len(self.settable)
+        self.first_output = self.first_state + len(model.NOMINAL)
+        self._level = [_SETTABLE] * self.first_state + [_STATES] * len(model.NOMINAL) + [_ALL] * model.OUTPUTS
+        for place in model.TERMINALS:
+            self._level[self.first_output + place] = _AT_TERMINALS
+        self._now = [v.start for v in self.settable] + [NAN] * (len(self._level) - self.first_state)
+        self._known = _SETTABLE
+        self._p: list[float] | None = None
+        self._derived: Sequence[float] | None = None
+        """from the fixed parameters, which do not change after the initialization"""
+        self._more: tuple[
+            Sequence[float], ...
+        ] = ()  # the last argument of the model's functions, if they take it
+        self._x: Sequence[float] = ()  # empty before the start of the states
         self._pace = 0.0  # next substep of an integrator that controls its error
         self._closed = False
         self._initialized = False
-        self._doubtful = True  # an input may be out of its bounds
+        self._doubtful = set(
+            range(self.first_input, self.first_state)
+        )  # inputs that may be out of their bounds
         self._time = 0.0
         self._stop = math.inf  # the last admissible time, with an allowance for rounding
         self._refusal = ""  # why the parameters make no model
@@ -102,9 +124,10 @@ class ModelInstance:
             self._time = time + size
             return True
         except BudgetError as reason:
-            over = {"size": size, "time": time, "name": MAX_STEPS, "most": reason.most}
+            name = self.settable[self.model.MAX_STEPS].name
+            over = {"size": size, "time": time, "name": name, "most": reason.most}
             self.tell(messages.OVER_BUDGET.format(**over))
-        except ArithmeticError:
+        except (ArithmeticError, ValueError):
             self.tell(messages.ASTRAY.format(time=time))
         except BaseException as reason:
             self.tell(f"step from t = {time:g} s failed: {reason!r}")
@@ -122,71 +145,78 @@ class ModelInstance:
     def _advance(self, time: float, step: float) -> bool:
         """Take states and inputs to the end of a step; False where a state runs away."""
         run = self._running()
-        if self.model.state_layout:
+        if self.model.NOMINAL:
             x = self._integrate(run, step)
             if not all(map(math.isfinite, x)):
                 self.tell(messages.ASTRAY.format(time=time))
                 return False
             self._x = x
-        for at, rate, half in run:
-            quantity = self.references.settable[at].quantity
-            self._set[at] = quantity.within_bounds(self._set[at] + step * (rate + step * half))
-            self._u = None
-            self._doubtful = True
+        for place, rate, half in run:
+            at = self.first_input + place
+            self._now[at] = self.settable[at].within_bounds(self._now[at] + step * (rate + step * half))
+            self._doubtful.add(at)
         self._touch()
-        self._closed = self.model.controlled
+        self._closed = self.model.CONTROLLED
         return True
 
-    def _integrate(self, run: Any, step: float) -> list[float]:
-        p, model = self._p, self.model
-        layout = model.state_layout
-        assert layout is not None
-        longest = model.internal_step(MATH, p)
+    def _integrate(self, run: list[tuple[int, float, float]], step: float) -> list[float]:
+        p, more, model = self._p, self._more, self.model
+        still = self._inputs()
 
-        def rates(since: float, x: Any) -> list[float]:
-            return model.derivatives(MATH, p, self._inputs(run, since), layout.instance(x))
+        def inputs(since: float) -> list[float]:
+            """The inputs, with the running ones at the time `since` [s] after they were set."""
+            if not run:
+                return still
+            values = still.copy()
+            for place, rate, half in run:
+                values[place] += since * (rate + since * half)
+            return values
 
-        if model.controlled:
-            return self._integrate_with_control(rates, run, step, longest)
-        return rk4(rates, self._x, step, longest, p.solver.max_steps)
+        def rates(since: float, x: Sequence[float]) -> Sequence[float]:
+            derivatives: Sequence[float] = model.derivatives(p, inputs(since), x, *more)
+            return derivatives
 
-    def _integrate_with_control(self, rates: Any, run: Any, step: float, longest: float) -> list[float]:
-        p, model, x = self._p, self.model, self._x
-        layout = model.state_layout
-        assert layout is not None
+        def close(since: float, x: Sequence[float]) -> Sequence[float]:
+            states: Sequence[float] = model.closed(p, inputs(since), x, *more)
+            return states
 
-        def close(since: float, x: Any) -> list[float]:
-            return model.constrained_states(MATH, p, self._inputs(run, since), layout.instance(x))
-
+        (longest,), most = model.internal_step(p), self._now[model.MAX_STEPS]
+        x = self._x
+        if not model.CONTROLLED:
+            return rk4(rates, x, step, longest, most)
         for _ in range(0 if self._closed else 2):
             x = close(0.0, x)
-        nominal = [v.quantity.nominal or 1.0 for v in layout.variables]
-        tolerance, most = model.tolerance(MATH, p), p.solver.max_steps
-        x, self._pace = controlled(rates, close, x, step, self._pace, longest, tolerance, nominal, most)
-        return x
+        (tolerance,) = model.tolerance(p)
+        later, self._pace = controlled(
+            rates, close, x, step, self._pace, longest, tolerance, model.NOMINAL, most
+        )
+        return later
 
     # -- values
 
     def assign(self, reference: int, value: float) -> None:
         """Set a parameter or an input; a fixed parameter only before the end of the initialization."""
-        quantity = self.references.settable[reference].quantity
-        if quantity.admits(value):
-            value = quantity.within_bounds(value)
-        if self._set[reference] == value:
+        variable = self.settable[reference]
+        if variable.admits(value):
+            value = variable.within_bounds(value)
+        if self._now[reference] == value:
             return
-        if reference >= self.references.first_input:
-            self._set[reference] = value
-            self._u = None
-            self._doubtful = True
+        if reference >= self.first_input:
+            self._now[reference] = value
+            self._doubtful.add(reference)
             self._start_anew()
             self._touch()
         elif not self._initialized:
             self._take(reference, value)
+        elif not variable.tunable:
+            self.tell(messages.FIXED.format(name=variable.name) + "; not changed")
+        elif not variable.admits(value):
+            self.tell(variable.complaint(value) + "; not changed")
         else:
-            self._tune(reference, value)
+            self._take(reference, value)
 
     def _take(self, reference: int, value: float) -> None:
-        self._set[reference] = value
+        self._now[reference] = value
         self._p = None
         self._start_anew()
         self._touch()
@@ -194,55 +224,51 @@ class ModelInstance:
     def _start_anew(self) -> None:
         """Start the states again at the next use, unless the initialization has already started them."""
         if not self._initialized or self._unstarted:
-            self._x, self._unstarted = [], ""
+            self._x, self._unstarted = (), ""
 
-    def _tune(self, reference: int, value: float) -> None:
-        variable = self.references.settable[reference]
-        if not variable.quantity.tunable:
-            self.tell(messages.FIXED.format(name=variable.name) + "; not changed")
-        elif not variable.quantity.admits(value):
-            self.tell(complaint(variable, value) + "; not changed")
-        else:
-            self._take(reference, value)
+    def values(self, references: Sequence[int]) -> list[float]:
+        """The values of these variables; outputs are evaluated at most once per state."""
+        if self._known < _ALL and references:
+            wanted = max([self._level[i] for i in references])
+            if wanted > self._known:
+                self._evaluate(wanted)
+        now = self._now
+        return [now[i] for i in references]
 
-    def value(self, reference: int) -> float:
-        """The value of a variable; an output is evaluated at most once per state and part."""
-        places = self.references
-        if reference < places.first_state:
-            return self._set[reference]
-        if reference < places.first_output:
-            return NAN if self.prepare() else self._x[reference - places.first_state]
-        for i, (low, high) in enumerate(places.parts):
-            if low <= reference < high and not self._fresh[i]:
-                self._evaluate(i, low, high)
-        return self._out[reference - places.first_state]
-
-    def _evaluate(self, i: int, low: int, high: int) -> None:
-        values: list[float] | None = None
-        bad = self.prepare() or self._bad_input()
+    def _evaluate(self, wanted: int) -> None:
+        bad = self.prepare()
+        count = self.first_output - self.first_state
+        self._now[self.first_state : self.first_output] = [NAN] * count if bad else self._x
+        self._known = wanted
+        if wanted == _STATES:
+            return
+        bad = bad or self._bad_input()
+        model, values = self.model, [NAN] * len(self._now)
         if not bad:
             try:
-                p, u = self._p, self._inputs()
-                layout, part = self.model.state_layout, self.model.parts[i]
-                x = layout.instance(self._x) if layout else None
-                if self._shared is None:
-                    self._shared = self.model.shared(MATH, p, u, x)
-                values = part.layout.values(part.equations(MATH, p, u, x, self._shared))
+                function = model.values if wanted == _ALL else model.values_at_terminals
+                values = function(self._p, self._inputs(), self._x, *self._more)
                 if not all(map(math.isfinite, values)):
-                    values, bad = None, messages.NO_OUTPUT.format(model=self.model.name, time=self._time)
+                    raise ArithmeticError
+            except (ArithmeticError, ValueError):
+                values, bad = (
+                    [NAN] * len(self._now),
+                    messages.NO_OUTPUT.format(model=model.NAME, time=self._time),
+                )
             except BaseException as reason:
-                bad = f"outputs cannot be evaluated: {reason!r}"
-        if values is None:
+                values, bad = [NAN] * len(self._now), f"outputs cannot be evaluated: {reason!r}"
+        if bad:
             self.tell(bad)
-            values = [NAN] * (high - low)
-        self._out[low - self.references.first_state : high - self.references.first_state] = values
-        self._fresh[i] = True
+        if wanted == _ALL:
+            self._now[self.first_output :] = values[: model.OUTPUTS]
+        else:
+            for place, value in zip(model.TERMINALS, values, strict=False):
+                self._now[self.first_output + place] = value
 
     def _touch(self) -> None:
         """Mark all outputs for a new evaluation."""
-        self._shared = None
         self._closed = False
-        self._fresh = [False] * len(self._fresh)
+        self._known = _SETTABLE
 
     def prepare(self) -> str:
         """Check the parameters and start the states, after a change of either. Returns why they make no model, or an
@@ -251,28 +277,59 @@ class ModelInstance:
             self.tell(bad)
             return bad
         if self._p is None:
-            self._refusal = ""
-            derived, self._derived = self._derived if self._initialized else None, None
-            try:
-                p = self._p = self.model.parameter_layout.instance(self._set[: self.references.first_input])
-                p = self._p = self.model.check(p, derived)
-                self._derived = getattr(p, "derived", None)
-            except BaseException as reason:
-                self._refusal = str(reason) or repr(reason)
+            self._refusal = self._refused_parameters()
+            if self._refusal:
                 self.tell(self._refusal)
-        if self.model.state_layout and not (self._x or self._refusal or self._unstarted):
+        if self.model.NOMINAL and not (self._x or self._refusal or self._unstarted):
             self._start()
         return self._refusal or self._unstarted
 
+    def _refused_parameters(self) -> str:
+        """Take the parameters, with the values that are derived from them; why they make no model, or an empty
+        text."""
+        derived, self._derived = self._derived if self._initialized else None, None
+        p = self._p = self._now[: self.first_input]
+        model = self.model
+        try:
+            for variable, x in zip(self.settable, p, strict=False):
+                if not variable.admits(x):
+                    return variable.complaint(x)
+            p[:] = [v.within_bounds(x) for v, x in zip(self.settable, p, strict=False)]
+            if model.DERIVED:
+                derived = model.derive(p) if derived is None else derived
+                self._more = (derived,)
+            if model.REQUIRED:
+                self._check(model.REQUIRED, model.requirements(p, *self._more))
+            self._derived = derived
+        except BaseException as reason:
+            return str(reason) or repr(reason)
+        return ""
+
+    def _check(self, required: Sequence[Any], limits: Sequence[float]) -> None:
+        """Raise an error for a requirement that is not met."""
+        for k, (subject, unit, why, remedy, context) in enumerate(required):
+            value, low, high = three = limits[3 * k : 3 * k + 3]
+            if not low < value < high:
+                parameters = {self.settable[i].name: self._now[i] for i in context}
+                raise _RefusedError(bounds.refusal(subject, unit, why, remedy, parameters, three))
+
     def _start(self) -> None:
         """Compute the states at the start, or keep why there are none."""
-        layout = self.model.state_layout
-        assert layout is not None
+        model, p = self.model, self._p
         try:
             if bad := self._bad_input():
-                raise InputError(bad)
-            self._x = layout.values(self.model.begin(self._p, self._inputs()))
-            self._pace = 0.0
+                raise _RefusedError(bad)
+            u, z = self._inputs(), ()
+            if model.UNKNOWNS:
+                z = model.guess(p, u)
+                for _ in range(model.START_ROUNDS):
+                    z = model.improved(p, u, z)
+            x = model.initial(p, u, z)
+            if model.START_REQUIRED:
+                self._check(model.START_REQUIRED, model.start_limits(p, u, x, *self._more))
+            if not all(map(math.isfinite, x)):
+                raise _RefusedError(messages.NO_OUTPUT.format(model=model.NAME, time=self._time))
+            self._x, self._pace = x, 0.0
         except BaseException as reason:
             self._unstarted = str(reason) or repr(reason)
             self.tell(self._unstarted)
@@ -284,34 +341,23 @@ class ModelInstance:
             return messages.STOP.format(stop=self._stop, start=self._time)
         return ""
 
-    def _inputs(self, run: list[tuple[int, float, float]] | None = None, since: float = 0.0) -> Any:
-        """The inputs, with the running ones `run` at the time `since` [s] after they were set."""
-        first = self.references.first_input
-        if run:
-            values = self._set[first:]
-            for at, rate, half in run:
-                values[at - first] += since * (rate + since * half)
-            return self.model.input_layout.instance(values)
-        if self._u is None:
-            self._u = self.model.input_layout.instance(self._set[first:])
-        return self._u
+    def _inputs(self) -> list[float]:
+        return self._now[self.first_input : self.first_state]
 
     def _running(self) -> list[tuple[int, float, float]]:
         """Place, rate and half of the second derivative of each input that follows another one and moves."""
-        first = self.references.first_input
-        return [
-            (first + place, rate, half)
-            for place, rate, half in self.model.extrapolations(self._set[first:])
-            if rate or half
+        u = self._inputs()
+        rows = [
+            (place, u[rate], 0.5 * u[second] if second >= 0 else 0.0)
+            for place, rate, second in self.model.RATES
         ]
+        return [row for row in rows if row[1] or row[2]]
 
     def _bad_input(self) -> str:
-        if self._doubtful:
-            inputs = slice(self.references.first_input, None)
-            for variable, value in zip(self.references.settable[inputs], self._set[inputs], strict=True):
-                if not variable.quantity.admits(value):
-                    return f"input {complaint(variable, value)}"
-            self._doubtful = False
+        for at in sorted(self._doubtful):
+            if not self.settable[at].admits(self._now[at]):
+                return f"input {self.settable[at].complaint(self._now[at])}"
+        self._doubtful.clear()
         return ""
 
     # -- saved states
@@ -322,7 +368,7 @@ class ModelInstance:
             return {"damaged": "it was taken after one that was refused"}
         return {
             "of": _IDENTITY,
-            "set": list(self._set),
+            "set": self._now[: self.first_state],
             "x": list(self._x),
             "time": self._time,
             "stop": self._stop,
@@ -343,12 +389,12 @@ class ModelInstance:
         if why:
             self.tell(self._unrestored)
             return
-        self._set, self._x = list(state["set"]), list(state["x"])
+        self._now[: self.first_state], self._x = state["set"], list(state["x"])
         self._time, self._stop, self._pace = state["time"], state["stop"], state["pace"]
         self._initialized = state["initialized"]
-        self._doubtful = True
+        self._doubtful = set(range(self.first_input, self.first_state))
         # the state may be that of another geometry
-        self._p = self._u = self._derived = None
+        self._p = self._derived = None
         self._unstarted = ""
         self._closed = state["closed"]
 
@@ -364,17 +410,14 @@ class ModelInstance:
             float,
             int,
         }
-        places = self.references
-        states = places.first_output - places.first_state if state["started"] else 0
-        complete = len(values) == places.first_state and len(x) == states
+        states = self.first_output - self.first_state if state["started"] else 0
+        complete = len(values) == self.first_state and len(x) == states
         if not (numbers and complete and state["pace"] >= 0.0 and {type(flag) for flag in flags} == {bool}):
             raise ValueError
         if not all(map(math.isfinite, x)):
             return "a value in it is not finite"
         if state["started"] and state["initialized"]:  # else `prepare` judges them
-            for variable, value in zip(
-                self.references.settable[: self.references.first_input], values, strict=False
-            ):
-                if not variable.quantity.admits(value):
-                    return complaint(variable, value)
+            for variable, value in zip(self.settable[: self.first_input], values, strict=False):
+                if not variable.admits(value):
+                    return variable.complaint(value)
         return ""

@@ -280,7 +280,7 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
     value is 0.
     """
     model = interface.model
-    sizes = interface.script.sizes
+    sizes = interface.sizes
     courses: dict[str, Callable[[float], float]] = {}
     for terminal in model.terminals:
         if terminal.kind == LOAD and terminal.members["tau_bias"] in model.input_layout.names:

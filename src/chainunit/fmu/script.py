@@ -1,4 +1,4 @@
-"""The declarations in the script of a Python FMU; a script in `fmu/` has no others."""
+"""What an FMU may have in place of the values of its model: the declarations in the script of a Python FMU."""
 
 from __future__ import annotations
 
@@ -37,3 +37,14 @@ class Script:
     """The names of the variables in the FMU; all others here are those of the model."""
     sizes: ClassVar[dict[str, float]] = {}
     """Sizes of inputs in the reference results, by name, in place of the usual ones."""
+
+
+class FlatScript(Script):
+    """No values of its own, and flat names."""
+
+    names = "flat"
+
+
+def script_with_names(names: Names) -> type[Script]:
+    """The class without values of its own, with these names of the FMU's variables."""
+    return FlatScript if names == "flat" else Script

@@ -1,176 +1,26 @@
-"""The slave inside a pythonfmu FMU, for any model, by its declarations.
-
-It never raises: pythonfmu turns an exception into a fatal status, after which the host must give up. Instead the
-outputs become NaN, the step is discarded, and the reason is logged once (`chainunit.fmu.model_instance`).
-"""
+"""The class from which the script of a Python FMU derives its own."""
 
 from __future__ import annotations
 
-import atexit
-import binascii
-import contextlib
-import ctypes
-import json
-import math
-import os
-import sys
-from collections.abc import Callable
-from functools import partialmethod
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 from xml.etree.ElementTree import Element
 
-from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from ..core import messages
-from .model_instance import NAN, ModelInstance
-from .script import Script, text_in_fmu
-
-_NOTHING: dict[str, Any] = {"Real": NAN, "Integer": 0, "Boolean": False, "String": ""}
-"""By type of FMI, what stands for a value that cannot be told."""
-_Slave = TypeVar("_Slave")
-_LIBRARIES: set[Path] = set()
-
-
-def hold(namespace: dict[str, Any]) -> Callable[[type[_Slave]], type[_Slave]]:
-    """Decorate the class of a script with the script's own `namespace`, to mend two faults of pythonfmu 0.7.
-
-    pythonfmu imports the script by its name, runs its text again in the namespace of that module at every
-    instantiation, and takes the class from the module. It releases a reference to the namespace that it never took,
-    so that later instances in a process would work on freed memory: each run therefore takes a reference. And a
-    second FMU with a script of the same name would get the class of the first: each run therefore puts its class into
-    the namespace.
-    """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
-
-    def register(slave: type[_Slave]) -> type[_Slave]:
-        namespace[slave.__name__] = slave
-        return slave
-
-    return register
-
-
-def _release_at_exit(library: Path) -> None:
-    """Make the FMU's library release its interpreter handle while Python still runs.
-
-    On Linux, pythonfmu 0.7 releases that handle twice when the process ends, the second time in freed memory, which
-    sometimes aborts the host at its exit. The release here sets the handle to null, so that the later two do nothing.
-    """
-    if sys.platform != "linux" or library in _LIBRARIES or not library.is_file():
-        return
-    _LIBRARIES.add(library)
-
-    def release() -> None:
-        # if the host has already unloaded the library, the handle was released in the right order
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(str(library), mode=os.RTLD_NOW | os.RTLD_NOLOAD).finalizePythonInterpreter()
-
-    atexit.register(release)
+from .export import complete
+from .script import Script
 
 
 class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
-    """A model as pythonfmu's slave; a script in `fmu/` derives one class with `model` and perhaps `start`."""
-
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        _release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{type(self).__name__}.so")
-        self._instance = ModelInstance(self.model, self.start, self._tell)
-
-    def _tell(self, line: str) -> None:
-        variables = [v.name for v in self._instance.references.settable]
-        self.log(text_in_fmu(line, variables, self.names), Fmi2Status.error)
-
-    # -- life cycle
-
-    def setup_experiment(
-        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
-    ) -> None:
-        """Set the start time and, if it is known, the stop time."""
-        self._instance.set_times(start_time, stop_time)
-
-    def enter_initialization_mode(self) -> None:
-        """Check the parameters and start the states."""
-        self._instance.prepare()
-
-    def exit_initialization_mode(self) -> None:
-        """End the initialization: from here on fixed parameters cannot change."""
-        self._instance.end_initialization()
+    """A model as pythonfmu builds an FMU of it; a script in `fmu/` derives one class with `model` and perhaps
+    `start`. The FMU carries another script in its place, with the equations as printed Python."""
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """One communication step; False (discard) where the model, its inputs or the step are not usable."""
-        return self._instance.step(current_time, step_size)
-
-    # -- values; pythonfmu would raise for a value reference of another type, which is fatal for the host
-
-    def _assign(self, kind: str, vrs: list[int], values: list[Any]) -> None:
-        """Set parameters and inputs of that type; a fixed parameter only before the end of the initialization."""
-        for vr, value in zip(vrs, values, strict=True):
-            if not self._is_of(kind, vr):
-                continue
-            if vr >= self._instance.references.first_state:
-                self._instance.tell(messages.OUTPUT_SET.format(reference=vr))
-                continue
-            self._instance.assign(vr, float(bool(value) if kind == "Boolean" else value))
-
-    set_real = partialmethod(_assign, "Real")
-    set_integer = partialmethod(_assign, "Integer")
-    set_boolean = partialmethod(_assign, "Boolean")
-    set_string = partialmethod(_assign, "String")
-
-    def _is_of(self, kind: str, vr: int) -> bool:
-        """Whether there is a variable of that type with that reference; a line in the log where there is none."""
-        types = self._instance.references.types
-        if types.get(vr) == kind:
-            return True
-        line = messages.OTHER_TYPE if vr in types else messages.NO_REFERENCE
-        self._instance.tell(line.format(reference=vr, type=kind))
-        return False
-
-    def _read(self, kind: str, vrs: list[int]) -> list[Any]:
-        """Values of that type by reference. A value that cannot be told is NaN, or 0, false or an empty text."""
-        nothing = _NOTHING[kind]
-        try:
-            values = [self._instance.value(vr) if self._is_of(kind, vr) else NAN for vr in vrs]
-        except BaseException as reason:
-            self._instance.tell(f"values cannot be read: {reason!r}")
-            return [nothing] * len(vrs)
-        if kind == "Real":
-            return values
-        return [type(nothing)(value) if math.isfinite(value) else nothing for value in values]
-
-    get_real = partialmethod(_read, "Real")
-    get_integer = partialmethod(_read, "Integer")
-    get_boolean = partialmethod(_read, "Boolean")
-    get_string = partialmethod(_read, "String")
-
-    # -- states of the FMU, and its description
-
-    def _get_fmu_state(self) -> dict[str, Any]:
-        return self._instance.saved()
-
-    def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        self._instance.restore(state)
-
-    @staticmethod
-    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        text = json.dumps(state).encode()
-        return binascii.crc32(text).to_bytes(4, "big") + text
-
-    @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        checksum, text = state[:4], state[4:]
-        if checksum != binascii.crc32(text).to_bytes(4, "big"):
-            return {"damaged": messages.STATE_DAMAGED}
-        try:
-            saved = json.loads(text)
-        except ValueError:
-            return {}
-        return saved if isinstance(saved, dict) else {}
+        """Of the class in the FMU, see `chainunit.fmu.printed_slave`."""
+        raise NotImplementedError
 
     def to_xml(self, model_options: Any = None) -> Element:
         """The description from the declarations, for pythonfmu's build (its own description lacks units, bounds,
         dependencies and initial unknowns). Also writes the files that the FMU needs into `resources`."""
-        from .export import complete  # not copied into the FMU: importers never call this
-
         return complete(type(self), Path(self.resources))

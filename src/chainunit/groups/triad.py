@@ -29,6 +29,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
+from ..core.engines import MATH
 from ..core.model import Requirement
 from ..core.planar import Link, Motion, Vec2
 from .body import Bar, Load, Mass
@@ -355,10 +358,6 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
     third order in theta. Its coefficients come from seven samples, and its roots z = exp(i theta) are eigenvalues of
     a companion matrix. Newton's method on the three lengths polishes each real root.
     """
-    import numpy as np
-
-    from ..core.engines import MATH
-
     legs = rods_at([Motion(p) for p in pins], lengths, arms)
     (p1, p2, p3), (l1, l2, l3) = pins, lengths
     c, e = arms[0] - arms[1], arms[2] - arms[1]

@@ -493,7 +493,8 @@ class ChamberForces(InverseMachine):
     fmu_data = FmuData(
         notes="\n\nThe start values describe the packaged study, with three exceptions: the shaft stands, "
         "ratio is 1 (there 50), and the processing forces are 0 (there 10 N a side), which makes the rocker torque "
-        "some percent less."
+        "some percent less.",
+        sizes={"stop.stiffness": 100.0, "stop.damping": 5.0},  # a stop that blocks nothing
     )
     description = (
         "Forces in a chain unit: crank, coupler, rocker and two working organs; "

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
 
 from ..core.errors import InputError
-from ..core.model import Making, Requirement, StartProblem
+from ..core.model import FmuData, Making, Requirement, StartProblem
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
@@ -210,7 +210,8 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
         """
 
         name = "ChainUnitFlexible"
-        made = Making(f"flexible({walls}, {webs})", flexible, (walls, webs))
+        made = Making(flexible, (walls, webs))
+        fmu_data = FmuData(sizes=ChamberForces.fmu_data.sizes)
         description = (
             f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "
             "in the web: from motor angle and speed to torque, load port and every support reaction"

@@ -1,7 +1,7 @@
 """The filter of `chainunit.machines.load_observer`: rates of a covariance, and of alarms.
 
 Symmetric matrices are lists of rows; states store the upper triangle, row after row. Numbers are those of any engine
-`xp`. Standard library only.
+`xp`.
 """
 
 from __future__ import annotations

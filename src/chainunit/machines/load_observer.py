@@ -27,7 +27,7 @@ from collections.abc import Iterator
 from typing import Any, ClassVar, NamedTuple
 
 from ..core.engines import Dual, dual, slope
-from ..core.model import Model, Part
+from ..core.model import FmuData, Model, Part
 from ..core.ports import measured_terminal
 from ..mechanism.machine import MachineState, Mechanism
 from . import chain_unit
@@ -316,6 +316,8 @@ class LoadObserver(Model):
     """
 
     name = "LoadObserver"
+    # the torque that holds the machine nearly at rest: in the reference results no load jumps
+    fmu_data = FmuData(sizes={"w": 0.05, "current": 0.1})
     description = (
         "Observer of a chain unit: from motion and a measured signal of the motor to feed and processing force of "
         "each side with standard deviations, and an alarm where one side is overloaded"

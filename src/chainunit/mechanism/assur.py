@@ -6,8 +6,6 @@ takes is free. In a full matching each link depends on the other links of its eq
 other, directly or by a circle, form a group, which no smaller part of it determines. The groups come in the order in
 which they can be solved. This is the fine Dulmage-Mendelsohn decomposition of the equations; where all their ranks
 are full, it is that into Assur groups.
-
-Standard library only: FMUs carry this file.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Smooth functions of one variable for the expressions of loads: steps, ramps, and tables.
 
 Their slopes are exact in every engine, and have no jump: a solver steps over them, and the load port follows them.
-Standard library only: FMUs carry this file.
 """
 
 from __future__ import annotations
@@ -13,6 +12,8 @@ from functools import cached_property
 from itertools import pairwise
 from operator import mul
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..core import engines
 
@@ -134,8 +135,6 @@ class TableCurve:
 
     @cached_property
     def _arrays(self) -> tuple[Any, Any]:
-        import numpy as np
-
         return np.array(self._later), np.array(self._pieces).T
 
 

@@ -1,4 +1,4 @@
-"""The end stops of a driver that moves by itself within a range. Standard library only: FMUs carry this file."""
+"""The end stops of a driver that moves by itself within a range."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Expressions of named quantities, such as ``2 * r + sqrt(l * l - r * r)``, for any engine.
-
-Standard library only: FMUs carry this file.
-"""
+"""Expressions of named quantities, such as ``2 * r + sqrt(l * l - r * r)``, for any engine."""
 
 from __future__ import annotations
 

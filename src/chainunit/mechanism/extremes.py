@@ -1,7 +1,7 @@
 """The largest and the least value of a quantity over the way of the driver, such as the place of a ram.
 
 The search of `extreme` has the same operations for all values, so that symbols do, too: an FMU computes the extremes
-of its own lengths before a run. Standard library only: FMUs carry this file. For arrays: `sampled_quantities`.
+of its own lengths before a run. For arrays: `sampled_quantities`.
 """
 
 from __future__ import annotations

@@ -263,7 +263,7 @@ class InverseMachine(LinkageModel, MachineModel):
             "name": cls.direct_name,
             "description": cls.direct_description
             or words_on_motion(f"{cls.name} that moves by itself", port),
-            "made": Making(f"{cls.expression()}.direct()", direct_model, (cls,)),
+            "made": Making(direct_model, (cls,)),
             "inverse": cls,
             "fmu_data": cls.fmu_data,
             "repeated": cls.repeated,

@@ -1,5 +1,5 @@
 """Extremes, roots and means of sampled quantities over the way of a driver, between the places at which they are
-sampled, too. No FMU carries this file."""
+sampled, too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pins and links of a mechanism that a picture shows, and the sketch of a machine. No FMU carries this file."""
+"""The pins and links of a mechanism that a picture shows, and the sketch of a machine."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 """Zeros of a quantity over the way of a driver, from its values and its exact slopes, so that none is missed: simple
-ones, those at which it only touches zero, and ranges in which it is zero. No FMU carries this file."""
+ones, those at which it only touches zero, and ranges in which it is zero."""
 
 from __future__ import annotations
 

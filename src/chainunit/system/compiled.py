@@ -7,7 +7,6 @@ no error of a coupling.
 
 from __future__ import annotations
 
-import json
 import keyword
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -77,7 +76,7 @@ def compiled(
         )
     description = _description(system, models, name, printable(title))
     description |= {"about": about and asdict(about), "experiment": dict(experiment or {})}
-    model = system_model(json.dumps(description, sort_keys=True))
+    model = system_model(description)
     values = system.values
     layout = model.parameter_layout
     limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}

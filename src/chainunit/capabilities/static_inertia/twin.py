@@ -103,7 +103,7 @@ def twin_model(machine: type[InverseMachine]) -> type[InverseMachine]:
         "__module__": __name__,
         "name": f"{machine.name}OneInertia",
         "description": f"{machine.name} with one inertia",
-        "made": Making(f"twin_model({machine.expression()})", twin_model, (machine,)),
+        "made": Making(twin_model, (machine,)),
         "Parameters": declared_class("Parameters", (machine.Parameters, FixedInertia)),
         "Inputs": declared_class("Inputs", (machine.Inputs, InertiaSpeed)),
         "Feed": machine.Feed,

@@ -19,8 +19,8 @@ from ...core.native.elementary_code import HEADER, header
 from ..companion_files import companion_files
 from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes
-from ..recipe import recipes, script_with_names
-from ..script import Names
+from ..recipe import recipes
+from ..script import Names, script_with_names
 from .generate import kernels, rules, tables
 from .platforms import build, choose, units_of
 
@@ -91,7 +91,7 @@ def export(
         where the compiler fails, with its messages.
     """
     targets, compiler = choose(platforms, fmi)
-    interface = interface_of(model, start, script_with_names(model, names))
+    interface = interface_of(model, start, script_with_names(names))
     file = Path(file)
     folder(file.parent)
     of_version = _VERSIONS[fmi]

@@ -1,5 +1,4 @@
-"""Why a linkage does not close: the group, its gap, and the lengths with which it closes. Standard library only: FMUs
-carry this file."""
+"""Why a linkage does not close: the group, its gap, and the lengths with which it closes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The declarations that every linkage from a file has: parameters, inputs and outputs. Standard library only."""
+"""The declarations that every linkage from a file has: parameters, inputs and outputs."""
 
 from __future__ import annotations
 

@@ -6,7 +6,6 @@ Each entry that is a quantity is a number in SI units, a text with a unit ("80 m
 
 from __future__ import annotations
 
-import json
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -105,7 +104,7 @@ def linkage_in(file: Path) -> tuple[type[InverseMachine], tuple[UnusualValue, ..
             raise InputError.joined([*error.faults, *slips]) from error
 
 
-def description_of(data: Mapping[str, Any], name: str, folder: Path = Path()) -> str:
+def description_of(data: Mapping[str, Any], name: str, folder: Path = Path()) -> dict[str, Any]:
     """The description of a machine from the tables of a file in a `folder`; `name` is that of the machine where the
     file has none.
 
@@ -120,7 +119,7 @@ def description_of(data: Mapping[str, Any], name: str, folder: Path = Path()) ->
 class _LinkageReader(LoadReader):
     """The reader of one file."""
 
-    def description(self) -> str:
+    def description(self) -> dict[str, Any]:
         """The description."""
         study_fault(self.data)
         self.fault_drivers()
@@ -174,7 +173,7 @@ class _LinkageReader(LoadReader):
         }
         if self.derived:
             described["derived"] = [*self.derived.items()]
-        return json.dumps(described, sort_keys=True)
+        return described
 
     def fault_drivers(self) -> None:
         """Fault a list of drivers; the reader goes on with the first one."""

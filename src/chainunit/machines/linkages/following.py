@@ -1,5 +1,4 @@
-"""A linkage with values, followed over the way of its driver: how its links turn, or where it does not close.
-Standard library only: FMUs carry this file."""
+"""A linkage with values, followed over the way of its driver: how its links turn, or where it does not close."""
 
 from __future__ import annotations
 

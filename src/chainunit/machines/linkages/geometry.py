@@ -2,8 +2,7 @@
 group.
 
 A description places the points of a link in the link's own frame. A group has frames of its own for its links
-(`chainunit.groups`): a `LinkFrame` is the place of such a frame in that of the description. Standard library only:
-FMUs carry this file.
+(`chainunit.groups`): a `LinkFrame` is the place of such a frame in that of the description.
 """
 
 from __future__ import annotations

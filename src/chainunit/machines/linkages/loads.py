@@ -1,5 +1,5 @@
 """Loads of a linkage from a description: forces and torques by expressions of the motion, springs with dampers, and
-tables over the coordinate. Standard library only: FMUs carry this file."""
+tables over the coordinate."""
 
 from __future__ import annotations
 

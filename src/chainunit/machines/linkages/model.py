@@ -1,7 +1,7 @@
 """A machine from the description of its linkage: the model of a file, without a line of code of its own.
 
-The description is a text in JSON, which a checked file gives (`chainunit.machines.linkages.file`). It is the
-whole definition: by it another process, or an FMU, builds the same model. Standard library only.
+The description is data as JSON has them, which a checked file gives (`chainunit.machines.linkages.file`). It is the
+whole definition: by it another process builds the same model.
 
 x points right, y up, angles count counter-clockwise from the x axis. The coordinate q is that of the driver.
 """
@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, cast
 
 from ...core.engines import MATH
@@ -60,27 +60,28 @@ _FIXED_RATIO = (
 )
 
 
-def machine_of(text: str) -> type[InverseMachine]:
-    """The model of a description.
+_MACHINES: dict[str, type[InverseMachine]] = {}
+
+
+def machine_of(data: Mapping[str, Any]) -> type[InverseMachine]:
+    """The model of a description; equal descriptions have one model.
 
     Raises
     ------
     InputError
         where the linkage is not determined, has a group that is not covered, or does not close.
     """
-    return _machine_of(text)
-
-
-@cache
-def _machine_of(text: str) -> type[InverseMachine]:
-    return LinkageDescription(json.loads(text), text).model()
+    key = json.dumps(data, sort_keys=True)
+    if key not in _MACHINES:
+        _MACHINES[key] = LinkageDescription(data).model()
+    return _MACHINES[key]
 
 
 class LinkageDescription(LinkageOutputs):
     """The description of a linkage with its structure: what all values of its parameters share."""
 
-    def __init__(self, data: Mapping[str, Any], text: str) -> None:
-        self.data, self.text = data, text
+    def __init__(self, data: Mapping[str, Any]) -> None:
+        self.data = data
         self.structure = structure_of(data)
         self.way = DriverWay.of(data)
         check_groups(self.structure, data.get("groups", ()))
@@ -390,7 +391,7 @@ class LinkageDescription(LinkageOutputs):
             driver_noun = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
             direct_description = words_on_motion(f"{noun}, moving by itself", described.port)
-            made = Making(f"machine_of({described.text!r})", machine_of, (described.text,))
+            made = Making(machine_of, (data,))
             fmu_data = FmuData(described.notes, About(**data.get("about", {})))
             repeated = repeated_outputs(described.structure, described.variable)
             constant = constant_outputs(described.structure, described.variable)
@@ -413,10 +414,10 @@ class LinkageDescription(LinkageOutputs):
                 return described.linkage(xp, p, u)
 
             @classmethod
-            def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
+            def check(cls, p: Any) -> Any:
                 """See `Model.check`; a refusal says where the linkage does not close."""
                 try:
-                    return super().check(p, derived)
+                    return super().check(p)
                 except GeometryError as error:
                     where = described.obstacle(p)
                     raise (GeometryError(where) if where else error) from None

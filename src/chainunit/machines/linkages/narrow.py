@@ -1,5 +1,5 @@
 """Checks of a linkage over the way of its driver: the least margin of each group between the places at which it is
-looked at, and triads. Standard library only: FMUs carry this file."""
+looked at, and triads."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The outputs of a linkage from a file: their declaration, and their values at one state. Standard library only: FMUs
-carry this file."""
+"""The outputs of a linkage from a file: their declaration, and their values at one state."""
 
 from __future__ import annotations
 

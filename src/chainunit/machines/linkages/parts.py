@@ -1,5 +1,4 @@
-"""From the description of a linkage to its Assur groups: bars with their frames, rails, and assembly modes. Standard
-library only: FMUs carry this file."""
+"""From the description of a linkage to its Assur groups: bars with their frames, rails, and assembly modes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""A linkage without numbers: its links and joints as entries, and the groups that follow from them. Standard library
-only: FMUs carry this file."""
+"""A linkage without numbers: its links and joints as entries, and the groups that follow from them."""
 
 from __future__ import annotations
 

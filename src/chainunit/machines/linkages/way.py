@@ -1,4 +1,4 @@
-"""The way of a driver: all the way round, or within its range. Standard library only: FMUs carry this file."""
+"""The way of a driver: all the way round, or within its range."""
 
 from __future__ import annotations
 

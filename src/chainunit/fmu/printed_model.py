@@ -1,0 +1,99 @@
+"""A model as a module of Python for its FMU: tables of its variables, and its functions as printed Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from ..core.integrators import MAX_STEPS
+from ..core.model import Model, Requirement
+from ..core.native.kernels import ModelFunction, kernels, output_groups
+from ..core.native.python_code import python_text
+from .description import Interface, shared_interface
+
+_HEAD = '''\
+"""{title}: tables and equations, printed from the model of chainunit."""
+
+from math import *
+
+from .core.native.python_math import *
+
+'''
+
+
+def printed_model(interface: Interface) -> str:
+    """The module of a model, as `chainunit.fmu.model_instance.ModelInstance` takes it."""
+    model = interface.model
+    rows = "\n".join(f"{name} = {_text(value)}" for name, value in _tables(interface).items())
+    head = _HEAD.format(title=model.name)
+    return f"{head}{interface.text(rows)}\n\n\n{python_text(_functions(model))}"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return "".join(["[", *(f"\n    {row!r}," for row in value), "\n]" if value else "]"])
+    return repr(value)
+
+
+def _tables(interface: Interface) -> dict[str, Any]:
+    """The tables by name; a variable in them is its value reference, or its place among outputs or inputs."""
+    model = interface.model
+    inputs, parameters = model.input_layout.names, model.parameter_layout.names
+
+    def follows(name: str) -> int:
+        return inputs.index(model.input_rates[name]) if name in model.input_rates else -1
+
+    def required(requirements: tuple[Requirement, ...]) -> list[Any]:
+        return [
+            (r.subject, r.unit, r.why, r.remedy, tuple(map(parameters.index, r.context)))
+            for r in requirements
+        ]
+
+    settable = [*interface.signals_of("parameter"), *interface.signals_of("input")]
+    types = {s.reference: s.variable.type for s in interface.signals if s.variable.type != "Real"}
+    return {
+        "NAME": model.name,
+        "SETTABLE": [_settable(s.variable, s.start) for s in settable],
+        "PARAMETERS": len(parameters),
+        "NOMINAL": tuple(v.quantity.nominal or 1.0 for v in interface.states),
+        "OUTPUTS": len(interface.others),
+        "TERMINALS": _at_terminals(model),
+        "TYPES": types,
+        "RATES": [
+            (inputs.index(one), follows(one), follows(other)) for one, other in model.input_rates.items()
+        ],
+        "DERIVED": bool(model.derived_count),
+        "REQUIRED": required(model.required),
+        "START_REQUIRED": required(model.start_problem.required),
+        "UNKNOWNS": model.start_problem.unknowns,
+        "START_ROUNDS": model.start_problem.rounds,
+        "CONTROLLED": model.controlled,
+        "MAX_STEPS": parameters.index(MAX_STEPS) if interface.states else -1,
+    }
+
+
+def _settable(variable: Any, start: float | None) -> tuple[Any, ...]:
+    """The row of a parameter or an input, see `chainunit.fmu.model_instance.Settable`."""
+    q = variable.quantity
+    return (
+        *(variable.name, q.unit, variable.description, q.allowed_range, q.low, q.high, q.slack),
+        *(q.open_low, q.tunable, q.type, float(start or 0.0)),
+    )
+
+
+def _at_terminals(model: type[Model]) -> list[int]:
+    """The outputs that are evaluated without the others, if there are others; by place."""
+    first, *others = output_groups(model)
+    return first if others else []
+
+
+def _functions(model: type[Model]) -> Iterator[ModelFunction]:
+    """The functions of a model, with all outputs in declared order and those at the terminals."""
+    interface = shared_interface(model)
+    names = [v.name for v in interface.others]
+    yield from kernels(interface.trace, interface.derived, slopes=False, columns=names)
+    if places := _at_terminals(model):
+        columns = [names[i] for i in places]
+        first = next(kernels(interface.trace, interface.derived, slopes=False, columns=columns))
+        yield replace(first, name="values_at_terminals")
