@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import subprocess
 from importlib.resources import files
 
-from wasm_hosts import NODE
+from javascript_hosts import NODE
 
 from chainunit.report.live.page import live_of_config
 from chainunit.study.choice import choose
 
 _SCRIPT = """
-const fs = require("fs");
-const given = JSON.parse(fs.readFileSync(0, "utf8"));
-const bytes = {};
-for (const [name, text] of Object.entries(given.modules)) bytes[name] = Buffer.from(text, "base64");
 %s
-(async () => {
-  const model = await liveModel(given.data, bytes);
+(() => {
+  const model = liveModel(%s, %s);
   // values by the keys of a study file, "feed.left.material_mass"
   const values = (changed) => {
     const list = model.study.slice();
@@ -39,11 +34,8 @@ for (const [name, text] of Object.entries(given.modules)) bytes[name] = Buffer.f
 def in_node(live, script):
     """The value that a script returns, which has `model` and ``values``, a function of changes by key."""
     code = (files("chainunit.report.live") / "model.js").read_text("utf-8")
-    modules = {name: base64.b64encode(content).decode() for name, content in live.modules.items()}
-    job = json.dumps({"data": live.data, "modules": modules})
-    run = subprocess.run(
-        [NODE, "-e", _SCRIPT % (code, script)], input=job, capture_output=True, text=True, check=False
-    )
+    whole = _SCRIPT % (code, json.dumps(live.data), live.equations, script)
+    run = subprocess.run([NODE, "-"], input=whole, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr[-2000:]
     return json.loads(run.stdout)
 

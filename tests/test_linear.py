@@ -137,11 +137,10 @@ def drive():
 
 
 def test_the_point_of_a_run_needs_no_compiler(monkeypatch):
-    """Without one, and without wasmtime, Python makes the run."""
+    """Without one Python makes the run."""
     file, at = str(EXAMPLES / "jam_with_driveline.toml"), "start_up:0.02 s"
     wanted = linear_point(file, at).states
     monkeypatch.setattr(transients, "compiler", lambda: None)
-    monkeypatch.setattr(transients, "has_wasmtime", lambda: False)
     assert linear_point(file, at).states == pytest.approx(wanted, rel=1e-5, abs=1e-9)
 
 

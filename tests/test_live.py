@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from javascript_hosts import node
 from live_pages import OUTCOME, in_node, live_of
-from wasm_hosts import NODE
 
 from chainunit import InputError
 from chainunit.app.cli import live as live_command
@@ -42,9 +42,7 @@ from chainunit.study.window import Phase, Trip, Window
 EXAMPLES = Path(__file__).parents[1] / "examples"
 LINKAGES = sorted((EXAMPLES / "linkages").glob("*.toml"))
 QUICK = ("chain_unit", "slider_crank_press", "scotch_yoke_pump", "toggle_clamp", "cylinder_lift")
-pytestmark = pytest.mark.skipif(
-    NODE is None, reason="no node, which runs the page's script as a browser does"
-)
+pytestmark = node
 
 
 def varied(live, count, seed, of=("machine", "feed")):
@@ -197,7 +195,7 @@ def test_an_empty_start_is_made_once(ratio, tmp_path):
       runs.spent = 0;
       const signals = runs.signals({{}}, true, from);
       runs.setInputs(signals);
-      runs.k.functions.start();
+      runs.k.start();
       const whole = runs.run(0, run.made, signals);
       const off = (a, b) => Math.max(...a.map((x, k) => Math.abs(x - b[k]))) / Math.max(...b.map(Math.abs));
       const even = run.time.every((t, k) => Math.abs(t - k * runs.of.step) < 1e-9);

@@ -203,12 +203,42 @@ def test_a_linkage_moves_in_its_page(name, tmp_path):
         assert not page.console and page.requests == [file.as_uri()]
 
 
-def test_a_page_without_webassembly_says_so(page_file, tmp_path):
-    text = page_file.read_text("utf-8").replace(
-        "<script>", "<script>delete window.WebAssembly;</script><script>", 1
-    )
+def test_a_page_evaluates_no_text_and_needs_no_webassembly(page_file, tmp_path):
+    """Its policy admits neither, and the machine runs."""
+    text = page_file.read_text("utf-8")
+    assert "unsafe-eval" not in text
     file = tmp_path / "without.html"
+    file.write_text(
+        text.replace("<script>", "<script>delete window.WebAssembly;</script><script>", 1), "utf-8"
+    )
+    with Page(file, tmp_path / "browser") as page:
+        ready(page)
+        assert not page.console and shown(page)
+
+
+def test_a_page_whose_equations_are_damaged_says_so(page_file, tmp_path):
+    text = page_file.read_text("utf-8").replace('id="live-data">', 'id="live-data">A', 1)
+    file = tmp_path / "damaged.html"
     file.write_text(text, "utf-8")
     with Page(file, tmp_path / "browser") as page:
-        page.wait("document.getElementById('live-none').textContent.includes('not to be had')")
+        page.wait("document.getElementById('live-none').textContent.includes('does not run here')")
         assert page.evaluate("document.getElementById('live-root').hidden")
+
+
+def test_a_frame_and_a_transient_are_short(page_file, tmp_path):
+    """The least of a slider's moves, and of the start and event after each: the machine may have other work."""
+    with Page(page_file, tmp_path / "browser") as page:
+        ready(page)
+        times = []
+        for share in np.linspace(0.3, 0.6, 20):
+            moved(page, "machine.crank.m", share)
+            read = "JSON.stringify([root.dataset.frame, root.dataset.transient].map(Number))"
+            times.append(
+                json.loads(
+                    page.evaluate(
+                        f"(() => {{ const root = document.getElementById('live-root'); return {read}; }})()"
+                    )
+                )
+            )
+    frame, transient = np.min(times, axis=0)
+    assert frame < 16.0 and transient < 100.0, (frame, transient)

@@ -10,7 +10,7 @@ import subprocess
 import numpy as np
 import pytest
 from browser import CHROMIUM
-from wasm_hosts import NODE
+from javascript_hosts import NODE, node
 
 from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import blocks as b
@@ -22,7 +22,7 @@ from chainunit.report.packing import packed_bytes
 TEXTS = ["", "a", "abc" * 2000, "".join(random.Random(1).choices("abcdef ", k=70_000)), "é € " * 30]
 
 
-@pytest.mark.skipif(NODE is None, reason="no node here")
+@node
 def test_a_page_unpacks_what_python_packed():
     """At once: a browser prints a page as soon as it is loaded, and does not wait for a stream."""
     script = (

@@ -1,11 +1,9 @@
 """The same bits on every platform: one digest of a run of a compiled drive, in native code of several compilers and
-machines, and in WebAssembly."""
+machines, and in JavaScript."""
 
 from __future__ import annotations
 
-import base64
 import importlib.util
-import json
 import shutil
 import struct
 import subprocess
@@ -17,10 +15,9 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from wasm_hosts import NODE, addresses, numbers
+from javascript_hosts import in_node, node
 
 from chainunit.core.native.compilers import compiler, host
-from chainunit.core.wasm.module import wasm_module
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
 from chainunit.study.choice import drive_of
@@ -34,7 +31,6 @@ STEP, STEPS, WHOLE = 1e-3, 500, 2000
 """Communication step [s], steps of a piece with the same inputs, and pieces of the whole run: 1e6 steps."""
 here = pytest.mark.skipif(host() != "linux64", reason="run on 64-bit Linux")
 zig = pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")
-node = pytest.mark.skipif(NODE is None, reason="no node, which runs the modules as a browser does")
 SYSTEMS = {
     # study file of a compiled drive, or a model; by input its lowest and highest value
     "chain_unit": (
@@ -88,8 +84,8 @@ class Job:
         values = [reference[name] for name in (*self.bounds, *self.results)]
         job = (
             struct.pack(f"<{len(head) + len(values)}I", *head, *values)
-            + numbers([STEP])
-            + numbers(self.given)
+            + struct.pack("<d", STEP)
+            + np.ascontiguousarray(self.given).tobytes()
         )
         (folder / "job").write_bytes(job)
         program = folder / "host.exe"
@@ -107,40 +103,53 @@ class Job:
         return process.stdout.split()
 
     def in_node(self):
-        """The digests of the module in node."""
-        module = wasm_module(self.model, slopes=False)
-        d = module.description
-        chosen = -(-d["memory"]["free"] // 16) * 16
-        table = addresses(d, self.results)
-        parameters = self.model.parameter_layout.values(self.whole.parameters)
-        inputs = d["inputs"]
-        job = {
-            "module": base64.b64encode(module.content).decode(),
-            "writes": [
-                (at, base64.b64encode(data).decode())
-                for at, data in ((d["parameters"]["address"], numbers(parameters)), (chosen, table))
-            ],
-            "inputs": [inputs["address"] + 8 * inputs["names"].index(name) for name in self.bounds],
-            "given": base64.b64encode(numbers(self.given)).decode(),
-            "chosen": chosen,
-            "into": chosen + -(-len(table) // 16) * 16,
-            "groups": (1 << len(d["groups"])) - 1,
-            "results": len(self.results),
-            "step": STEP,
-            "steps": STEPS,
-            "pieces": self.pieces,
-            "every": self.every,
+        """The digests of JavaScript in node."""
+        inputs = list(self.model.input_layout.names)
+        given = {
+            "p": np.array(self.model.parameter_layout.values(self.whole.parameters), float),
+            "inputs": [inputs.index(name) for name in self.bounds],
+            "values": self.given,
+            "results": self.results,
+            **{"step": STEP, "steps": STEPS, "pieces": self.pieces, "every": self.every},
         }
-        script = [NODE, str(HERE / "digest.mjs")]
-        run = subprocess.run(script, input=json.dumps(job), capture_output=True, text=True, check=True)
-        return run.stdout.split()
+        return in_node({"m": self.model}, DIGEST, given)
+
+
+DIGEST = """
+const m = models.m, { inputs, values, results, step, steps, pieces, every } = given, digests = [];
+const chosen = placesOf(m, results);
+const row = new Float64Array(results.length), words = new Uint32Array(row.buffer);
+const take = (piece) => inputs.forEach((place, k) => (m.u[place] = values[piece * inputs.length + k]));
+m.p.set(given.p);
+take(0);
+m.derive?.();
+m.start();
+let [a, b] = [0x811c9dc5, 0x9747b28c];
+const digest = (r) => {
+  if (r === 0) return;
+  for (let n = 0; n < row.length; n++) row[n] = chosen[n][0][chosen[n][1]];
+  for (const word of words) {
+    a = Math.imul(a ^ word, 0x01000193);
+    b = Math.imul(b ^ word, 0x85ebca6b);
+    b ^= b >>> 13;
+  }
+};
+for (let piece = 0; piece < pieces; ++piece) {
+  take(piece);
+  const rows = m.run({ begin: piece * steps * step, step, rows: steps + 1, between: false, row: digest });
+  if (rows !== steps + 1) throw new Error(`${rows} rows in piece ${piece}`);
+  if ((piece + 1) % every === 0) digests.push([a, b].map((x) => (x >>> 0).toString(16).padStart(8, "0")).join(""));
+}
+return digests;
+"""
+"""The digests of digest.c of the same run."""
 
 
 @pytest.mark.second
 @here
 @node
 @pytest.mark.parametrize("name", SYSTEMS)
-def test_native_code_and_webassembly_have_the_same_bits(name, tmp_path):
+def test_native_code_and_javascript_have_the_same_bits(name, tmp_path):
     """10,000 steps: the motor follows jumps of its reference under jumps of the load."""
     job = Job(name, tmp_path, 20)
     digests = job.native()
@@ -199,5 +208,5 @@ def test_every_platform_has_the_same_bits(name, platform, tmp_path):
 @node
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
-def test_a_million_steps_in_webassembly(name, tmp_path):
+def test_a_million_steps_in_javascript(name, tmp_path):
     assert Job(name, tmp_path, WHOLE).in_node() == whole_run(name)

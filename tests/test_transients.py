@@ -1,5 +1,5 @@
-"""Blocks of transients in compiled code, and in WebAssembly without a compiler: against the monolithic solution, and
-each run as if it were alone."""
+"""Blocks of transients in compiled code, and in Python without a compiler: against the monolithic solution, and each
+run as if it were alone."""
 
 from __future__ import annotations
 
@@ -22,6 +22,9 @@ from chainunit.system import Profile, compiled, monolithic
 KEPT = ["motor.tau", "motor.air_gap_tau", "machine.rocker.tau", "motor.w", "motor.phi"]
 DRIVEN = ["motor.w_ref", "machine.left.processing_force"]
 STEP, STOP = 1e-3, 1.2
+
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 
 def drive_of(text=""):
@@ -56,22 +59,8 @@ class Rig:
         return self.loop.run(self.p, self.loads, states, signals=np.moveaxis(table, 1, -1), **options)
 
 
-@pytest.fixture(scope="module", params=["native", "wasm"], autouse=True)
-def engine(request):
-    """The loop: native, or as it is where no C compiler is found."""
-    if request.param == "native":
-        if compiler() is None:
-            pytest.skip("no C compiler")
-        yield request.param
-        return
-    pytest.importorskip("wasmtime")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(transients, "compiler", lambda: None)
-        yield request.param
-
-
 @pytest.fixture(scope="module")
-def rig(engine):
+def rig():
     return Rig(guarded=["motor.tau"])
 
 
@@ -196,20 +185,19 @@ def test_wrong_requests_are_refused(rig):
     assert rig.model.internal_step(MATH, rig.model.with_derived(MATH, rig.p)) < STEP
 
 
-def without_any_fast_loop(monkeypatch):
+def without_compiler(monkeypatch):
     monkeypatch.setattr(transients, "compiler", lambda: None)
-    monkeypatch.setattr(transients, "has_wasmtime", lambda: False)
     assert not transients.can_run()
 
 
-def test_without_any_fast_loop_python_makes_the_runs(rig, monkeypatch):
+def test_without_a_compiler_python_makes_the_runs(rig, monkeypatch):
     """Runs of different ends, with a guard, varying values, and states that leave all bounds, as the fast loop."""
     signals = [events(rig.drive, force, 0.02) for force in (500.0, 1500.0)]
     stop, limits = [0.1004, 0.08], np.array([[np.inf, 20.0]])
     wild = np.repeat(np.array(rig.start, float)[:, None], 2, axis=1)
     wild[rig.model.state_layout.names.index("motor.w"), 1] = 1e200
     fast, failed = rig.run(signals, stop=stop, limits=limits), rig.run(signals, states=wild, stop=0.01)
-    without_any_fast_loop(monkeypatch)
+    without_compiler(monkeypatch)
     own = Rig(guarded=["motor.tau"])
     assert type(own.loop._loop).__name__ == "PythonLoop"
     result = own.run(signals, stop=stop, limits=limits)
@@ -237,46 +225,27 @@ def test_without_any_fast_loop_python_makes_the_runs(rig, monkeypatch):
 
 
 @pytest.mark.second
-def test_without_any_fast_loop_python_makes_the_runs_of_chains(monkeypatch):
+def test_without_a_compiler_python_makes_the_runs_of_chains(monkeypatch):
     """They need the control of the error."""
     text = 'organ = "chain"\n[chain]\nrods = 2\n'
     fast = Rig(text)
     signals = events(fast.drive, 200.0, 0.01)
     wanted = fast.run([signals], stop=0.03).rows[:, 0]
-    without_any_fast_loop(monkeypatch)
+    without_compiler(monkeypatch)
     rows = Rig(text).run([signals], stop=0.03).rows[:, 0]
     assert np.max(np.abs(rows - wanted) / np.max(np.abs(wanted), axis=1, keepdims=True)) < 1e-6
 
 
 def test_directions_need_a_compiler(monkeypatch):
-    without_any_fast_loop(monkeypatch)
+    without_compiler(monkeypatch)
     with pytest.raises(InputError, match=r"^no C compiler .*chainunit\[cross\].* found$"):
         Rig(by=["machine.left.web_mass"])
 
 
-def test_both_loops_agree_to_the_tolerance_of_the_integrator(engine, rig, monkeypatch):
-    """Also beyond one piece of rows, and in more threads than one."""
-    if engine == "native" or compiler() is None:
-        pytest.skip("compares the other loop with native code")
-    many = [events(rig.drive, force) for force in (0.0, 500.0, 1500.0)]
-    assert type(rig.loop._loop).__name__ == "WasmLoop"
-    of_wasm = rig.run(many, stop=[1.2, 0.9, 1.15], workers=2)
-    monkeypatch.setattr(transients, "compiler", compiler)
-    of_native = Rig(guarded=["motor.tau"]).run(many, stop=[1.2, 0.9, 1.15])
-    assert of_wasm.count.tolist() == of_native.count.tolist() == [1201, 901, 1151]
-    for k, n in enumerate(of_native.count):
-        rows, wanted = of_wasm.rows[:, k, :n], of_native.rows[:, k, :n]
-        assert np.max(np.abs(rows - wanted) / np.max(np.abs(wanted), axis=1, keepdims=True)) < 1e-7
-
-
-def test_a_direction_gives_the_derivative_of_the_run(engine, rig):
+def test_a_direction_gives_the_derivative_of_the_run(rig):
     """By a parameter, an input and a state at the start, each against differences of runs, through a lump that the
     loop of the control follows. The values themselves are those of a run without directions."""
     by = {"machine.left.web_mass": 2.0, "machine.right.material_mass": 3.0}
-    if engine == "wasm":
-        with pytest.raises(InputError, match=r"^no C compiler .* found$"):
-            Rig(by=list(by))
-        return
     own = Rig(by=list(by), varying=["machine.left.web_mass"])
     signals, size, n = events(rig.drive, 400.0), 1e-4, len(rig.start)
     mass = own.drive.machine.by_name["left.web_mass"]

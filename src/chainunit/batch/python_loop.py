@@ -1,5 +1,5 @@
-"""Transients of a model where there is neither a C compiler nor ``wasmtime``: run by run in Python, by the
-integrators of Python FMUs. CasADi evaluates the equations. The steps of the integrator end at rows."""
+"""Transients of a model without a C compiler: run by run in Python, by the integrators of Python FMUs. CasADi
+evaluates the equations. The steps of the integrator end at rows."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from .equations import find
 
 
 class PythonLoop:
-    """The loop of a model, with the interface of `chainunit.batch.wasm_loop.WasmLoop`.
+    """The loop of a model, with the interface of the native one; `names` are the uniform arguments, and `lanes`
+    is the number of runs that share a vector.
 
     Parameters
     ----------
-    model, outputs, varying, driven, guarded, changes : see `chainunit.batch.transients.Transients`
+    model, outputs, varying, driven, guarded : see `chainunit.batch.transients.Transients`
     symbols, groups : the vectors of parameters, inputs and states; the derivatives of the states, the kept rows, and
         the states that meet the constraints, none where the integrator has equal steps
 
@@ -67,7 +68,17 @@ class PythonLoop:
         out: Any,
         count: Any,
     ) -> None:
-        """See `WasmLoop`."""
+        """Simulate the runs from the first number to before the second.
+
+        Parameters
+        ----------
+        numbers : time between rows [s], longest step [s], tolerance, and most substeps of a step
+        arrays : uniform arguments, shape (arguments,); varying parameters; signals; begins and stops; limits: see
+            `chainunit.batch.transients.Transients.run`, the runs last
+        x : states at the begin, shape (states, runs); those at the end replace them
+        out : rows to be filled, shape (outputs, runs, rows)
+        count : numbers of rows to be filled, shape (runs,); negative where the last one is not finite
+        """
         uniform, varying, signals, begin, stop, limits = arrays
         for r in range(*runs):
             p, u = uniform[: self._count].copy(), uniform[self._count :].copy()

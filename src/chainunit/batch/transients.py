@@ -1,5 +1,5 @@
-"""Transients of a model in blocks: many runs side by side, in one native loop without Python between the steps.
-Without a C compiler its WebAssembly module makes them, where ``wasmtime`` is installed, else Python.
+"""Transients of a model in blocks: many runs side by side, in one native loop without Python between the steps;
+without a C compiler in Python.
 
 Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
 with equal steps or with error control of its own (`chainunit.core.integrators`), and its signals are evaluated at
@@ -35,7 +35,6 @@ from .equations import arguments_of, find, names_of
 from .native import load, threads
 from .python_loop import PythonLoop
 from .vector_code import VectorCode, c_file
-from .wasm_loop import WasmLoop, has_wasmtime
 
 _NUMBERS = (
     "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR "
@@ -104,13 +103,8 @@ class Runs:
 
 
 def can_run() -> bool:
-    """Whether there is a fast loop for many runs: a C compiler, or ``wasmtime``."""
-    return compiler() is not None or has_wasmtime()
-
-
-def only_wasm() -> bool:
-    """Whether ``wasmtime`` is the only fast loop for runs."""
-    return compiler() is None and has_wasmtime()
+    """Whether there is a C compiler, and so the fast loop for many runs."""
+    return compiler() is not None
 
 
 class _NativeLoop:
@@ -131,7 +125,7 @@ class _NativeLoop:
         out: Any,
         count: Any,
     ) -> None:
-        """See `WasmLoop`."""
+        """See `PythonLoop`."""
         self._library.transients(
             *map(ctypes.c_long, (*runs, *out.shape[1:])),
             *map(ctypes.c_double, numbers),
@@ -174,13 +168,11 @@ class Transients:
         self._varying, self._driven, self._guarded = tuple(varying), tuple(driven), tuple(guarded)
         self._changes, self._by = changes, tuple(by)
         chosen = self.outputs, self._varying, self._driven, self._guarded
-        self._loop: _NativeLoop | WasmLoop | PythonLoop
+        self._loop: _NativeLoop | PythonLoop
         if own := compiler():
             self._loop = _compiled(model, *chosen, self._by, changes, own)
         elif by:
             raise InputError(f"no C compiler ({COMPILERS}) found")
-        elif has_wasmtime():
-            self._loop = WasmLoop(model, *chosen, changes)
         else:
             self._loop = PythonLoop(model, *chosen, *_equations(model, self.outputs, ()))
         self.digest = self._loop.digest

@@ -32,11 +32,9 @@ _SPACE = "\u00a0"  # before a unit
 _SHORT = 16
 """Rows of a table that does not break across printed pages."""
 _POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'{}; style-src 'unsafe-inline'; img-src data: blob:; "
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
     "font-src data:"
 )
-_WASM = " 'wasm-unsafe-eval'"
-"""What a live machine needs beyond it: to compile the WebAssembly that the page holds."""
 _SIGN = {"good": "✓", "partly": "◐", "bad": "✗", "warning": "!"}
 _ORIGIN = {
     "file": "the study file's",
@@ -72,9 +70,11 @@ def render(report: b.Report) -> str:
     styles, scripts = ["page.css"], ["packing.js", "picture.js", "page.js"]
     if (live := page.live) is not None:
         styles.append("live/live.css")
-        scripts += ["live/model.js", "live/live.js"]
-        modules = {f"module-{name}": packed_bytes(each) for name, each in live.modules.items()}
-        data |= {"live-data": packed(live.data), **modules}
+        program = [
+            f"const liveEquations = {live.equations};",
+            *map(_short, ("live/model.js", "live/live.js")),
+        ]
+        data |= {"live-data": packed(live.data), "live-program": packed_bytes("\n".join(program).encode())}
     if figures:
         data["plotly"] = _packed_plotly()
     return "\n".join(
@@ -83,7 +83,7 @@ def render(report: b.Report) -> str:
             '<html lang="en">',
             "<head>",
             '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{escape(_POLICY.format(_WASM if live else ""))}">',
+            f'<meta http-equiv="Content-Security-Policy" content="{escape(_POLICY)}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f'<meta name="generator" content="chainunit {__version__}">',
             f"<title>{escape(title)}</title>",

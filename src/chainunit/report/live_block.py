@@ -15,10 +15,11 @@ _LEAD = (
 
 @dataclass(frozen=True)
 class LiveMachine:
-    """A live machine: the `data` of the page as JSON has it, and by name the bytes of its modules of WebAssembly."""
+    """A live machine: the `data` of the page as JSON has it, and its `equations` as an expression of JavaScript
+    (`chainunit.core.printing.javascript.program`)."""
 
     data: Mapping[str, Any]
-    modules: Mapping[str, bytes]
+    equations: str
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Live:
     Raises
     ------
     InputError
-        by `make`, where an equation has a function that WebAssembly has not.
+        by `make`, for an equation with a function that has not the same bits in each browser.
     """
 
     make: Callable[[], LiveMachine]

@@ -99,3 +99,9 @@ const unpackedData = (id) => {
   };
   return restored(JSON.parse(new TextDecoder().decode(unpackedBytes(id))));
 };
+// a script that the page holds packed
+const runPacked = (id) => {
+  const script = document.createElement("script");
+  script.textContent = new TextDecoder().decode(unpackedBytes(id));
+  document.head.appendChild(script);
+};

@@ -7,12 +7,6 @@
   const plots = [];
   // the page holds the library compressed: it would otherwise be most of the page
   let figures = {};
-  const loadPlotly = () => {
-    const script = document.createElement("script");
-    script.textContent = new TextDecoder().decode(unpackedBytes("plotly"));
-    document.head.appendChild(script);
-    figures = unpackedData("figures");
-  };
   // panels that are too narrow beside each other stand below each other
   const isNarrow = (figure, width) => figure.narrow && width < figure.below;
   // the library changes figure.layout: the height of the wide layout is kept apart
@@ -41,9 +35,11 @@
   window.addEventListener("resize", fit);
   // before the page counts as loaded: it may be printed at once
   if (document.querySelector(".plot")) {
-    loadPlotly();
+    runPacked("plotly");
+    figures = unpackedData("figures");
     drawPlots();
   }
+  if (byId("live-program")) runPacked("live-program");
   // paper is narrower than a screen: a plot is laid out anew for it, so that its letters keep their size
   const PAPER = { width: 690, most: 900, two: 415, rows: 500, letters: 10, titles: 9.5, as: 900 };
   const resize = (box, figure, width, height, letters, titles, across) => {

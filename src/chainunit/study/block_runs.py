@@ -121,7 +121,7 @@ class BlockRuns:
     Raises
     ------
     InputError
-        where a component of the system is an FMU, and where there is neither a C compiler nor ``wasmtime``.
+        where a component of the system is an FMU.
     """
 
     def __init__(

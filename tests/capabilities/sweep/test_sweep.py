@@ -24,6 +24,7 @@ from command import chainunit
 from scipy.stats import qmc, spearmanr
 
 from chainunit import GeometryError, InputError, Study
+from chainunit.batch import transients
 from chainunit.batch.evaluate import ReasonKind
 from chainunit.capabilities.sweep import figures as sweep_figures
 from chainunit.capabilities.sweep import page as sweep_page
@@ -40,10 +41,11 @@ from chainunit.reading.results import as_data
 from chainunit.report.figure import Hatch, hatch_lines
 from chainunit.report.terminal import plain
 from chainunit.study.block_runs import Cause
-from chainunit.study.choice import choose
+from chainunit.study.choice import choose, drive_of
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
 from chainunit.study.readings import crank_angle
+from chainunit.study.rig import Rig
 from chainunit.study.verdict import two_bars
 from chainunit.work.store import made_anew
 
@@ -958,3 +960,16 @@ def test_a_few_large_values_leave_the_others_their_classes():
     counts, _ = np.histogram(rim, levels)
     assert counts.sum() == rim.size and counts.max() < 0.75 * rim.size
     assert sweep_figures._levels(np.linspace(545.0, 10170.0, 100)) == tuple(range(0, 12001, 2000))
+
+
+def test_measures_need_a_compiler(monkeypatch):
+    config = parse(
+        '[sweep]\nmeasures = ["crank_torque_peak"]\nevent = "jam_left"\n'
+        '[[sweep.parameter]]\nname = "machine.crank.m"\nvalues = [40, 60]\n'
+    )
+    rig, plan = Rig(config.operation, drive_of(config), None), config.plans["sweep"]
+    monkeypatch.setattr(transients, "compiler", lambda: None)
+    with pytest.raises(
+        InputError, match=r"^sweep\.measures: need a C compiler .*; install one, or leave them out$"
+    ):
+        sweep_runs.check_drive(rig, plan, config.events[plan.event])

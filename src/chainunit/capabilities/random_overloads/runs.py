@@ -170,13 +170,7 @@ class Parcel:
         return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
     def start(self) -> BlockRuns | EventSimulation:
-        """The system of the task in its steady state.
-
-        Raises
-        ------
-        InputError
-            where a worker has neither a C compiler nor ``wasmtime`` for the compiled system.
-        """
+        """The system of the task in its steady state."""
         if self.states is not None:
             return self.task.block(self.states)
         folder = temporary_folder("chainunit_runs")

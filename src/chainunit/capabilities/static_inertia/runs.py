@@ -93,7 +93,7 @@ def obstacle(drive: Drive) -> str:
     if not model.turns:
         return f"the {drive.driver_noun} goes to and fro, and makes no turn at constant speed"
     if not can_run():
-        return f"it needs a C compiler ({COMPILERS}), or wasmtime (pip install 'chainunit[wasm]')"
+        return f"it needs a C compiler ({COMPILERS})"
     return ""
 
 

@@ -31,7 +31,7 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
     ------
     InputError
         for an event that the drive cannot have, for a swept quantity that changes no run or is not one number of the
-        drive, and where there is neither a C compiler nor ``wasmtime``.
+        drive, and without a C compiler.
     """
     faults = Faults()
     if not rig.takes(event):
@@ -49,8 +49,7 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
             line = f"sweep.parameter: {name} {words}; leave it out, or sweep it without measures"
             faults.add([InputError(line, "sweep.parameter")])
     if not can_run():
-        words = f"need a C compiler ({COMPILERS}), or wasmtime (pip install 'chainunit[wasm]')"
-        line = f"sweep.measures: {words}, and there is neither; install one, or leave them out"
+        line = f"sweep.measures: need a C compiler ({COMPILERS}); install one, or leave them out"
         faults.add([InputError(line, "sweep.measures")])
     faults.refuse()
 

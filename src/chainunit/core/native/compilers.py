@@ -25,9 +25,9 @@ from ..temporary_folders import scratch
 from .cache import entry
 
 _CODE = (
-    b"\x7fELF", b"MZ", b"\x64\x86", b"\x4c\x01", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"\0asm",
+    b"\x7fELF", b"MZ", b"\x64\x86", b"\x4c\x01", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe",
 )  # fmt: skip
-"""First bytes of libraries and objects: ELF, Windows (library, objects), macOS (one processor, more), WebAssembly."""
+"""First bytes of libraries and objects: ELF, Windows (library, objects), macOS (one processor, more)."""
 COMPILERS = "cc, gcc, clang, or zig by pip install 'chainunit[cross]'"
 """The compilers that serve, and how to have one, for refusals."""
 

@@ -1,6 +1,6 @@
 """The functions of a model that native code computes, as groups of symbolic results.
 
-C code and WebAssembly modules are made from the same list.
+C and JavaScript are printed from the same list.
 """
 
 from __future__ import annotations

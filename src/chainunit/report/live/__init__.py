@@ -1,1 +1,1 @@
-"""The live machine of a page: its equations as WebAssembly, its quantities, and what the page computes with them."""
+"""The live machine of a page: its equations in JavaScript, its quantities, and what the page computes with them."""

@@ -1,5 +1,5 @@
 "use strict";
-(async () => {
+(() => {
   const byId = (name) => document.getElementById(name);
   const root = byId("live-root");
   if (!root) return;
@@ -7,12 +7,9 @@
   const none = byId("live-none");
   let model;
   try {
-    if (typeof WebAssembly !== "object") throw new Error("this browser has none");
-    const data = unpackedData("live-data"), bytes = {};
-    for (const name of Object.keys(data.modules)) bytes[name] = unpackedBytes(`module-${name}`);
-    model = await liveModel(data, bytes);
+    model = liveModel(unpackedData("live-data"), liveEquations);
   } catch (error) {
-    none.textContent = `The live machine needs WebAssembly, which is not to be had here (${error.message}); all else on this page is there.`;
+    none.textContent = `The live machine does not run here (${error.message}); all else on this page is there.`;
     return;
   }
   none.hidden = true;

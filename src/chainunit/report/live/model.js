@@ -1,38 +1,29 @@
 "use strict";
 /* The machine and the drive of a live page, without a page: everything is computed from the values of the quantities,
-   in SI units, by their places in `data.quantities`. `bytes` has the modules by name. */
-const liveModel = async (data, bytes) => {
+   in SI units, by their places in `data.quantities`. `equations` are those of the turn and of the runs, see
+   chainunit.core.printing.javascript. */
+const liveModel = (data, equations) => {
   const TURN = 2 * Math.PI;
   const MOST_NUMBERS = 2 ** 24; // of a run, for which a browser has memory
 
-  /* a module: its functions, and its memory as numbers by name */
-  const kernel = async (name) => {
-    const places = data.modules[name];
-    const { instance } = await WebAssembly.instantiate(bytes[name], {});
-    const functions = instance.exports, memory = functions.memory;
-    const index = {};
-    for (const table of ["parameters", "inputs", "states", "outputs"])
-      places[table].names.forEach((each, k) => (index[each] = index[each] ?? places[table].address / 8 + k));
-    const own = {
-      functions, memory, places, index,
-      numbers: new Float64Array(memory.buffer),
-      // room for so many bytes behind the memory of the module
-      room(size) {
-        const free = Math.ceil(places.free / 16) * 16, lacking = free + size - memory.buffer.byteLength;
-        if (lacking > 0) memory.grow(Math.ceil(lacking / 65536));
-        own.numbers = new Float64Array(memory.buffer);
-        return free;
+  /* equations, with their numbers by name */
+  const named = (of) => {
+    const places = new Map();
+    for (const letter of "yxup") of.about[letter].forEach((name, n) => places.set(name, [of[letter], n]));
+    return {
+      ...of,
+      set(name, value) {
+        const [array, n] = places.get(name);
+        array[n] = value;
       },
-      set(each, value) {
-        own.numbers[index[each]] = value;
+      get(name) {
+        const [array, n] = places.get(name);
+        return array[n];
       },
-      get: (each) => own.numbers[index[each]],
-      has: (each) => each in index,
+      has: (name) => places.has(name),
     };
-    return own;
   };
-  const turnKernel = await kernel("turn");
-  const runsKernel = data.runs ? await kernel("runs") : null;
+  const turnKernel = named(equations.turn), runsKernel = data.runs ? named(equations.runs) : null;
   const quantities = data.quantities, study = quantities.map((q) => q.value);
   const placeOf = (role) => quantities.findIndex((q) => q.role === role);
   const speedAt = placeOf("speed"), ratioAt = placeOf("ratio");
@@ -74,12 +65,11 @@ const liveModel = async (data, bytes) => {
 
   // the first requirement that a machine does not meet; null where it meets all
   const unmet = (k) => {
-    const { address, rules } = k.places.requirements;
-    if (!k.functions.requirements) return null;
-    k.functions.requirements();
-    for (let n = 0; n < rules.length; n++) {
-      const [value, low, high] = k.numbers.subarray(address / 8 + 3 * n, address / 8 + 3 * n + 3);
-      if (!(low < value && value < high)) return { rule: rules[n], value, low, high };
+    if (!k.requirements) return null;
+    k.requirements();
+    for (const [n, rule] of k.about.requirements.entries()) {
+      const [value, low, high] = k.requirements_.subarray(3 * n);
+      if (!(low < value && value < high)) return { rule, value, low, high };
     }
     return null;
   };
@@ -100,25 +90,24 @@ const liveModel = async (data, bytes) => {
       for (const name of q.turn) turnKernel.set(name, values[i]);
     });
     if (turnKernel.has("ratio")) turnKernel.set("ratio", ratioOf(values));
-    if (turnKernel.functions.derive) turnKernel.functions.derive();
+    turnKernel.derive?.();
     const fault = unmet(turnKernel);
     if (fault) throw refused(fault);
   };
-  const outputs = data.modules.turn.outputs.names;
+  const outputs = turnKernel.about.y;
 
   // the columns of a turn by name, each with a number for each place of the driver
   const turn = (values, count = data.turn.places) => {
     prepare(values);
     const ratio = ratioOf(values), speed = speedOf(values), [low, high] = data.turn.span;
     const columns = outputs.map(() => new Float64Array(count)), place = new Float64Array(count);
-    const { numbers, functions, index } = turnKernel, first = data.modules.turn.outputs.address / 8;
-    numbers[index.w] = speed * ratio;
-    numbers[index.a] = 0;
+    turnKernel.set("w", speed * ratio);
+    turnKernel.set("a", 0);
     for (let k = 0; k < count; k++) {
       place[k] = data.turn.turns ? (TURN * k) / count : low + ((high - low) * k) / (count - 1);
-      numbers[index.phi] = place[k] * ratio;
-      functions.values(1);
-      for (let n = 0; n < columns.length; n++) columns[n][k] = numbers[first + n];
+      turnKernel.set("phi", place[k] * ratio);
+      turnKernel.values();
+      for (let n = 0; n < columns.length; n++) columns[n][k] = turnKernel.y[n];
     }
     const found = { place, ratio, speed, count, columns: Object.fromEntries(outputs.map((name, n) => [name, columns[n]])) };
     if (!found.columns.crank_torque.every(Number.isFinite)) throw new Refusal("the linkage does not close all the way with these values");
@@ -286,9 +275,8 @@ const liveModel = async (data, bytes) => {
       if (of.gear_loss) k.set(of.gear_loss.parameter, friction(values));
       if (of.derived) {
         prepare(values);
-        const from = turnKernel.places.derived / 8, to = k.places.derived / 8, count = of.derived;
-        k.numbers.set(turnKernel.numbers.subarray(from, from + count), to);
-      } else if (k.functions.derive) k.functions.derive();
+        k.k.set(turnKernel.k);
+      } else k.derive?.();
       this.columns = [...new Set([...of.columns, of.names.angle, of.names.speed, of.names.motor_speed, of.names.current])].filter(k.has);
     }
 
@@ -310,43 +298,29 @@ const liveModel = async (data, bytes) => {
 
     // from the states in memory on: so many rows, a step apart
     run(begin, rows, signals, step = this.of.step) {
-      const k = this.k, names = Object.keys(signals), count = this.columns.length;
-      let tail = 0;
-      for (const s of Object.values(signals)) tail += 8 * (1 + 3 * s.changes.length);
-      const table = 8 + 24 * names.length, chosen = 8 + 8 * Math.ceil(count / 2);
+      const k = this.k, { x, y, about } = k, names = this.columns;
       this.spent += (rows - 1) * step;
-      if (!(this.spent <= this.of.most && rows * count <= MOST_NUMBERS)) throw new Refusal(`these runs last too long for a page: ${shown(this.spent, { factor: 1, offset: 0, unit: "s" })} and more`);
-      const at = k.room(table + tail + chosen + 8 * rows * count + 64), whole = new Int32Array(k.memory.buffer);
-      let numbers = at + table;
-      whole[at / 4] = names.length;
-      names.forEach((name, n) => {
-        const s = signals[name], record = (at + 8 + 24 * n) / 4;
-        whole.set([8 * k.index[name], 1, s.changes.length, numbers, 0, 0], record);
-        k.numbers.set([s.start, ...s.changes.flat()], numbers / 8);
-        numbers += 8 * (1 + 3 * s.changes.length);
+      if (!(this.spent <= this.of.most && rows * names.length <= MOST_NUMBERS)) throw new Refusal(`these runs last too long for a page: ${shown(this.spent, { factor: 1, offset: 0, unit: "s" })} and more`);
+      const columns = names.map(() => new Float64Array(rows));
+      const sources = names.map((name) => (about.x.includes(name) ? [x, about.x.indexOf(name)] : [y, about.y.indexOf(name)]));
+      const made = k.run({
+        begin, step, rows, longest: this.of.longest,
+        signals: Object.entries(signals).map(([name, s]) => [about.u.indexOf(name), Float64Array.of(s.start, ...s.changes.flat())]),
+        row(r) {
+          for (let n = 0; n < columns.length; n++) columns[n][r] = sources[n][0][sources[n][1]];
+        },
       });
-      whole[numbers / 4] = count;
-      this.columns.forEach((name, n) => (whole[numbers / 4 + 2 + n] = 8 * k.index[name]));
-      const into = numbers + chosen;
-      // between the steps of the integrator where the module interpolates
-      const go = k.functions.dense ?? k.functions.run;
-      const made = go(begin, step, this.of.longest, rows, at, numbers, into, 1);
-      const found = { time: new Float64Array(made), made, wanted: rows };
-      for (const name of this.columns) found[name] = new Float64Array(made);
-      for (let r = 0; r < made; r++) {
-        found.time[r] = begin + r * step;
-        this.columns.forEach((name, n) => (found[name][r] = k.numbers[into / 8 + r * count + n]));
-      }
+      const found = { time: Float64Array.from({ length: made }, (_, r) => begin + r * step), made, wanted: rows };
+      names.forEach((name, n) => (found[name] = columns[n].subarray(0, made)));
       return found;
     }
 
     get states() {
-      const { address, names } = this.k.places.states;
-      return this.k.numbers.slice(address / 8, address / 8 + names.length);
+      return this.k.x.slice();
     }
 
     set states(x) {
-      this.k.numbers.set(x, this.k.places.states.address / 8);
+      this.k.x.set(x);
     }
 
     setInputs(signals) {
@@ -355,11 +329,11 @@ const liveModel = async (data, bytes) => {
 
     // the next step of the integrator, 0 where none is known; it is no part of the states
     get pace() {
-      return this.k.numbers[this.k.places.pace / 8];
+      return this.k.pace[0];
     }
 
     set pace(step) {
-      this.k.numbers[this.k.places.pace / 8] = step;
+      this.k.pace[0] = step;
     }
 
     forget() {
@@ -395,7 +369,7 @@ const liveModel = async (data, bytes) => {
       const changes = event ? this.eventSignals(event, 0, () => 0) : {};
       const signals = this.signals(changes, true);
       this.setInputs(signals);
-      this.k.functions.start();
+      this.k.start();
       const fed = this.of.empty_start ? 2 : 1, time = this.rampEnd + fed * this.of.settle_turns * this.turnTime;
       return this.of.empty_start && !event ? this.fedOnTheWay(time, signals) : this.run(0, this.rowsOf(time), signals);
     }

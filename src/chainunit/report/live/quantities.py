@@ -1,5 +1,5 @@
-"""The quantities that a live page lets its reader change: their declarations, their values, and their places in the
-modules of the page."""
+"""The quantities that a live page lets its reader change: their declarations, their values, and their names in the
+equations of the page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class LiveQuantity:
     """A quantity of the page.
 
     `key` is its path in a study file. `turn` and `runs` are the full names of the parameters and inputs of the two
-    modules that have its value. `role` is set where its value takes another way: ``speed``, ``ratio``, ``ramp``,
+    models that have its value. `role` is set where its value takes another way: ``speed``, ``ratio``, ``ramp``,
     ``rotor``, ``added``, ``trip``, ``release``, or ``event``, a quantity of the event `event`.
     """
 
@@ -53,7 +53,7 @@ class LiveQuantity:
 
 def of_machine(table: str, declared: Any, known: Collection[str] = ()) -> Iterator[LiveQuantity]:
     """The real numbers that a `table` of a study file has of a machine: its parameters, or its loads in normal
-    running; `known` are the parameters and inputs of the module of runs. The ratio is a quantity of the drive."""
+    running; `known` are the parameters and inputs of the model of runs. The ratio is a quantity of the drive."""
     for v, value in named_values(declared):
         if v.type == "Real" and v.name != "ratio":
             full = f"machine.{v.name}"

@@ -1,4 +1,4 @@
-"""The drive of a live page in its runs: its module, and the data by which the page starts it, feeds it and brings
+"""The drive of a live page in its runs: its equations, and the data by which the page starts it, feeds it and brings
 events. The page goes through a run as `chainunit.study.block_runs` does."""
 
 from __future__ import annotations
@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ...core.printing.javascript import model_text
 from ...core.quantities import Layout, named_values, variable_of
-from ...core.wasm.module import WasmModule, wasm_module
 from ...drives.catalogue import CatalogueMotor
 from ...reading.text import Units
 from ...study.block_runs import names_read
@@ -39,10 +39,10 @@ _MEASURES = ("crank_torque_peak", "rocker_torque_peak", "current_peak", "speed_l
 
 @dataclass(frozen=True)
 class LiveRuns:
-    """The module of a drive, the `data` of its runs as JSON has it, the `names` of its parameters and inputs, and the
-    quantities that only runs have."""
+    """The `equations` of a drive in JavaScript, the `data` of its runs as JSON has it, the `names` of its parameters
+    and inputs, and the quantities that only runs have."""
 
-    module: WasmModule
+    equations: str
     data: dict[str, Any]
     names: Collection[str]
     quantities: tuple[LiveQuantity, ...]
@@ -87,7 +87,7 @@ def live_runs(
     columns = [name for name in names_read(rig, taken) if name in outputs]
     machine = drive.simulated_machine.model
     shared = machine.derived_count == model.derived_count
-    module = wasm_module(model, False, tuple(columns), not (shared and model.derived_count))
+    equations = model_text(model, columns, not (shared and model.derived_count))
     values = model.parameter_layout.by_name(system.p) | {"solver.tolerance": TOLERANCE}
     inputs = system.inputs | rig.normal
     torque = next(name for name in torque_names(drive.machine_bond) if name in columns)
@@ -141,7 +141,7 @@ def live_runs(
         "results": list(_results(drive, units, "machine.rocker.tau" in columns)),
     }
     names = {*model.parameter_layout.names, *system.inputs}
-    return LiveRuns(module, data, names, tuple(_quantities(drive, operation, taken, names)))
+    return LiveRuns(equations, data, names, tuple(_quantities(drive, operation, taken, names)))
 
 
 def _profile(signal: Profile) -> dict[str, Any]:

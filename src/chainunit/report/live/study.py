@@ -48,7 +48,7 @@ def of_study(
     Raises
     ------
     InputError
-        for an equation with a function that WebAssembly has not.
+        for an equation with a function that has not the same bits in each browser.
     """
     machine, units, speed = drive.machine, config.units, config.run.crank_speed
     turn = live_turn(machine, float(speed), units)

@@ -1,5 +1,5 @@
-"""The machine of a live page over a turn of its driver, or over its way: its module, and the data by which the page
-draws it and reads its results."""
+"""The machine of a live page over a turn of its driver, or over its way: its equations, and the data by which the
+page draws it and reads its results."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...core.printing.javascript import model_text
 from ...core.symbolic_trace import trace
-from ...core.wasm.module import WasmModule, wasm_module
 from ...machines.machine import Machine
 from ...mechanism.sketch import places
 from ...reading.text import Units
@@ -26,9 +26,9 @@ _ON_THE_WAY = 361
 
 @dataclass(frozen=True)
 class LiveTurn:
-    """The module of a machine, and the `data` of its turn as JSON has it."""
+    """The `equations` of a machine in JavaScript, and the `data` of its turn as JSON has it."""
 
-    module: WasmModule
+    equations: str
     data: dict[str, Any]
 
 
@@ -94,7 +94,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
             "rails": list(linkage.rails(whole)),
         },
     }
-    return LiveTurn(wasm_module(model, False, tuple(columns)), data)
+    return LiveTurn(model_text(model, tuple(columns)), data)
 
 
 def _effort(machine: Machine) -> str:

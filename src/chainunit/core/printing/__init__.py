@@ -1,0 +1,1 @@
+"""Printers of traced equations: one for each language, from the same list of operations."""

@@ -1,1 +1,0 @@
-"""WebAssembly modules of models, written byte by byte from the same operations as the C code."""
