@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 import pytest
 from machines import random_loads, random_machine, random_state
-from test_wasm import OFTEN, QUICK, REST, Points, compare
+from test_javascript import OFTEN, QUICK, REST, Points, compare
 
 from chainunit.core import engines
 from chainunit.core.native import python_math
