@@ -126,21 +126,21 @@ def model_text(model: type[Model], columns: Sequence[str] | None = None, derives
         "u": [v.name for v in arguments["u"]],
         "x": [v.name for v in states],
         "y": names,
-        "requirements": [asdict(each) for each in model.required],
-        "start_limits": [asdict(each) for each in model.start_problem.required],
+        "requirements": [asdict(rule) for rule in model.required],
+        "start_limits": [asdict(rule) for rule in model.start_problem.required],
         "rounds": model.start_problem.rounds,
         "controlled": bool(states) and model.controlled,
         "free": bool(states) and model.controlled and t.is_free,
         "nominal": [v.quantity.nominal or 1.0 for v in states],
     }
-    own = ",".join([*sizes, *(kernel.name for kernel in functions)])
+    members = ",".join([*sizes, *(kernel.name for kernel in functions)])
     return "\n".join(
         [
             "(() => {",
             f"const {','.join(arrays)};",
             *starts,
             *lines,
-            f"return {{{own},about:{json.dumps(about, ensure_ascii=False)}}};",
+            f"return {{{members},about:{json.dumps(about, ensure_ascii=False)}}};",
             "})()",
         ]
     )
@@ -166,10 +166,10 @@ def _function(kernel: ModelFunction, sizes: dict[str, int]) -> list[str]:
     sizes["w"] = max(sizes["w"], len(rest))
 
     def outside(place: int) -> str:
-        each = items[place]
-        if each.kind == ARGUMENT:
-            return f"{kernel.takes[each.entry[0]]}[{each.entry[1]}]"
-        return _number(each.value) if each.kind == NUMBER else kept[place]
+        operation = items[place]
+        if operation.kind == ARGUMENT:
+            return f"{kernel.takes[operation.entry[0]]}[{operation.entry[1]}]"
+        return _number(operation.value) if operation.kind == NUMBER else kept[place]
 
     copies = "".join(f"{to}={outside(place)};" for to, place in copied)
     usual: dict[Any, list[int]] = {}
@@ -269,10 +269,10 @@ def _renamed(
         new = used.pop(0) if line.startswith("$") and n < len(lines) else ""
         busy.difference_update(names[name] for name in used if last[name] == n)
         if new:
-            known = usual.setdefault((forms[n], forms[n + 1]), [])
-            names[new] = next(k for k in chain(known, count(min(len(usual), _NAMES))) if k not in busy)
-            if names[new] not in known:
-                known.append(names[new])
+            candidates = usual.setdefault((forms[n], forms[n + 1]), [])
+            names[new] = next(k for k in chain(candidates, count(min(len(usual), _NAMES))) if k not in busy)
+            if names[new] not in candidates:
+                candidates.append(names[new])
             if last[new] > n:
                 busy.add(names[new])
         whole[n] = _NAME.sub(lambda match: _short(names[match[0]]), line)
@@ -314,15 +314,15 @@ def _elementary() -> str:
     """Sine, arctangent and the like (`chainunit.core.native.elementary`)."""
     texts = {}
     for kind, (function, arguments, _) in OWN.items():
-        of = recording(kind)
+        traced = recording(kind)
 
-        def outside(place: int, of: Any = of) -> str:
-            each = of.items[place]
-            return _number(each.value) if each.kind == NUMBER else f"x{each.entry[1]}"
+        def outside(place: int, traced: Any = traced) -> str:
+            operation = traced.items[place]
+            return _number(operation.value) if operation.kind == NUMBER else f"x{operation.entry[1]}"
 
-        lines, values = _statements(of.items, range(len(of.items)), outside, {}, of.results, {})
+        lines, values = _statements(traced.items, range(len(traced.items)), outside, {}, traced.results, {})
         first, *other = values
-        also = "".join(f"second[0]={each};" for each in other)
+        also = "".join(f"second[0]={value};" for value in other)
         names = ",".join(f"x{n}" for n in range(arguments))
         texts[function.__name__] = f"function {function.__name__}({names}){{{lines}{also}return {first};}}\n"
     return "".join(texts.values())
