@@ -127,7 +127,7 @@ def test_a_certified_fmu_holds(made):
     assert "by the expected key" in lines[0] and "30 members" in lines[1]
 
 
-NEEDED = {"cryptography", "fmpy", "numpy", "pydantic", "pythonfmu", "rich", "scipy", "typer"}
+NEEDED = {"cryptography", "fmpy", "numpy", "pydantic", "rich", "scipy", "typer"}
 """The packages that a receiver installs beside this one; docs/how-to/vouching.md names them."""
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "vouching.md"
 
