@@ -14,6 +14,8 @@ from random_linkages import DYADS, random_linkage
 
 from chainunit.core.engines import MATH, Dual, dual, slope
 from chainunit.core.errors import InputError
+from chainunit.core.symbolic_trace import outputs_of
+from chainunit.machines.linkages import model as linkage_model
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 
@@ -96,7 +98,7 @@ def shuffled(data, rng):
     """The same file with links, joints and points in another order."""
 
     def mixed(table):
-        return {name: table[name] for name in rng.permutation([*table]).tolist()}
+        return {name: table[name] for name in rng.permutation([*table])}
 
     links = {name: {**link, "points": mixed(link["points"])} for name, link in mixed(data["links"]).items()}
     return {**data, "ground": mixed(data["ground"]), "links": links, "joints": mixed(data["joints"])}
@@ -111,6 +113,26 @@ def test_shuffled_lists_give_the_same_groups(count):
         one, two = by_the_machine(model, *state)[0], by_the_machine(other, *state)[0]
         for name in ("tau", "J", "tau_bias", "dJ_dphi", "tau_bias_dphi", "tau_bias_dw", "kinetic_energy"):
             assert two[name] == pytest.approx(one[name], rel=1e-9, abs=1e-9), (seed, name)
+
+
+def backwards(data):
+    """The same data with the entries of all tables in the opposite order."""
+    if isinstance(data, dict):
+        return {name: backwards(data[name]) for name in reversed(data)}
+    return [backwards(each) for each in data] if isinstance(data, list | tuple) else data
+
+
+def test_the_order_of_entries_changes_nothing_of_a_model():
+    """Not either by the file of the two that this process reads first."""
+    (_, _, _, _, model, _), *_ = closing(1)
+    (data,) = model.made.arguments
+    assert list(backwards(data)) != list(data)
+    outputs = []
+    for given in (backwards(data), data):
+        linkage_model._machine_of.cache_clear()
+        machine = machine_of(given)
+        outputs.append(repr((machine.made.arguments, [v.name for v in outputs_of(machine)])))
+    assert outputs[0] == outputs[1]
 
 
 def turns_well(body, places=96, least=1e-3):

@@ -103,7 +103,7 @@ def test_shuffled_links_and_joints_give_the_same_machine():
         data = tables(MACHINES["crank_shaper"]["description"])
         for key in ("links", "joints"):
             names = [*data[key]]
-            data[key] = {name: data[key][name] for name in rng.permutation(names).tolist()}
+            data[key] = {name: data[key][name] for name in rng.permutation(names)}
         outputs = Machine(machine_of(description_of(data, "shuffled"))).evaluate(inputs)
         for name, value in plain.items():
             assert float(outputs[name]) == pytest.approx(float(value), rel=1e-11, abs=1e-9), name

@@ -16,6 +16,11 @@ def admits(x: Any, low: float, high: float, slack: float, open_low: bool, whole:
     return (abs(x) < math.inf) & above & (x <= high + slack) & (not whole or x % 1 == 0)
 
 
+def within(x: float, low: float, high: float) -> float:
+    """The admitted number `x`, set to the bound where it is beyond it by rounding."""
+    return low if x < low else high if x > high else x
+
+
 def complaint(name: str, x: float, unit: str, allowed: str, bounded: bool, description: str) -> str:
     """The line that refuses the value `x` of a variable, which is `bounded` or any number."""
     if not math.isfinite(x):

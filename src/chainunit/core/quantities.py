@@ -241,7 +241,7 @@ class Quantity(Described):
 
     def within_bounds(self, x: float) -> float:
         """The admitted number `x`, set to the bound where it is beyond it by rounding."""
-        return self.low if x < self.low else self.high if x > self.high else x
+        return bounds.within(x, self.low, self.high)
 
 
 Value: TypeAlias = Any

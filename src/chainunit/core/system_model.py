@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -216,17 +217,11 @@ class SystemModel(Model):
         return values
 
 
-_MODELS: dict[Any, type[SystemModel]] = {}
-
-
 def system_model(data: Mapping[str, Any]) -> type[SystemModel]:
     """The model of a description; equal descriptions of the same components have one model."""
     # a class that was defined anew, as in a notebook, makes a new model
-    models = tuple(model_at(each) for _, each in data["components"])
-    key = json.dumps(data, sort_keys=True), models
-    if key not in _MODELS:
-        _MODELS[key] = _system_model(SystemDescription(data, models))
-    return _MODELS[key]
+    models = (model_at(each) for _, each in data["components"])
+    return _system_model(json.dumps(data, sort_keys=True), *models)
 
 
 def _shortest(models: Iterable[type[Model]]) -> dict[str, float]:
@@ -245,8 +240,9 @@ def _sizes(of: SystemDescription) -> dict[str, float]:
     return {name: x for name, x in sizes.items() if name in free}
 
 
-def _system_model(of: SystemDescription) -> type[SystemModel]:
-    models = of.models.values()
+@cache
+def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
+    of = SystemDescription(json.loads(text), models)
     apart = of.by_differences()
     about = of.data["about"]
     members: dict[str, Any] = {

@@ -44,7 +44,7 @@ class Settable(NamedTuple):
 
     def within_bounds(self, x: float) -> float:
         """The allowed value, set to the bound where it is beyond it by rounding."""
-        return self.low if x < self.low else self.high if x > self.high else x
+        return bounds.within(x, self.low, self.high)
 
     def complaint(self, x: float) -> str:
         """The line that refuses the value."""
@@ -73,16 +73,14 @@ class ModelInstance:
         self._p: list[float] | None = None
         self._derived: Sequence[float] | None = None
         """from the fixed parameters, which do not change after the initialization"""
-        self._more: tuple[
-            Sequence[float], ...
-        ] = ()  # the last argument of the model's functions, if they take it
+        self._more: tuple[Sequence[float], ...] = ()
+        """the last argument of the model's functions, if they take it"""
         self._x: Sequence[float] = ()  # empty before the start of the states
         self._pace = 0.0  # next substep of an integrator that controls its error
         self._closed = False
         self._initialized = False
-        self._doubtful = set(
-            range(self.first_input, self.first_state)
-        )  # inputs that may be out of their bounds
+        self._doubtful = set(range(self.first_input, self.first_state))
+        """inputs that may be out of their bounds"""
         self._time = 0.0
         self._stop = math.inf  # the last admissible time, with an allowance for rounding
         self._refusal = ""  # why the parameters make no model

@@ -78,10 +78,7 @@ def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: boo
                     refusal += f"and the units differ ({units}); write all in one, which stands in the head"
                 else:
                     refusal += f"write [{with_unit[2]}] into the head, and take it out of all cells"
-            raise InputError(
-                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: "
-                f"{printable(cell, 40)} {refusal}"
-            )
+            raise InputError(f"{table.place_of(k, place)}: {printable(cell, 40)} {refusal}")
         x[k] = np.nan
     return x
 
@@ -164,7 +161,7 @@ def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> No
     for k in whole:
         if len(decimals) == 1 and len(_mantissa(cells[k])) > max(decimals) > 0:
             raise InputError(
-                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has no "
+                f"{table.place_of(k, place)}: {cells[k]} has no "
                 f"decimal sign, and the other numbers have {max(decimals)} decimals: a sign is left out; mend it, or "
                 "write nan"
             )
@@ -181,7 +178,7 @@ def _refuse_added(table: LoggerTable, place: int, cells: Sequence[str]) -> None:
         if after and (before + after).isdigit() and len(before + after) in whole:
             longer = f"{before or 0}.{after}" + "0" * (1 + max(whole) - len(before + after))
             raise InputError(
-                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has a "
+                f"{table.place_of(k, place)}: {cells[k]} has a "
                 "decimal sign, and the other numbers are whole ones with as many digits: a sign is added; mend it, "
                 f"or write {longer} if the number is right"
             )
@@ -201,7 +198,7 @@ def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bo
         for sign in sorted(signs)
     }
     k = next(iter(first_rows.values()))
-    where = f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]}"
+    where = f"{table.place_of(k, place)}: {cells[k]}"
     if is_mixed:
         other = " and ".join(f"{cells[j]} (line {table.lines[j]})" for j in list(first_rows.values())[1:])
         return InputError(f"{where} and {other} have different decimal signs; write all with the same one")
@@ -363,7 +360,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             h, m, s = 0, h, str(m)
             if clock["f"] is None:
                 raise InputError(
-                    f"{table.file}, line {table.lines[k]}, column {places[0] + 1}, {table.heads[places[0]]}: "
+                    f"{table.place_of(k, places[0])}: "
                     f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and does not resolve the rows; write "
                     "hh:mm:ss.fff"
                 )
@@ -402,7 +399,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
 def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:
     cells = " ".join(table.rows[row][place] for place in places)
     return InputError(
-        f"{table.file}, line {table.lines[row]}, column {places[0] + 1}, {table.heads[places[0]]}: "
+        f"{table.place_of(row, places[0])}: "
         f"{printable(cells, 40)} is no time as in the rows before; mend this row, or delete it"
     )
 
@@ -425,7 +422,7 @@ def _day_numbers(table: LoggerTable, days: Sequence[str], place: int) -> list[fl
     spans = [way[days[-1]] - way[days[0]] for way in ways]
     if not ways:
         raise InputError(
-            f"{table.file}, line {table.lines[0]}, column {place + 1}, {table.heads[place]}: "
+            f"{table.place_of(0, place)}: "
             f"{printable(days[0], 40)} is no date that can be read; write it as 2023-06-19"
         )
     way = ways[min(range(len(ways)), key=lambda k: (spans[k] < 0, abs(spans[k])))]

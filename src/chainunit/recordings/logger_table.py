@@ -68,6 +68,10 @@ class LoggerTable:
         """The cells of a column."""
         return [cells[place] for cells in self.rows]
 
+    def place_of(self, row: int, place: int) -> str:
+        """The file, line, column and head of a cell, in words."""
+        return f"{self.file}, line {self.lines[row]}, column {place + 1}, {self.heads[place]}"
+
 
 def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
     """The table in the `text` of a file; a head has the columns of most of these `names`.

@@ -140,10 +140,10 @@ class BatchStore:
             file.set_auto_chartostring(False)
             yield file
 
-    def extent(self, batch: int, points: int | None = None) -> tuple[int, int]:
-        """The first point of a batch, and the first one behind it."""
+    def extent(self, batch: int) -> tuple[int, int]:
+        """The first point of a batch, and the first one of the next."""
         begin = batch * self.job.batch
-        return begin, min(begin + self.job.batch, self.points if points is None else points)
+        return begin, min(begin + self.job.batch, self.points)
 
     def missing(self, progress: Callable[[int], None]) -> tuple[list[int], int]:
         """The batches of the job that the store does not have, and how many of these it has damaged. `progress`

@@ -10,22 +10,7 @@ from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _WIDEST = 80
 """Largest number of characters of an operation that is written inline instead of on a line of its own."""
-_RARE = (
-    "sqrt",
-    "exp",
-    "log",
-    "pow",
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "sinh",
-    "cosh",
-    "fmod",
-    "floor",
-    "ceil",
-)
+_RARE = "sqrt exp log pow sin cos tan asin acos sinh cosh fmod floor ceil".split()
 """Functions that `math` refuses to compute out of their domains."""
 
 

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, cast
 
 from ...core.engines import MATH
@@ -60,9 +60,6 @@ _FIXED_RATIO = (
 )
 
 
-_MACHINES: dict[str, type[InverseMachine]] = {}
-
-
 def machine_of(data: Mapping[str, Any]) -> type[InverseMachine]:
     """The model of a description; equal descriptions have one model.
 
@@ -71,10 +68,13 @@ def machine_of(data: Mapping[str, Any]) -> type[InverseMachine]:
     InputError
         where the linkage is not determined, has a group that is not covered, or does not close.
     """
-    key = json.dumps(data, sort_keys=True)
-    if key not in _MACHINES:
-        _MACHINES[key] = LinkageDescription(data).model()
-    return _MACHINES[key]
+    return _machine_of(json.dumps(data, sort_keys=True))
+
+
+@cache
+def _machine_of(text: str) -> type[InverseMachine]:
+    # of the text: the entries have one order, whatever that of the file is
+    return LinkageDescription(json.loads(text)).model()
 
 
 class LinkageDescription(LinkageOutputs):
