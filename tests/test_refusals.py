@@ -151,6 +151,7 @@ def test_a_name_in_place_of_a_table_is_sent_to_its_table(name):
     [
         (["export"], "(chainunit export --help shows its options)"),
         (["study", "--chek"], "(chainunit study --help shows its options)"),
+        (["vouch", "key", "mine"], "(chainunit vouch key --help shows its options)"),
         (["study", "--backend", "rust"], "'rust' is not one of 'native', 'python' (chainunit study --help"),
         (["stduy"], "(chainunit --help shows the commands)"),
     ],
@@ -159,6 +160,11 @@ def test_a_wrong_command_names_the_help_that_has_the_right_one(words, remedy, tm
     done = chainunit(*words, cwd=tmp_path)
     (line,) = done.stderr.splitlines()
     assert done.returncode == 2 and remedy in line and "Value error" not in line
+
+
+def test_a_group_without_a_command_prints_its_help(tmp_path):
+    done, asked = (chainunit("vouch", *option, cwd=tmp_path) for option in ((), ("--help",)))
+    assert done.returncode == 0 and done.stdout == asked.stdout and not done.stderr
 
 
 def test_a_missing_linkage_file_is_told_at_the_key_that_names_it(tmp_path):

@@ -345,6 +345,25 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
     assert text.count("0.00431") == 9 and text.count("machine") == (3 if text.count("Inertias") == 1 else 6)
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("Warning: short (in brackets).", "Warning: short (in brackets)."),
+        (
+            "Warning: Bars in compression, where a chain goes slack: start-up (web mean pull -325 N, wall -12 N).",
+            "Warning: Bars in compression, where a chain goes slack: start-up.",
+        ),
+        (
+            "Warning: The speed does not return to its steady band within the time followed: the rocker is blocked.",
+            "Warning: The speed does not return to its steady band within the time followed.",
+        ),
+        ("Warning: " + "word " * 20, "Warning: " + "word " * 13 + "..."),
+    ],
+)
+def test_a_warning_takes_one_line_of_the_screen_and_ends_with_a_clause(text, line):
+    assert terminal.line_of(text, 79) == line
+
+
 def test_markdown_has_the_lines_below_the_numbers_of_a_card():
     card = b.Card(
         "crank torque",

@@ -363,6 +363,9 @@ def _outcome() -> tuple[int, str]:
         # wrong usage: an unknown command or option, a missing argument
         if not hasattr(error, "format_message"):
             raise
+        if type(error).__name__ == "NoArgsIsHelpError":  # a group without a command, as chainunit itself
+            print(error.ctx.get_help())
+            return 0, ""
         return 2, _usage(error)
 
 
@@ -377,8 +380,11 @@ def _declared(module: str) -> str:
 
 def _usage(error: Any) -> str:
     """The message of a wrong usage, with the command whose help shows the right one."""
-    context = getattr(error, "ctx", None)
-    command = f"chainunit {context.info_name}" if context and context.parent else "chainunit"
+    context, command = getattr(error, "ctx", None), ""
+    while context and context.parent:
+        command = f" {context.info_name}{command}"
+        context = context.parent
+    command = f"chainunit{command}"
     missing = error.param if hasattr(error, "param_type") else None
     if missing is not None and missing.param_type_name == "argument":
         words = f"{missing.name.upper()} is missing: {missing.help}"

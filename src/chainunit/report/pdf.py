@@ -119,11 +119,15 @@ class _PrintedPage(Page):
         if file is None:
             return ""
         picture = base64.b64encode(file.read_bytes()).decode()
+        shape = "printed flat" if self._height(figure) < _FLAT else "printed"
         return (
-            f'<figure class="printed"><img src="data:image/png;base64,{picture}" alt="{escape(figure.alt)}">'
+            f'<figure class="{shape}"><img src="data:image/png;base64,{picture}" alt="{escape(figure.alt)}">'
             f"<figcaption>{escape(figure.title)}. {self.line(figure.caption)}</figcaption></figure>"
         )
 
+
+_FLAT = 0.5
+"""Height over width below which two figures stand beside each other in a long annex."""
 
 _WARNINGS, _FIGURES = "warnings", "figures"
 

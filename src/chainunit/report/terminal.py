@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -17,6 +18,8 @@ from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
+_BRACKETS = re.compile(r" ?\([^()]*\)")
+_CLAUSE_END = re.compile(r"(?<=.{20})[:;.] ")
 
 
 def plain_line(line: Line, units: Units = DEFAULT_UNITS) -> str:
@@ -89,7 +92,7 @@ def screen(report: Report, console: Console, rest: str) -> None:
     warnings = [each for each in last if each.startswith(_LAST["warning"])][:_WARNINGS]
     if len(last) > len(warnings):
         rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
-    end = [shorten(each, console.width - 1, placeholder=" ...") + "\n" for each in warnings]
+    end = [line_of(warning, console.width - 1) + "\n" for warning in warnings]
     end.append(_printed(console, lambda: console.print(rest)))
     room = _LINES - _count(end)
     title = f"{report.title}\n" if report.title else ""
@@ -103,6 +106,16 @@ def screen(report: Report, console: Console, rest: str) -> None:
             console.file.write(shown)
             room -= _count([shown])
     console.file.write("".join(end))
+
+
+def line_of(text: str, width: int) -> str:
+    """A sentence in one line: if it is too long, without what stands in brackets, then with its first clauses."""
+    if len(text) > width:
+        text = _BRACKETS.sub("", text)
+    if len(text) <= width:
+        return text
+    ends = [place.start() for place in _CLAUSE_END.finditer(text) if place.start() < width]
+    return f"{text[: ends[-1]]}." if ends else shorten(text, width, placeholder=" ...")
 
 
 def _printed(console: Console, show: Callable[[], None]) -> str:
