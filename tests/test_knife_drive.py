@@ -310,6 +310,7 @@ def test_accepted_machines_are_right_all_the_way_round():
         assert np.max(np.abs(np.diff(out.blade.x.v))) < 0.2
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize(
     ("values", "line"),
     [
@@ -327,6 +328,7 @@ def test_refusals(values, line, tmp_path):
     assert not (tmp_path / "x.fmu").exists()
 
 
+@pytest.mark.compiler
 def test_the_native_fmu_refuses_what_python_refuses(tmp_path):
     """Derived values are computed anew from what is set before initialisation, and refused in the same words."""
     from chainunit import RunError

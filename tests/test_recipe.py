@@ -118,7 +118,7 @@ def test_values_that_do_not_follow_stand_in_the_model():
         assert set(model.fmu_data.sizes) <= set(model.input_layout.names)
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", ["python", pytest.param("native", marks=pytest.mark.compiler)])
 def test_an_export_runs_no_script(backend, tmp_path, monkeypatch):
     """A native export found its default experiment by running the script of a Python FMU."""
     monkeypatch.setattr(recipe, "recipes", lambda: pytest.fail("the scripts are for pythonfmu"))

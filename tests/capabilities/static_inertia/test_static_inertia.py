@@ -181,6 +181,7 @@ def test_without_masses_that_move_unevenly_both_agree_to_rounding():
     assert later["start_time"] is None
 
 
+@pytest.mark.compiler
 def test_the_energy_of_its_runs_is_kept(given):
     findings = StaticInertiaFindings.of_study(given)
     assert 0.0 < findings.residual < 1e-7
@@ -249,6 +250,7 @@ def scipy_rms(study, inertia, terms):
     return rms(at_gear), rms(gaps)
 
 
+@pytest.mark.compiler
 @pytest.mark.second
 def test_an_integration_with_scipy_has_the_same_rms_torques(given):
     findings = StaticInertiaFindings.of_study(given)
@@ -268,12 +270,14 @@ def test_an_integration_with_scipy_has_the_same_rms_torques(given):
     assert found["static"][0] > 1.05 * found["machine"][0]
 
 
+@pytest.mark.compiler
 def test_the_terms_at_constant_speed_leave_an_error_of_second_order(given):
     findings = StaticInertiaFindings.of_study(given)
     static, with_terms = (findings.deviations[name]["gear_torque_rms"] for name in ("static", "with_terms"))
     assert abs(with_terms) < 0.05 * abs(static)
 
 
+@pytest.mark.compiler
 def test_events_have_their_peaks_with_both(tmp_path):
     text = GIVEN.replace("event = []\n", "") + '[[event]]\ntype = "jam"\nside = "left"\n'
     study = run_study(parse(text), tmp_path)
@@ -313,6 +317,7 @@ def test_a_file_that_asks_for_what_there_is_not_is_refused(text, words):
         parse(text)
 
 
+@pytest.mark.compiler
 def test_the_page_says_what_differs(given):
     said = markdown(report(given, as_dict(given)), {})
     findings = StaticInertiaFindings.of_study(given)
@@ -326,6 +331,7 @@ def test_the_page_says_what_differs(given):
     )
 
 
+@pytest.mark.compiler
 def test_nothing_is_said_where_nothing_differs(given):
     """A machine whose inertia hardly changes: the numbers stand in the data, and no sentence and no section."""
     findings = StaticInertiaFindings.of_study(given)
@@ -344,6 +350,7 @@ def test_nothing_is_said_where_nothing_differs(given):
         assert "static_inertia" in as_dict(study)
 
 
+@pytest.mark.compiler
 def test_the_same_drive_by_other_numbers_has_a_short_sentence(given):
     """None if the numbers agree to 2 %, too."""
     findings = StaticInertiaFindings.of_study(given)
@@ -382,6 +389,7 @@ def shaper(tmp_path_factory):
     return study
 
 
+@pytest.mark.compiler
 @pytest.mark.second
 def test_a_motor_that_one_inertia_makes_too_small_is_told_with_what_it_misses(shaper):
     findings = StaticInertiaFindings.of_study(shaper)
@@ -399,6 +407,7 @@ def test_a_motor_that_one_inertia_makes_too_small_is_told_with_what_it_misses(sh
     assert warning.quantities["inertia"].value == findings.inertia.mean
 
 
+@pytest.mark.compiler
 @pytest.mark.second
 def test_the_trial_in_the_machine_is_a_study_of_that_motor(shaper, tmp_path):
     """Another study, whose file names the other motor, finds the same temperature."""
@@ -413,6 +422,7 @@ def test_the_trial_in_the_machine_is_a_study_of_that_motor(shaper, tmp_path):
     assert choice.checks["rms_torque"].value == pytest.approx(torque, rel=0.02)
 
 
+@pytest.mark.compiler
 @pytest.mark.second
 def test_a_search_that_fails_leaves_the_rest(shaper):
     words = trial_words(
@@ -432,6 +442,7 @@ def test_a_twin_survives_pickle():
     assert other.outputs(1.0, 2.0).J == 12.0 / 49.0
 
 
+@pytest.mark.compiler
 def test_machines_without_an_inertia_of_their_angle_say_so():
     assert obstacle(drive_of(parse(GIVEN))) == ""
     with_chains = parse(GIVEN.replace('"always"', '"sizing"').replace("event", 'organ = "chain"\nevent'))
@@ -439,6 +450,7 @@ def test_machines_without_an_inertia_of_their_angle_say_so():
     assert obstacle(chains) == "the inertia of the machine does not belong to its angle alone"
 
 
+@pytest.mark.compiler
 def test_runs_that_fail_are_told_and_leave_the_study(monkeypatch, tmp_path):
     def fails(*_):
         raise RunError("it stalls")

@@ -132,6 +132,7 @@ NEEDED = {"cryptography", "fmpy", "numpy", "pydantic", "rich", "scipy", "typer"}
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "vouching.md"
 
 
+@pytest.mark.compiler
 def test_a_receiver_needs_few_packages(made):
     """The others, as casadi, are not to be had for every machine."""
     arguments = ["verify", "it.fmu", "--key", "chainunit.key.pub"]
@@ -847,7 +848,13 @@ FORGERIES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", list(FORGERIES))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.compiler if "Model Exchange" in name else ())
+        for name in FORGERIES
+    ],
+)
 def test_no_evidence_of_its_own_makes_a_file_hold(tmp_path, members, other, name):
     change, words = FORGERIES[name]
     found = checked(tmp_path, signed(change(members), other))
@@ -888,9 +895,25 @@ def evidence_of_a_system(fmus):
     return manifest.json_bytes({"sources": certify.sources_hash(), "fmus": fmus})
 
 
+def test_an_fmu_by_pythonfmu_without_its_script_is_not_run(fmus):
+    """The library of pythonfmu would end the process."""
+    members = archive.contents(fmus["ChamberForces"].read_bytes()).members
+    lacking = {
+        name: content
+        for name, content in members.items()
+        if not re.fullmatch("resources/ChamberForces_.*py", name)
+    }
+    assert len(lacking) == len(members) - 1
+    with (
+        rerun.unpacked(lacking, "it.fmu") as fmu,
+        pytest.raises(rerun.NoLibraryError, match=r"^resources/ChamberForces_\w+[.]py is missing$"),
+    ):
+        rerun.opened(fmu)
+
+
 def test_a_model_under_another_name_is_not_judged_by_itself(tmp_path, members, other):
     """Its results are then those in the file alone."""
-    renamed = {name.replace("/ChamberForces_", "/Mine_"): x for name, x in members.items()}
+    renamed = {re.sub("^(extra/.*/)ChamberForces_", r"\1Mine_", name): x for name, x in members.items()}
     renamed = text(b'modelName="ChamberForces"', b'modelName="Mine"')(evidence(model="Mine")(renamed))
     renamed = text(b"# ChamberForces", b"# Mine", documents.REPORT)(renamed)
     renamed = text(b'name="ChamberForces"', b'name="Mine"', documents.SRMD)(renamed)

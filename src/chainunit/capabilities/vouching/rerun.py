@@ -180,10 +180,12 @@ def opened(fmu: UnpackedFmu) -> Any:
     Raises
     ------
     NoLibraryError
-        where this machine cannot load the library.
+        where this machine cannot load the library, or an FMU by pythonfmu lacks its script.
     """
     from fmpy import fmi2, fmi3
 
+    if reason := _lost_script(fmu):
+        raise NoLibraryError(reason)
     of_class = fmu.instead or (fmi2.FMU2Slave if fmu.fmi == 2 else fmi3.FMU3Slave)
     try:
         with loading():
@@ -195,6 +197,15 @@ def opened(fmu: UnpackedFmu) -> Any:
             )
     except Exception as error:  # fmpy has no class of its own
         raise NoLibraryError(_no_library(fmu, error)) from error
+
+
+def _lost_script(fmu: UnpackedFmu) -> str:
+    """Why an FMU by pythonfmu cannot be run: its library ends the process if the script is not there."""
+    resources = fmu.folder / "resources"
+    if not (named := resources / "slavemodule.txt").is_file():
+        return ""
+    script = f"{named.read_text('utf-8', 'replace').strip()}.py"
+    return "" if (resources / script).is_file() else f"resources/{printable(script, 100)} is missing"
 
 
 class Slave:
