@@ -132,6 +132,8 @@ def test_temperatures():
         ("[ratios]\nrho = 0.1\n[machine]\nr = 0.2", "machine.r: given beside [ratios]"),
         ("[ratios]\nrho = 0.6", "machine: "),
         ("[ratios]\nmu = 1.0", "ratios: rho = 0.1, mu = 1: the papers' frame needs"),
+        ("[ratios]\nrho = 0.9", "ratios: c = .*, rho = 0.9 must be <= 0.3069$"),
+        ("[ratios]\nzeta = 0.001", "ratios: z = .*, zeta = 0.001 must be >= 0.1494 and <= 0.928$"),
         ("[run]\nstep = 1", "run.step = 1 s: must be >= 1e-05 s and <= 0.02 s"),
         ("x =", "no valid TOML"),
         ("[machine]\nr = 1" + 5000 * "0", "no valid TOML"),

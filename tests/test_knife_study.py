@@ -329,7 +329,7 @@ def test_a_motor_that_stalls(tmp_path):
     assert wheel.stalls and wheel.answers.speed_ripple is None and wheel.answers.start_time is not None
     assert study.findings["flywheels"].least is None
     said = " ".join(str(remark) for remark in study.warnings)
-    assert "The motor stalls under the load" in said and "nor does a larger one that was tried" in said
+    assert "The motor stalls with a flywheel" in said and "nor does a larger one that was tried" in said
     assert " on average, rated is 14.4 N m" in said
     # no flywheel is advised beside
     assert ": a larger motor, or less load." in said

@@ -88,7 +88,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     steady, motor = study.answers["steady"], study.drive.parameters
     missed = warnings["speed missed"].text
     below = breakdown_speed(study.drive, study.steady)
-    assert steady.speed_mean < 0.5 * below and "the motor stalls under the load" in missed
+    assert steady.speed_mean < 0.5 * below and "the motor stalls below its pull-out speed" in missed
     assert f"below {below:.2f} rad/s, the speed of its pull-out torque" in missed
     assert "slip" not in missed and "verload" not in missed
     # there the torque is the largest of all speeds

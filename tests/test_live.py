@@ -17,7 +17,7 @@ from live_pages import OUTCOME, in_node, live_of
 from chainunit import InputError
 from chainunit.app.cli import live as live_command
 from chainunit.core.quantities import Layout
-from chainunit.machines.admissible import holding_range
+from chainunit.machines.admissible import admits, holding_range
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.report import html
@@ -136,7 +136,7 @@ def test_the_most_effective_numbers_come_first(packaged):
 def test_lengths_that_cannot_close_are_refused_with_the_range(packaged):
     _, live, choice = packaged
     machine = choice.drive.machine
-    low, high = holding_range(machine.model, machine.by_name, "z")
+    low, high = holding_range(admits(machine.model), machine.by_name, "z", machine.model.Parameters().z)
     found = in_node(
         live,
         f"const z = {1.05 * high};"

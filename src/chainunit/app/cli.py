@@ -364,7 +364,7 @@ def _outcome() -> tuple[int, str]:
         if not hasattr(error, "format_message"):
             raise
         if type(error).__name__ == "NoArgsIsHelpError":  # a group without a command, as chainunit itself
-            print(error.ctx.get_help())
+            print(error.ctx.get_help())  # type: ignore[attr-defined]
             return 0, ""
         return 2, _usage(error)
 

@@ -4,10 +4,12 @@ refused that another one spoils."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from ..core.errors import InputError
 from ..core.messages import unit_behind
+from ..core.quantities import Layout
 from ..mechanism.models import MachineModel
 
 _ROUNDS = 24
@@ -16,22 +18,29 @@ _FARTHEST = 1e3
 """Ratio to the declared start value up to which a limit is sought."""
 
 
-def holding_range(
-    model: type[MachineModel], given: Mapping[str, float], name: str
-) -> tuple[float, float] | None:
-    """The range of the parameter `name` about its declared start value in which all requirements of the `model` hold,
-    with the other `given` values; None where they do not hold at this start value. An end without a limit nearby is
-    0, or infinite."""
+def admits(model: type[MachineModel]) -> Callable[[Mapping[str, float]], bool]:
+    """Whether a machine of the `model` works with these parameters, the others at their declared start values."""
     layout = model.parameter_layout
-    start = layout.by_name(model.Parameters())
-    inside = start[name]
 
-    def holds(value: float) -> bool:
+    def holds(values: Mapping[str, float]) -> bool:
         try:
-            model.check(layout.from_names({**given, name: value}, model.Parameters()))
+            model.check(layout.from_names(dict(values), model.Parameters()))
         except InputError:
             return False
         return True
+
+    return holds
+
+
+def holding_range(
+    admitted: Callable[[Mapping[str, float]], bool], given: Mapping[str, float], name: str, start: float
+) -> tuple[float, float] | None:
+    """The range of the value `name` about its `start` in which the machine works (`admitted`), with the other `given`
+    values; None if it does not work at the start. An end without a limit nearby is 0, or infinite."""
+    inside = start
+
+    def holds(value: float) -> bool:
+        return admitted({**given, name: value})
 
     if not holds(inside):
         return None
@@ -59,22 +68,22 @@ def holding_range(
     return ends[0], ends[1]
 
 
-def causes(model: type[MachineModel], given: Mapping[str, float]) -> dict[str, str]:
-    """The given values each of which alone spoils the machine, by name, in words with the range in which all
-    requirements hold. Whoever keeps to a range is not refused again."""
-    start = model.parameter_layout.by_name(model.Parameters())
-    units = {v.name: unit_behind(v.unit) for v in model.parameter_layout.variables}
+def causes(
+    admitted: Callable[[Mapping[str, float]], bool], given: Mapping[str, float], layout: Layout, start: Any
+) -> dict[str, str]:
+    """The given values each of which alone spoils the machine, by name, in words with the range in which it works.
+    Whoever keeps to a range is not refused again. `start` are the values of the `layout` that are not given."""
     words = {}
-    for name in given:
-        if name not in start or given[name] == start[name]:
+    units = {variable.name: unit_behind(variable.unit) for variable in layout.variables}
+    for name, usual in layout.by_name(start).items():
+        if name not in given or given[name] == usual:
             continue
-        found = holding_range(model, given, name)
-        if found is None:
+        span, unit = holding_range(admitted, given, name, usual), units[name]
+        if span is None:
             continue
-        low, high = (_inward(x, sense) for x, sense in zip(found, (1.0, -1.0), strict=True))
-        unit = units[name]
-        limits = [f">= {low}{unit}"] if found[0] not in (0.0, -math.inf) else []
-        limits += [f"<= {high}{unit}"] if math.isfinite(found[1]) else []
+        low, high = (_inward(x, sense) for x, sense in zip(span, (1.0, -1.0), strict=True))
+        limits = [f">= {low}{unit}"] if span[0] not in (0.0, -math.inf) else []
+        limits += [f"<= {high}{unit}"] if math.isfinite(span[1]) else []
         words[name] = f"{name} = {given[name]:g}{unit} must be {' and '.join(limits)}"
     return words
 

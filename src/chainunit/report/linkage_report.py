@@ -162,8 +162,8 @@ def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
             yield from _reversals(s, f, path)
     if f.machine.model.turns and (f.strokes or f.swings):
         yield b.Text(
-            "Forth: the angle of the driver from the least to the largest. Time ratio: the time of the slower way "
-            "over that of the faster one.",
+            "Forth: the angle of the driver from the least to the largest. Time ratio: slow stroke over quick "
+            "return.",
             "note",
             "long",
         )

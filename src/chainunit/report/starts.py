@@ -14,11 +14,10 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The worst start in a sentence, and a table of all starts."""
     if "starts" not in s.result:
         return
-    place = "on the output of the gear" if study.drive.is_geared else f"on the {study.driver_noun}"
+    place = "output of the gear" if study.drive.is_geared else study.driver_noun
     worst = (
-        f"Start: load and acceleration put up to {{starts.worst.quasi_static}} {place}, from "
-        "{a driver} angle of {starts.worst.angle}; "
-        "{running} puts {starts.running} on it ({starts.over_running} times)."
+        f"Start: load and acceleration load the {place} with up to {{starts.worst.quasi_static}}, from "
+        "{a driver} angle of {starts.worst.angle}: {starts.over_running} times {running}, {starts.running}."
     )
     running = running_words(study, s.result["starts"]["running_in"])
     transient = "" if study.drive.follows else f" The {transient_words(study)}: {{starts.transient}}."

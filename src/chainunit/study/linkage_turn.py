@@ -78,7 +78,7 @@ class Stroke:
     largest_at: Value = quantity("rad", "place of the driver there")
     range: Value = quantity("m", "stroke")
     forth: Value = quantity("rad", "angle of the driver from the least to the largest way")
-    time_ratio: Value = quantity("1", "time of the slower way over that of the faster one")
+    time_ratio: Value = quantity("1", "time ratio: slow stroke over quick return")
 
 
 @declaration
@@ -91,7 +91,7 @@ class Swing:
     largest_at: Value = quantity("rad", "place of the driver there")
     range: Value = quantity("rad", "swing")
     forth: Value = quantity("rad", "angle of the driver from the least to the largest angle")
-    time_ratio: Value = quantity("1", "time of the slower way over that of the faster one")
+    time_ratio: Value = quantity("1", "time ratio: slow stroke over quick return")
 
 
 @dataclass(frozen=True)

@@ -189,8 +189,8 @@ def _why_missed(study: StudyRecord, steady: Answers) -> str:
     if (breakdown := _stall_speed(study, steady)) is not None:
         below = number(breakdown, "rad/s", "speed", beside=False)
         return (
-            f"the motor stalls under the load: below {below}, the speed of its pull-out torque, its torque falls "
-            "with the speed; take a larger motor, less load, or for a load that comes and goes a heavier flywheel"
+            f"the motor stalls below its pull-out speed, {below}; take a larger motor, less load, or for a load that "
+            "comes and goes a heavier flywheel"
         )
     if steady.energy_gap > STORED:
         return (

@@ -401,7 +401,7 @@ def motor_energy(plan, name, power, price):
         (450.0, "it has paid after"),
         (380.0, "it costs no more than the other"),
         (4000.0, "does not pay in a life of"),
-        (None, "not known without the prices"),
+        (None, "payback: enter motor_price and other_price"),
     ],
 )
 def test_the_life_decides_whether_a_motor_pays(study, price, words):

@@ -100,8 +100,8 @@ def verdict_words(comparison: MotorComparison) -> str:
     if comparison.cost_saving is not None:
         text += ", a cost of {energy.comparison.cost_saving} a year"
     if comparison.pays_after is None or comparison.life_saving is None:
-        energy = "" if comparison.cost_saving is not None else " and of the energy"
-        text += f"; when it has paid is not known without the prices of both motors{energy}"
+        price = "" if comparison.cost_saving is not None else " and price (of a kWh)"
+        text += f"; payback: enter motor_price and other_price{price}"
     elif comparison.pays_after <= 0.0:
         text += "; it costs no more than the other, and saves {energy.comparison.life_saving} over the life"
     elif comparison.life_saving >= 0.0:

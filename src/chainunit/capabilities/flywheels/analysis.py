@@ -295,7 +295,7 @@ _TROUBLES = (
     Trouble(
         "flywheel stalls",
         lambda wheel: wheel.stalls,
-        "the motor stalls under the load with a flywheel of {where}: {remedy}, or less load.",
+        "the motor stalls with a flywheel of {where}: {remedy}, or less load.",
     ),
     Trouble(
         "flywheel does not start",

@@ -54,7 +54,7 @@ _OBSTACLES = {
 
 
 _REASONS = {
-    Obstacle.START: "a start puts {start} on it",
+    Obstacle.START: "a start loads it with {start}",
     Obstacle.MOTOR: "the motor gives {motor} at most",
     Obstacle.GEAR: "the gear may carry {gear} in running",
     Obstacle.OVERLOADS: "no overload of this study would open it",

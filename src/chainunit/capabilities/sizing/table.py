@@ -96,7 +96,7 @@ class Sizing:
     )
     candidates: Value = quantity(
         "1",
-        "least number of motors that are tried; more follow until one fits and none behind it can be preferred",
+        "least number of motors that are tried; further ones are tried until no later one could rank higher",
         default=9,
         min=1,
         max=200,
