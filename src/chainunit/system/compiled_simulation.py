@@ -141,9 +141,6 @@ class CompiledSimulation(Simulation):
         }
         return xr.Dataset(variables, {"time": ("time", times[chosen], {"units": "s", "long_name": "time"})})
 
-    def check_states(self) -> None:
-        """See `Simulation`; the state can always be saved."""
-
     def save(self) -> float:
         """Keep the state, and return its time [s]."""
         self._saved = self.time, self._states

@@ -7,10 +7,11 @@ states first, then the outputs that depend on them. So every recorded row belong
 from __future__ import annotations
 
 import math
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -56,6 +57,10 @@ class RunOptions:
     every: int
     names: Iterable[str] | None
     file: Path | None
+
+
+_PastRun = tuple[dict[str, Any], RunOptions]
+"""The signals and the arguments of a run that can be repeated."""
 
 
 class Simulation(ABC):
@@ -142,9 +147,10 @@ class Simulation(ABC):
     def restore(self) -> None:
         """Return to the saved state, from which another branch can run."""
 
-    @abstractmethod
-    def check_states(self) -> None:
-        """Refuse a system whose state cannot be saved."""
+    @property
+    def without_states(self) -> list[str]:
+        """The components whose state cannot be saved: to `restore` then runs the system from its start again."""
+        return []
 
 
 class FmuSimulation(Simulation):
@@ -176,28 +182,35 @@ class FmuSimulation(Simulation):
         self._instances: dict[str, Any] = {}
         self._state: dict[str, Any] = {}
         self._journal: list[str] = []
+        self._start = self.time, dict(self.signals)
+        self._past: list[_PastRun] = []
+        """the runs since the start, where a state cannot be saved"""
+        self._saved_past: list[_PastRun] = []
         try:
             self._open()
-            self._transfers = self._schedule()
-            self._initialize()
+            self._instantiate()
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """Free every instance and the unpacked files."""
+        self._free_instances()
+        for fmu in self._fmus.values():
+            fmu.close()
+        self._fmus = {}
+
+    def _free_instances(self) -> None:
         for name, instance in self._instances.items():
             if name in self._state:
                 instance.forget(self._state[name])
             instance.close()
-        for fmu in self._fmus.values():
-            fmu.close()
-        self._instances, self._fmus, self._state = {}, {}, {}
+        self._instances, self._state = {}, {}
 
     # -- set-up
 
     def _open(self) -> None:
-        """Unpack the FMUs, each file once, and instantiate the components."""
+        """Unpack the FMUs, each file once."""
         archives: dict[Any, Fmu] = {}
         for name, component in self.system.components.items():
             if component.file is None:
@@ -210,7 +223,13 @@ class FmuSimulation(Simulation):
                     connector = component.connectors.get(variable.name)
                     variable.unit = variable.unit or (connector.unit if connector else None)
             self._fmus[name] = archives[key]
-            self._instances[name] = self.instances(archives[key], name, self._journal)
+
+    def _instantiate(self) -> None:
+        """Instantiate the components, and bring them to the start."""
+        for name, fmu in self._fmus.items():
+            self._instances[name] = self.instances(fmu, name, self._journal)
+        self._transfers = self._schedule()
+        self._initialize()
 
     def _schedule(self) -> list[tuple[Instance, Any, list[tuple[Instance, Any, list[int]]]]]:
         """Groups of connected outputs in an order in which each output is final when it is read. A group has its
@@ -317,6 +336,9 @@ class FmuSimulation(Simulation):
         import xarray as xr
 
         start, file = self.time, options.file
+        if self.without_states:
+            kept = replace(options, progress=None, every=sys.maxsize, file=None)
+            self._past.append((dict(self.signals), kept))
         n = max(1, math.ceil((options.stop - start) / options.step - 1e-9))
         recorders, guarded = self._recorders(options.names), self._guarded(options.guards)
         room = n // options.every + 2 if file is None else rows.BLOCK
@@ -400,42 +422,53 @@ class FmuSimulation(Simulation):
 
     # -- branching
 
-    def save(self) -> float:
-        """Save the present state of every FMU, in place of the last saved one; returns the time.
+    @property
+    def without_states(self) -> list[str]:
+        """See `Simulation`."""
+        return [name for name, fmu in self._fmus.items() if not fmu.interface.canGetAndSetFMUstate]
 
-        Raises
-        ------
-        InputError
-            where an FMU cannot give its state.
-        """
-        self.check_states()
-        for name, instance in self._instances.items():
-            if name in self._state:
-                instance.forget(self._state[name])
-            self._state[name] = instance.state()
+    def save(self) -> float:
+        """Save the present state of every FMU, in place of the last saved one; returns the time. Where an FMU cannot
+        give its state, the runs since the start are remembered in its place."""
+        if self.without_states:
+            self._saved_past = list(self._past)
+        else:
+            for name, instance in self._instances.items():
+                if name in self._state:
+                    instance.forget(self._state[name])
+                self._state[name] = instance.state()
         self._saved_at = self.time
         return self.time
 
-    def check_states(self) -> None:
-        """Refuse a system whose state cannot be saved.
+    def restore(self) -> None:
+        """Return to the saved state, from which another branch can run. Where an FMU cannot give its state, all FMUs
+        begin again, and the runs up to the saved time are repeated.
 
         Raises
         ------
-        InputError
-            where an FMU cannot give its state.
+        RunError
+            where an FMU fails in one of these runs.
         """
-        for name, fmu in self._fmus.items():
-            if not fmu.interface.canGetAndSetFMUstate:
-                raise InputError(
-                    f"{name} ({fmu.file.name}): cannot save its state (canGetAndSetFMUstate), so that no event can "
-                    "branch from steady running; ask its maker for an FMU that can"
-                )
-
-    def restore(self) -> None:
-        """Return to the saved state, from which another branch can run."""
-        for name, instance in self._instances.items():
-            instance.restore(self._state[name])
+        if self.without_states:
+            self._repeat(self._saved_past)
+        else:
+            for name, instance in self._instances.items():
+                instance.restore(self._state[name])
         self.time = self._saved_at
+
+    def _repeat(self, runs: Sequence[_PastRun]) -> None:
+        """Make these runs from the start again; the signals stay as they are."""
+        signals = self.signals
+        self._free_instances()
+        self._past = []
+        self.time, first = self._start
+        self.signals = dict(first)
+        self._instantiate()
+        for self.signals, options in runs:
+            failure = self._run(options)[1]
+            if failure is not None:
+                raise failure
+        self.signals = signals
 
 
 def beyond(guarded: Sequence[Guarded]) -> bool:
