@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, near_name, shown
+from ..core.declared_numbers import as_text
+from ..core.errors import InputError, RemarkWarning, check_kind, near_name, shown
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
 from ..machines.machine import Machine
@@ -49,9 +50,9 @@ class Study(StudyMethods):
     Parameters
     ----------
     **tables : the keys and tables of a study file (``chainunit keys`` shows them), by the same names and with the
-        same checks: tables are mappings, events a list of them. A number is in the declared SI unit; a text
-        may carry a unit. A key that is left out has the value of the example. Paths of files are relative to
-        the working folder.
+        same checks: tables are mappings, events a list of them. A number is in the declared SI unit; a text or a
+        quantity of pint has its unit. A key that is left out has the value of the example. Paths of files are
+        relative to the working folder.
 
     Raises
     ------
@@ -88,6 +89,7 @@ class Study(StudyMethods):
         InputError
             with a line of text for each fault, which begins with the file and its line number.
         """
+        check_kind("path", path, str | Path | None, "the path of a study file")
         config = study_files.load(None if path is None else Path(path))
         return cls.__new__(cls)._take(config, config.file.source)
 
@@ -100,6 +102,7 @@ class Study(StudyMethods):
         InputError
             as `from_file`.
         """
+        check_kind("text", text, str, "a text in TOML")
         with in_file(_TEXT, lambda: lines_of(text)):
             config = study_files.parse(text, _TEXT)
         return cls.__new__(cls)._take(config, _TEXT)
@@ -139,6 +142,7 @@ class Study(StudyMethods):
         InputError
             as the class.
         """
+        check_kind("values", values, Mapping, 'a mapping such as {"machine.r": "170 mm"}')
         tables = copy.deepcopy(dict(self.config.file.tables))
         for name, value in values.items():
             if not isinstance(name, str):
@@ -308,6 +312,7 @@ def _plain(value: Any) -> Any:
         return [_plain(each) for each in value]
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
+    value = as_text(value)
     return str(value) if isinstance(value, Path) else value
 
 

@@ -22,6 +22,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
 from . import bounds, messages
 from .descriptions import Described
+from .errors import UnknownNameError, near_name
 
 T = TypeVar("T")
 
@@ -452,12 +453,14 @@ class Layout:
 
         Raises
         ------
-        KeyError
+        UnknownNameError
             for a name that is not declared.
         """
         unknown = set(values) - set(self.names)
         if unknown:
-            raise KeyError(f"no variable {sorted(unknown)[0]!r} in {self.cls.__qualname__}")
+            name = min(unknown, key=str)
+            near = near_name(str(name), self.names)
+            raise UnknownNameError(f"no variable {name!r} in {self.cls.__qualname__}{near}")
         if default is not None:
             base = self.values(default)
         else:

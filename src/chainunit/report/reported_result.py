@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self
 
-from ..core.errors import WriteError
+from ..core.errors import WriteError, check_kind
 from ..core.files import atomic_file
 from ..core.temporary_folders import in_temporary_folder
 from ..work.progress import TaskProgress, quiet
@@ -40,6 +41,8 @@ class ReportedResult(Generic[Question, Outcome]):
         WriteError
             for a file that cannot be written; the others are written.
         """
+        check_kind("folder", folder, str | Path | None, "the path of a folder")
+        check_kind("progress", progress, Callable | None, "a function of task, work done and total work")
         task = cls._task
         compute = partial(task.outcome, question, progress=progress or quiet, **options)
         if folder is not None:
@@ -80,6 +83,7 @@ class ReportedResult(Generic[Question, Outcome]):
         WriteError
             for a file that cannot be written; the others are written.
         """
+        check_kind("folder", folder, str | Path, "the path of a folder")
         task = self._task
         with task.claimed(self._question, Path(folder)) as place:
             if task.kept is None or self._folder is None:

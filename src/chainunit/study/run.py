@@ -222,8 +222,8 @@ class Runner:
         for part in simulation.without_states if self.events else ():
             self.study.note(
                 "state not saved",
-                "{title} cannot save its state (canGetAndSetFMUstate): each event was run from rest, through the same "
-                "start-up. With an FMU that can, the study takes less time.",
+                "{title} cannot save its state (canGetAndSetFMUstate): each event was run from rest, through the "
+                "same start-up. With an FMU that can, the study takes less time.",
                 *(event.name for event in self.events),
                 title=self.rig.graph.components[part].title,
             )
