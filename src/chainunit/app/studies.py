@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.declared_numbers import as_text
 from ..core.errors import InputError, RemarkWarning, check_kind, near_name, shown
+from ..core.named import Named
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
 from ..machines.machine import Machine
@@ -277,13 +278,12 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         return table.dropna(how="all", subset=list(runs))
 
     @cached_property
-    def runs(self) -> xr.DataTree:
-        """The time series of every run: ``runs["jam_left"]["machine.tau"]``, with units in ``attrs``, and of the
-        turns in steady running: ``runs["steady"]``. The file result.nc holds the runs."""
-        import xarray as xr
-
-        runs, record = series.tree(self.record), self.record
-        return runs.assign({"steady": xr.DataTree(record.steady)}) if "steady" in record.answers else runs
+    def runs(self) -> Mapping[str, xr.Dataset]:
+        """The time series of every run by its name, a Dataset over ``time``: ``runs["jam_left"]["machine.tau"]``, with
+        units in ``attrs``; and those of the turns in steady running: ``runs["steady"]``. The file result.nc holds the
+        runs."""
+        runs = {name: node.to_dataset() for name, node in series.tree(self.record).children.items()}
+        return Named(runs | ({"steady": self.record.steady} if "steady" in self.record.answers else {}))
 
     @property
     def verdict(self) -> str:

@@ -115,7 +115,7 @@ def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     columns, rng = ("motor.i", "motor.u", "motor.w"), np.random.default_rng(3)
     write_recording(synthetic(drive, columns, run, logger, rng), tmp_path / "ramp.csv.gz")
     (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file="ramp.csv.gz"), "utf-8")
-    found = Study.from_file(tmp_path / "mine.toml").watch().watched
+    found = Study.from_file(tmp_path / "mine.toml").watch().record
     assert {each.side for each in found.alarms} == {"left"} and found.is_described
     time, shift = found.recording.time, Profile(0.0, ((30.0, 10.0, 12.0),))
     beyond = [shift(t) > x for t, x in zip(time, found.outputs["imbalance.feed_threshold"], strict=True)]
@@ -129,7 +129,7 @@ def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     wrong = TRUTH["machine"] | {"left.wall_mass": 81.0}
     (tmp_path / "mine.toml").write_text(study_text(wrong, end=40), "utf-8")
     found = Study.from_file(tmp_path / "mine.toml").watch()
-    assert not found.watched.is_described and watch_page.TASK.shortfall(found.watched) == ""
+    assert not found.record.is_described and watch_page.TASK.shortfall(found.record) == ""
     assert "does not describe the begin of the recording" in " ".join(repr(found).split())
     doubts = json.loads(found.to_json())["doubts"]
     assert any("remains in motor.i" in each for each in doubts)
@@ -150,7 +150,7 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
         (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], end=60, **more), "utf-8")
         found = Study.from_file(tmp_path / "mine.toml").watch()
         results.append(json.loads(found.to_json()))
-        thresholds.append(np.median(found.watched.outputs["imbalance.feed_threshold"]))
+        thresholds.append(np.median(found.record.outputs["imbalance.feed_threshold"]))
     assert results[0]["widening"]["value"] == 1.0
     # a web that is heavier by 1 kg is as good as feed
     assert results[1]["uncertainty"]["value"] == pytest.approx(1.0, abs=0.1)
@@ -201,7 +201,7 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     assert (
         f"The noise of the measured speed at the begin is {noise['speed']:.2g} times the stated one" in words
     )
-    assert found.watched.parameters["noise.w"] == pytest.approx(0.002 * noise["speed"] * 150.0, rel=0.01)
+    assert found.record.parameters["noise.w"] == pytest.approx(0.002 * noise["speed"] * 150.0, rel=0.01)
 
 
 def test_the_noise_of_columns_that_the_observer_does_not_use():
