@@ -279,7 +279,7 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
 
     @cached_property
     def runs(self) -> Mapping[str, xr.Dataset]:
-        """The time series of every run by its name, a Dataset over ``time``: ``runs["jam_left"]["machine.tau"]``, with
+        """The time series of every run by its name, Datasets over ``time``: ``runs["jam_left"]["machine.tau"]``, with
         units in ``attrs``; and those of the turns in steady running: ``runs["steady"]``. The file result.nc holds the
         runs."""
         runs = {name: node.to_dataset() for name, node in series.tree(self.record).children.items()}

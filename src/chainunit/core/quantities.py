@@ -21,6 +21,7 @@ from operator import attrgetter
 from typing import Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
 from . import bounds, messages
+from .brief import briefly_shown
 from .descriptions import Described
 from .errors import UnknownNameError, near_name
 
@@ -307,7 +308,7 @@ def group(declared: type, description: str, *, default: Any = None) -> Any:
 def declaration(cls: type[T]) -> type[T]:
     """Make `cls` a declaration: a frozen dataclass with keyword-only fields."""
     # no slots: declarations may inherit from several others
-    return dataclass(frozen=True, kw_only=True)(cls)
+    return briefly_shown(dataclass(frozen=True, kw_only=True)(cls))
 
 
 Fields = Sequence[tuple[str, Any, Any]]
@@ -316,7 +317,7 @@ Fields = Sequence[tuple[str, Any, Any]]
 
 def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
     """A declaration with these fields and those of `bases`."""
-    return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
+    return briefly_shown(dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True))
 
 
 def fields_of(declared: type, *, without: Sequence[str] = ()) -> Fields:

@@ -48,6 +48,7 @@ class ProgressBar:
         self._is_shown = False
 
     def __call__(self, what: str, done: float, total: float) -> None:
+        """Show the share of a task, see `TaskProgress`."""
         now = monotonic() - self._begin
         if now - self._last < _EVERY and done < total:
             return

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.brief import briefly_shown
 from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
 from ..machines.equilibria import Equilibria
@@ -94,6 +95,7 @@ class Swing:
     time_ratio: Value = quantity("1", "time of the slower way over that of the faster one")
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class LinkageFindings:
     """The findings on a linkage: `q` are the places of the driver [rad], shape (n,), `outputs` the outputs there by

@@ -16,6 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from ..core.brief import briefly_shown
 from ..core.errors import InputError, shown
 from ..core.model import Model, Terminal
 from ..core.ports import FLANGE, LOAD, PortSlopes
@@ -42,6 +43,7 @@ class Connector:
     type: Type = "Real"
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class ModelComponent:
     """A model with its `parameters`, an instance of its declaration. `file` is its FMU, or None before the export;
@@ -86,6 +88,7 @@ class ModelComponent:
         return self.model.name
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class FmuComponent:
     """An FMU `file`; see `chainunit.system.foreign`. `names` maps names of the system to names of the FMU, where they
@@ -117,6 +120,7 @@ class Bond:
     flanges: tuple[Terminal, Terminal]
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class System:
     """Components and their connections.
