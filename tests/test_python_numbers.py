@@ -8,10 +8,12 @@ import pint
 import pytest
 import xarray as xr
 
-from chainunit import ChainUnitMachine, InputError, SideLoads, Study, linearize
+from chainunit import ChainUnitMachine, InputError, SideLoads, Study, linearize, linkage
 from chainunit.machines.crank_rocker import CrankRocker
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.machine import Machine
+from chainunit.models import MODELS
+from chainunit.system import CompiledSimulation, ModelComponent, System, shaft_joints
 
 UNITS = pint.UnitRegistry()
 MM, RPM, DEG, KG, N = UNITS.mm, UNITS.rpm, UNITS.deg, UNITS.kg, UNITS.newton
@@ -88,6 +90,27 @@ def test_a_linear_model_takes_quantities():
     np.testing.assert_array_equal(texts.A, library.A)
 
 
+def test_a_system_takes_them_too():
+    chamber, motor = MODELS["ChamberForces"], MODELS["DcMotor"]
+    runs = []
+    for ratio, w, reference, stop, step in (
+        (50.0, 150.0, 120.0, 0.2, 0.002),
+        ("50", 150 * UNITS.rad / UNITS.s, 120 * UNITS.rad / UNITS.s, "200 ms", 2 * UNITS.ms),
+    ):
+        components = {
+            "machine": ModelComponent(chamber, chamber.Parameters(ratio=ratio)),
+            "motor": ModelComponent(motor, motor.Parameters(w_start=w)),
+        }
+        system = System(components, shaft_joints("motor", "machine"), start={"motor.w_ref": reference})
+        with CompiledSimulation(system, {"motor.w_ref": reference}) as simulation:
+            runs.append(simulation.run(stop, step))
+    assert runs[0].equals(runs[1]) and runs[0].sizes["time"] == 101
+    with pytest.raises(InputError, match=r'motor\.w_ref = "3 kg".*kg is a mass'):
+        CompiledSimulation(system, {"motor.w_ref": "3 kg"})
+    with CompiledSimulation(system) as simulation, pytest.raises(InputError, match=r'stop = "3 kg"'):
+        simulation.run("3 kg", 0.002)
+
+
 @pytest.mark.parametrize(
     ("call", "line"),
     [
@@ -112,6 +135,14 @@ def test_a_linear_model_takes_quantities():
         (lambda: Study().with_values(3), "values = 3: must be a mapping"),
         (lambda: Study.from_file(3), "path = 3: must be the path of a study file"),
         (lambda: Study.from_text(3), "text = 3: must be a text in TOML"),
+        (lambda: linearize("DcMotor", 3), "at = 3: must be a text, or a mapping"),
+        (lambda: linkage(3), "file = 3: must be the path of a linkage file"),
+        (lambda: linkage("x.toml", 3), "speed = 3: must be a text with a unit"),
+        (lambda: Study().compare(3), "other = 3: must be a study"),
+        (lambda: Study().export(3), "file = 3: must be the path of a file"),
+        (lambda: Study().export("mine.txt"), 'file = "mine.txt": must end in .fmu'),
+        (lambda: Study().export_ssp("mine.fmu"), 'file = "mine.fmu": must end in .ssp'),
+        (lambda: Study().live("mine"), 'file = "mine": must end in .html'),
         (lambda: Study().run(3), "folder = 3: must be the path of a folder"),
         (lambda: Study().run(progress=3), "progress = 3: must be a function"),
     ],

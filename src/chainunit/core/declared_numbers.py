@@ -76,6 +76,11 @@ def _is_unit(unit: str) -> bool:
     return True
 
 
+def has_own_unit(value: Any) -> bool:
+    """Whether a value is a text, or a quantity of a library, and no plain number."""
+    return isinstance(value, str) or magnitude_and_unit(value) is not None
+
+
 def as_text(value: Any) -> Any:
     """A quantity of a library in the form of a file: a text with a unit such as "1.5 kN", or a list of such texts.
     Another value stays as it is."""

@@ -166,8 +166,8 @@ class _Way:
         return values
 
 
-def speed_of_driver(machine: Machine, given: str | None) -> float:
-    """The speed of the driver of a linkage [rad/s, m/s] from an option, or the usual one.
+def speed_of_driver(machine: Machine, given: str | None, name: str = "--speed") -> float:
+    """The speed of the driver of a linkage [rad/s, m/s] from an option or argument of that name, or the usual one.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def speed_of_driver(machine: Machine, given: str | None) -> float:
     """
     unit = "m/s" if machine.model.slides else "rad/s"
     most = FASTEST[unit]
-    return option_value("--speed", given or USUAL_SPEEDS[unit], unit, "speed of the driver", most)
+    return option_value(name, given or USUAL_SPEEDS[unit], unit, "speed of the driver", most)
 
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:

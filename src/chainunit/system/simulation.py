@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
+from ..core.declared_numbers import number_in
 from ..core.errors import InputError, InterruptedRunError, RunError
 from ..core.files import atomic_file
 from ..work.interrupts import stoppable
@@ -85,8 +86,8 @@ class Simulation(ABC):
 
     def run(
         self,
-        stop: float,
-        step: float,
+        stop: float | str,
+        step: float | str,
         progress: Progress | None = None,
         *,
         guards: Mapping[str, float] | None = None,
@@ -98,7 +99,7 @@ class Simulation(ABC):
 
         Parameters
         ----------
-        stop, step : [s]
+        stop, step : [s], or texts such as "2 ms"
         progress : is called with the simulated time now and then
         guards : limits by full name of an output: where the absolute value passes the limit at the end of a step, the
             run ends with that row; in Model Exchange it ends with a row at the instant of the passage
@@ -124,6 +125,8 @@ class Simulation(ABC):
         WriteError
             where the `file` cannot be written.
         """
+        stop = number_in("s", "stop", stop, "time to which the run goes")
+        step = number_in("s", "step", step, "communication step")
         check_forward(self.time, stop, step)
         if not every >= 1 or every % 1:
             raise InputError(f"every = {every:g}: must be a whole number >= 1")
@@ -293,8 +296,8 @@ class FmuSimulation(Simulation):
     def _signal_inputs(self) -> list[tuple[Instance, Any, list[str]]]:
         """Handles of the inputs with signals."""
         connected = {target for _, target in self.system.connections}
+        self.signals = self.system.in_units(self.signals, "input")
         for full in self.signals:
-            self.system.connector(full, "input")
             if full in connected:
                 raise InputError(f"{full}: is connected, it cannot have a signal")
         return self._handles(self.signals)
