@@ -202,7 +202,7 @@ class Study(StudyMethods):
         check : whether every run is also compared with the monolithic solution
         backend : backend of the FMUs, "native" or "python"; by default native where there is a C compiler
         progress : a function that is called with the task, the amount of work that is complete, and the total
-            amount
+            amount; without one a notebook shows a bar
         scheduler : address of a Dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers make the random
             overloads in place of local processes
 
