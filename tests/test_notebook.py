@@ -62,6 +62,8 @@ class OwnShell:
 
     def __init__(self):
         self.names = {}
+        # matplotlib asks for them
+        self.events = SimpleNamespace(register=lambda *_: None, unregister=lambda *_: None)
 
     def run_cell(self, cell, **_):
         tree = ast.parse(cell)
@@ -84,7 +86,8 @@ class OwnShell:
 def own_shell(patch):
     """A shell of our own that this package takes for IPython's."""
     shell = OwnShell()
-    patch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    module = SimpleNamespace(get_ipython=lambda: shell, version_info=(9, 0))
+    patch.setitem(sys.modules, "IPython", module)
     return shell
 
 

@@ -150,7 +150,7 @@ def warnings(report: Report) -> list[str]:
     return [words for each in blocks for words in _sentences(each, report.units)]
 
 
-_MOST_LETTERS = 1900
+_MOST_LETTERS = 1990
 """Largest length of the text for a screen of Python."""
 
 
@@ -161,7 +161,7 @@ def brief(report: Report, count: int, width: int = 100) -> str:
     console = Console(
         file=out, width=width, markup=False, highlight=False, force_jupyter=False, no_color=True
     )
-    end = f"{count} warning{'s' * (count != 1)}: see warnings. " if count else ""
+    end = f"Warnings: {count}. " if count else ""
     end += "All numbers: answers, to_json()."
     pieces = [f"The run stopped early: {plain_line(report.failure)}."] if report.failure else []
     title, room = report.title, _MOST_LETTERS - len(end) - sum(map(len, pieces))
@@ -189,7 +189,7 @@ def _cut(table: Table, console: Console, units: Units, room: int) -> str:
         text = _printed(console, partial(_show_table, part, console, units))
         lines = [line.rstrip() for line in text.splitlines()]
         if count < len(rows):
-            lines.append(f"... and {len(rows) - count} more rows")
+            lines.append(f"... and {len(rows) - count} more")
         if len(text := "\n".join(lines)) < room:
             return text
     return ""
