@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.declared_numbers import in_declared_unit, one_number
 from ..core.engines import numpy_
-from ..core.errors import InputError, check_kind
+from ..core.errors import InputError, check_kind, shown
 from ..core.quantities import Variable, complaint
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
@@ -146,8 +146,10 @@ class Machine:
         return self._outputs(self.inputs({"phi": phi, "w": w, "a": a, **self._feed(feed)}))
 
     def _feed(self, feed: Any) -> dict[str, Any]:
-        check_kind("feed", feed, self.model.Feed | None, f"the Feed of {self.model.name}")
-        return self.model.feed_layout.by_name(self.model.Feed() if feed is None else feed)
+        try:
+            return self.model.feed_layout.by_name(self.model.Feed() if feed is None else feed)
+        except AttributeError:
+            raise InputError(f"feed = {shown(feed)}: must be the Feed of {self.model.name}") from None
 
     def _outputs(self, u: Any) -> Any:
         part = self.model.parts[0]
@@ -201,7 +203,7 @@ class Machine:
         """
         from .equilibria import equilibria
 
-        check_kind("feed", feed, self.model.Feed | None, f"the Feed of {self.model.name}")
+        self._feed(feed)
         return equilibria(self, feed)
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:

@@ -99,7 +99,12 @@ class ReportedResult(Generic[Question, Outcome]):
     @property
     def warnings(self) -> list[str]:
         """The warnings, a text each."""
-        return terminal.warnings(self._report)
+        return terminal.remarks(self._report, "warning")
+
+    @property
+    def notes(self) -> list[str]:
+        """The assumptions behind the numbers, a text each."""
+        return terminal.remarks(self._report, "note")
 
     @cached_property
     def figures(self) -> Mapping[str, ResultFigure]:

@@ -144,9 +144,9 @@ def judgements(report: Report) -> list[str]:
     return [words for each in graded or first for words in _sentences(each, report.units)]
 
 
-def warnings(report: Report) -> list[str]:
-    """The warnings of a report, a sentence each."""
-    blocks = [each for each in report.blocks("short") if _role(each) == "warning"]
+def remarks(report: Report, role: str) -> list[str]:
+    """The warnings of a report (`role` "warning") or its notes ("note"), a sentence each."""
+    blocks = [each for each in report.blocks("short") if _role(each) == role]
     return [words for each in blocks for words in _sentences(each, report.units)]
 
 
@@ -193,18 +193,6 @@ def _cut(table: Table, console: Console, units: Units, room: int) -> str:
         if len(text := "\n".join(lines)) < room:
             return text
     return ""
-
-
-def plain(report: Report, width: int = 120) -> str:
-    """The short form as plain text, in lines of at most `width` letters."""
-    out = io.StringIO()
-    console = Console(
-        file=out, width=width, markup=False, highlight=False, force_jupyter=False, no_color=True
-    )
-    if report.failure:
-        console.print(f"The run stopped early: {plain_line(report.failure)}.", soft_wrap=True)
-    show(report, console)
-    return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
 
 
 def _role(block: Block) -> str:

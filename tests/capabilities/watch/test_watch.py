@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command import chainunit
+from reports import plain
 from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit import InputError, Study
@@ -49,6 +50,11 @@ def study_text(machine, **watch):
             *(f"{name} = {json.dumps(str(x) if isinstance(x, Path) else x)}" for name, x in keys.items()),
         ]
     )
+
+
+def said_of(result):
+    """The short form of the report of a result, as one line."""
+    return " ".join(plain(result._report).split())
 
 
 GAINS = {
@@ -191,7 +197,7 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     found = Study.from_file(tmp_path / "mine.toml").watch()
     alarms = found.alarms
     assert {each.side for each in alarms} == {"left"} and 70.0 < alarms[0].begin < 70.5 + TURN
-    words = " ".join(repr(found).split())
+    words = said_of(found)
     assert "No rows from 30.00 s to 33.01 s: the observer starts anew behind this gap." in words
     assert "No rows from 49.99 s to 51.1" in words
     assert "The identification of this machine failed: its model does not describe its recordings." in words
@@ -219,7 +225,7 @@ def test_a_sensor_that_fails_behind_the_begin(tmp_path):
     """It makes a false alarm, which the page doubts; a machine that stops is watched all the same."""
     stuck = changed(tmp_path, motor_i=lambda t, x: np.where(t > 35.0, x[7000], x))
     (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file=stuck), "utf-8")
-    words = " ".join(repr(Study.from_file(tmp_path / "mine.toml").watch()).split())
+    words = said_of(Study.from_file(tmp_path / "mine.toml").watch())
     assert "Overload of the" in words and "motor.i keeps the value" in words
     doubt = (
         "from 35 to 59.995 s: a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
@@ -229,7 +235,7 @@ def test_a_sensor_that_fails_behind_the_begin(tmp_path):
         name: lambda t, x: np.where(t > 50.0, 0.0, x) for name in ("motor_i", "motor_u", "motor_w", "mark")
     }
     changed(tmp_path, **stop)
-    words = " ".join(repr(Study.from_file(tmp_path / "mine.toml").watch()).split())
+    words = said_of(Study.from_file(tmp_path / "mine.toml").watch())
     assert "motor.w keeps the value 0 rad/s from 50" in words
 
 
