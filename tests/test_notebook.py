@@ -241,6 +241,10 @@ def test_other_doors_of_a_study(study):
     check_words(study("other = study.compare(study.with_values({'machine.r': '170 mm'}))\nother"))
     assert "steady.crank_torque_peak" in other_answers(study)
     check_words(study("study.compare('saved')"))
+    study(
+        "swept = Study(sweep={'points': 8, 'parameter': [{'name': 'machine.r', 'from': 0.14, 'to': 0.15}]}).sweep()"
+    )
+    assert "is no result of a study" in study.refusal("study.compare(swept)")[-1]
     assert "has no result" in study.refusal("study.compare('nowhere')")[-1]
     linear = study("study.linearize()")
     assert linear.A.shape[0] == len(linear.states) and "steady running" in linear.at

@@ -10,7 +10,7 @@ from typing import Any
 from ...core.errors import check_kind
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
-from ...study.stored_result import StoredResult, read_result
+from ...study.stored_result import StoredResult, read_result, stored_result
 from ...work.progress import TaskProgress
 from .page import TASK
 
@@ -54,8 +54,9 @@ def compare(
         for a file that cannot be written; the others are written.
     """
     is_study = hasattr(other, "of_tables")
-    kinds = "a study, the result of one, or the folder of a result"
-    check_kind("other", other, type(other) if is_study else ReportedResult | str | Path, kinds)
+    if not is_study:
+        kinds = "a study, the result of one, or the folder of a result"
+        check_kind("other", other, ReportedResult | str | Path, kinds)
     # the folder is read before the run
     second = read_result(Path(other)) if isinstance(other, str | Path) else None
     first = _stored(study.run(progress=progress))
@@ -66,7 +67,7 @@ def compare(
 
 def _stored(result: Any) -> StoredResult:
     data = json.loads(result.to_json())
-    return StoredResult(Path(data["source"]), data)
+    return stored_result(Path(data["source"]), data)
 
 
 METHOD, RESULT = compare, ComparisonResult
