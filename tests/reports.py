@@ -36,11 +36,15 @@ def _array(x):
     return array.reshape(list(map(int, x["shape"].split(",")))) if "shape" in x else array
 
 
-def said_of(study, width=200):
+def plain(report, width=120):
+    """The short form of a report as a terminal without colours shows it."""
     out = io.StringIO()
-    console = Console(file=out, markup=False, highlight=False, width=width)
-    terminal.show(study_report.report(study), console)
-    return out.getvalue()
+    terminal.show(report, Console(file=out, markup=False, highlight=False, width=width, no_color=True))
+    return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
+
+
+def said_of(study, width=200):
+    return plain(study_report.report(study), width)
 
 
 def screen_of(report):

@@ -390,7 +390,7 @@ def test_values_with_units_and_coordinates():
             assert out.phi.attrs["units"] == "rad"
     for wrong in ("150 kg", "long", None, {"a": 1}, [1.0, "x"]):
         with pytest.raises(
-            InputError, match=r"^r = .*: must be a number in m, a text with a unit"
+            InputError, match=r"^r = .*: must be a number in m, or a text such as \"2 mm\""
         ) as refusal:
             machine.batch({"phi": 0.0, "r": wrong}, ["tau"], engine="numpy")
         assert "\n" not in str(refusal.value)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from multibody import Multibody
 from random_rest import resting
-from reports import packed_in
+from reports import packed_in, plain
 from scipy.integrate import solve_ivp
 
 from chainunit.core.engines import MATH
@@ -29,7 +29,6 @@ from chainunit.models import MODELS
 from chainunit.report.figure import Figure
 from chainunit.report.html import render
 from chainunit.report.linkage_report import linkage_report
-from chainunit.report.terminal import plain
 from chainunit.study.linear import linear_point
 from chainunit.study.linkage_turn import linkage_findings
 

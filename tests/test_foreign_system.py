@@ -548,12 +548,23 @@ def test_a_torque_limiter_behind_it(trip, opens, folder):
         assert study.certificate["jam_left"]["energy_residual_share"] < 1e-2
 
 
-def test_a_state_that_cannot_be_saved_is_refused_before_anything_is_run(folder, tmp_path, monkeypatch):
-    build(tmp_path, canGetAndSetFMUstate="false")
-    monkeypatch.setattr(CoSimulation, "run", lambda *_, **__: pytest.fail("a run began"))
-    given = config.parse(STUDY + '[system]\nmotor = "ForeignMotor.fmu"\n', str(tmp_path / "x.toml"))
-    with pytest.raises(InputError, match=r"cannot save its state \(canGetAndSetFMUstate\)"):
-        run.run_study(given, tmp_path)
+def test_a_motor_that_saves_no_state_runs_each_event_from_rest(folder, tmp_path):
+    """Its answers are those of the motor that saves its state, also where an assumption needs further runs."""
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.read_text().replace("class ForeignMotor", "class ForgetfulMotor"))
+    build(tmp_path, OTHER, script=script, canGetAndSetFMUstate="false", canSerializeFMUstate="false")
+    block = '\n[[event]]\ntype = "blocked"\n'
+    text = (folder / "foreign.toml").read_text() + block
+    saving = run.run_study(config.parse(text, str(folder / "x.toml")), tmp_path / "saving")
+    text = text.replace("ForeignMotor", "ForgetfulMotor")
+    study = run.run_study(config.parse(text, str(tmp_path / "x.toml")), tmp_path / "forgetful")
+    assert study.failure is None and list(study.answers) == ["steady", "jam_left", "blocked"]
+    assert study.answers == saving.answers and study.spreads == saving.spreads and study.spreads
+    for name, rows in saving.runs.items():
+        assert study.runs[name].drop_attrs().equals(rows.drop_attrs())
+    (note,) = [note for note in study.notes if note.kind == "state not saved"]
+    assert note.runs == ("jam_left", "blocked") and "each event was run from rest" in note.text
+    assert not [note for note in saving.notes if note.kind == "state not saved"]
 
 
 def test_a_reference_in_another_unit_is_refused(file, tmp_path):
@@ -591,12 +602,23 @@ def test_no_twin_without_a_rotor(file, machine, fmus):
         rigid(system, "driveline")
 
 
-def test_an_fmu_that_cannot_save_its_state_is_told(machine, tmp_path):
+def test_an_fmu_that_cannot_save_its_state_begins_again(machine, tmp_path):
     system = driven(machine, foreign_component(build(tmp_path, canGetAndSetFMUstate="false"), "motor"))
     with CoSimulation(system, SIGNALS) as simulation:
-        simulation.run(0.01, 0.002)
-        with pytest.raises(InputError, match=r"motor \(ForeignMotor\.fmu\): cannot save its state"):
-            simulation.save()
+        assert simulation.without_states == ["motor"]
+        simulation.run(0.05, 0.002)
+        simulation.signals = {"motor.w_ref": 60.0}
+        simulation.run(0.1, 0.002, guards={"motor.w": 55.0})
+        saved = simulation.save()
+        simulation.signals = {"motor.w_ref": 20.0}
+        first = simulation.run(saved + 0.05, 0.002)
+        simulation.signals = {"motor.w_ref": 90.0}
+        other = simulation.run(saved + 0.1, 0.002)
+        simulation.signals = {"motor.w_ref": 20.0}
+        simulation.restore()
+        assert simulation.time == saved and simulation.signals == {"motor.w_ref": 20.0}
+        again = simulation.run(saved + 0.05, 0.002)
+    assert again.equals(first) and float(other["motor.w"][-1]) > float(first["motor.w"][-1]) + 1.0
 
 
 def test_it_carries_nothing_of_ours(file):

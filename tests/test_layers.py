@@ -85,11 +85,11 @@ DOORS = {
     "report.study_task": {"_accept", "_compute", "_fmus"},
     # the live machine of a study
     "report.live.study": {"of_study", "without_drive"},
-    "report.live.page": {"live_of_config"},
+    "report.live.page": {"live_of_config", "live_page_of_config"},
     "app.studies": {"_take"},
     # the export of a study and its linear model, and the tasks of the capabilities
     "study.linear": {"_point_of_study"},
-    "study.package": {"drive_to_export", "export_study", "model_and_start"},
+    "study.package": {"drive_to_export", "export_study", "model_and_start", "remarks_on_export"},
     "capabilities.identification.identification": {"identify"},
     "capabilities.optimize.page": {"_accept", "_compute"},
     "capabilities.sweep.page": {"_compute"},

@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 from command import chainunit
 from linkage_files import MACHINES, pressed_both_ways
-from reports import pictures
+from reports import pictures, plain
 
 from chainunit.core.errors import GeometryError, RemarkWarning
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import linkage_in, read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.report import terminal
 from chainunit.report.blocks import Judgement, Table
 from chainunit.report.lines import Name, line
 from chainunit.report.linkage_report import linkage_report
@@ -287,7 +286,7 @@ def test_absurd_values_of_a_linkage_are_doubted(tmp_path):
         machine = Machine(read_linkage(file))
     assert len(warned) == len(unusual) - 2
     report = linkage_report(linkage_findings(machine, 1.0), file.name, unusual)
-    shown = terminal.plain(report)
+    shown = plain(report)
     for value in unusual:
         assert shown.count(f"{value.name} = ") == 1, value
     (question,) = [each for each in report.opening if isinstance(each, Judgement)]

@@ -224,10 +224,17 @@ def test_the_inputs_of_a_ball(ball):
     assert float(run["ball.v"][-1]) == pytest.approx(v, rel=1e-7)
 
 
-def test_a_state_that_cannot_be_saved_is_told(ball):
-    with ModelExchange(ball) as simulation:
-        with pytest.raises(InputError, match=r"ball \(ball\.fmu\): cannot save its state .* ask its maker"):
-            simulation.save()
+def test_a_ball_without_a_saved_state_is_thrown_again(ball):
+    with ModelExchange(ball, {"ball.g": 4.0}) as simulation:
+        assert simulation.without_states == ["ball"]
+        simulation.run(0.7, 0.05)
+        simulation.save()
+        first = simulation.run(1.5, 0.25)
+        simulation.signals = {"ball.g": 9.0}
+        simulation.run(2.0, 0.25)
+        simulation.signals = {"ball.g": 4.0}
+        simulation.restore()
+        assert simulation.time == 0.7 and simulation.run(1.5, 0.25).equals(first)
 
 
 # -- the duties of any run

@@ -123,9 +123,11 @@ def test_answers_are_a_table_with_units(result):
 
 def test_runs_are_the_tree_in_the_file(result, command):
     with xr.open_datatree(command / "result.nc") as tree:
-        assert list(result.runs.children) == [*tree.children, "steady"] == ["start_up", "jam_left", "steady"]
+        assert list(result.runs) == [*tree.children, "steady"] == ["start_up", "jam_left", "steady"]
         for name in tree.children:
-            assert result.runs[name].to_dataset().drop_attrs().equals(tree[name].to_dataset().drop_attrs())
+            assert result.runs[name].drop_attrs().equals(tree[name].to_dataset().drop_attrs())
+    assert len(result.runs) == 3 and all(isinstance(run, xr.Dataset) for run in result.runs.values())
+    assert result.runs["steady"].sizes["time"] < result.runs["start_up"].sizes["time"]
     force = result.runs["jam_left"]["machine.left.processing_force"]
     assert force.units == "N" and float(force.max()) == pytest.approx(1010.0)
     # as the documentation says for a tool that knows no trees

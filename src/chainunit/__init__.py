@@ -8,6 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .app.linkages import LinkageResult as LinkageResult
+    from .app.linkages import linkage as linkage
     from .app.studies import Study as Study
     from .app.studies import StudyResult as StudyResult
     from .app.study_methods import *  # noqa: F403 - the results of capabilities, by name
@@ -34,12 +36,14 @@ else:
         "GeometryError": ".core.errors",
         "InputError": ".core.errors",
         "LinearModel": ".system.linear",
+        "LinkageResult": ".app.linkages",
         "RunError": ".core.errors",
         "SideLoads": ".machines.chain_unit",
         "Study": ".app.studies",
         "StudyResult": ".app.studies",
         "WriteError": ".core.errors",
         "linearize": ".study.linear",
+        "linkage": ".app.linkages",
     }
 
     def __getattr__(name):

@@ -162,13 +162,10 @@ def export_ssp(
 
 def _show_remarks(loaded: Any) -> None:
     """Print the parts of a study that its FMU or package does not have, and the limits of its model."""
-    from ..study.package import beyond_two_bars, left_out
+    from ..study.package import remarks_on_export
 
-    if words := left_out(loaded.operation, loaded.given_events):
+    for words in remarks_on_export(loaded):
         print(words)
-    if loaded.file.tables.get("organ") != "chain":
-        for words in beyond_two_bars(loaded.machine, loaded.feed, loaded.run.crank_speed):
-            print(words)
 
 
 def _platforms(choice: str | None, fmi: int) -> list[str]:

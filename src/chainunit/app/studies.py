@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -12,27 +12,38 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, near_name, shown
+from ..core.declared_numbers import as_text
+from ..core.errors import InputError, RemarkWarning, check_kind, near_name, shown
+from ..core.files import write_file
+from ..core.named import Named
 from ..core.quantities import Layout
+from ..core.temporary_folders import scratch
 from ..fmu.backends import Backend
+from ..fmu.backends import export as write_fmu
+from ..fmu.script import Names
 from ..machines.machine import Machine
 from ..reading.tables import TOO_DEEP, in_file, nested_deeply
 from ..reading.text import number, shown_in
 from ..reading.toml_lines import lines_of
-from ..report import series
+from ..report import html, series
 from ..report import study as contents
 from ..report.blocks import Report
 from ..report.drawing import drawing
+from ..report.live.page import live_page_of_config
+from ..report.notebook import shown_progress
 from ..report.reported_result import ReportedResult
 from ..report.study_task import TASK
 from ..study import config as study_files
 from ..study.config import Config
 from ..study.foreign_machine import ForeignMachine
+from ..study.linear import At, linearize
 from ..study.measures import Answers, measures_of
+from ..study.package import drive_to_export, export_study, remarks_on_export, whole_system
 from ..study.parts import over_example, parts_of
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.window import Phase
+from ..system.linear import LinearModel
 from ..work.progress import TaskProgress
 from .study_methods import StudyMethods
 
@@ -49,9 +60,9 @@ class Study(StudyMethods):
     Parameters
     ----------
     **tables : the keys and tables of a study file (``chainunit keys`` shows them), by the same names and with the
-        same checks: tables are mappings, events a list of them. A number is in the declared SI unit; a text
-        may carry a unit. A key that is left out has the value of the example. Paths of files are relative to
-        the working folder.
+        same checks: tables are mappings, events a list of them. A number is in the declared SI unit; a text or a
+        quantity of pint has its unit. A key that is left out has the value of the example. Paths of files are
+        relative to the working folder.
 
     Raises
     ------
@@ -88,6 +99,7 @@ class Study(StudyMethods):
         InputError
             with a line of text for each fault, which begins with the file and its line number.
         """
+        check_kind("path", path, str | Path | None, "the path of a study file")
         config = study_files.load(None if path is None else Path(path))
         return cls.__new__(cls)._take(config, config.file.source)
 
@@ -100,6 +112,7 @@ class Study(StudyMethods):
         InputError
             as `from_file`.
         """
+        check_kind("text", text, str, "a text in TOML")
         with in_file(_TEXT, lambda: lines_of(text)):
             config = study_files.parse(text, _TEXT)
         return cls.__new__(cls)._take(config, _TEXT)
@@ -139,6 +152,7 @@ class Study(StudyMethods):
         InputError
             as the class.
         """
+        check_kind("values", values, Mapping, 'a mapping such as {"machine.r": "170 mm"}')
         tables = copy.deepcopy(dict(self.config.file.tables))
         for name, value in values.items():
             if not isinstance(name, str):
@@ -188,7 +202,7 @@ class Study(StudyMethods):
         check : whether every run is also compared with the monolithic solution
         backend : backend of the FMUs, "native" or "python"; by default native where there is a C compiler
         progress : a function that is called with the task, the amount of work that is complete, and the total
-            amount
+            amount; without one a notebook shows a bar
         scheduler : address of a Dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers make the random
             overloads in place of local processes
 
@@ -203,6 +217,113 @@ class Study(StudyMethods):
         """
         options = {"check": check, "backend": backend, "scheduler": scheduler}
         return StudyResult.made(self.config, folder, progress, **options)
+
+    def linearize(self, at: At = None) -> LinearModel:
+        """The linear model of the whole drive at a point, by default in steady running; see `chainunit.linearize`."""
+        return linearize(self, at)
+
+    def export(
+        self,
+        file: str | Path,
+        *,
+        backend: Backend | None = None,
+        fmi: int = 2,
+        platforms: Sequence[str] = (),
+        names: Names = "structured",
+        progress: TaskProgress | None = None,
+    ) -> Path:
+        """Write the whole system as one FMU, as ``chainunit export`` does; returns the file.
+
+        Parameters
+        ----------
+        file : a name that ends in .fmu
+        backend, fmi, platforms, names : see `chainunit.fmu.backends.export`
+        progress : as of `run`
+
+        Raises
+        ------
+        InputError
+            for a wrong name or option, and where motor or machine is a foreign FMU.
+        RunError
+            where no motor is found, and where the FMU cannot be made.
+
+        Warns
+        -----
+        UserWarning
+            on the parts of the study that the FMU does not have, and on the limits of its model.
+        """
+        path = _named(file, ".fmu")
+        with shown_progress(progress) as shown, self.config.file.refusals():
+            say = _as_words(shown)
+            drive = drive_to_export(self.config, backend, say)
+            model, start = whole_system(
+                drive, self.config.operation, self.config.title, self.config.file.labels
+            )
+            write_fmu(
+                model, path, start, backend=backend, fmi=fmi, platforms=platforms, names=names, progress=say
+            )
+        self._warn_of_export()
+        return path
+
+    def export_ssp(
+        self,
+        file: str | Path,
+        *,
+        all_inputs: bool = False,
+        names: Names = "structured",
+        backend: Backend | None = None,
+        progress: TaskProgress | None = None,
+    ) -> Path:
+        """Write motor and machine, connected, as an SSP 1.0 package of FMUs 2.0; returns the file.
+
+        Parameters
+        ----------
+        file : a name that ends in .ssp
+        all_inputs, names, backend : see `chainunit.system.ssp.export`
+        progress : as of `run`
+
+        Raises
+        ------
+        InputError, RunError
+            as of `export`.
+
+        Warns
+        -----
+        UserWarning
+            as of `export`.
+        """
+        path = _named(file, ".ssp")
+        with shown_progress(progress) as shown, self.config.file.refusals():
+            export_study(
+                self.config,
+                path,
+                all_inputs=all_inputs,
+                names=names,
+                backend=backend,
+                progress=_as_words(shown),
+            )
+        self._warn_of_export()
+        return path
+
+    def _warn_of_export(self) -> None:
+        for words in remarks_on_export(self.config):
+            warnings.warn(words, RemarkWarning, stacklevel=3)
+
+    def live(self, file: str | Path = "live.html") -> Path:
+        """Write a page in which the machine runs, as ``chainunit live`` does, without a run here; returns the file.
+
+        Raises
+        ------
+        InputError
+            for a name that does not end in .html, and for an equation that cannot run in a page.
+        WriteError
+            for a file that cannot be written.
+        """
+        path = _named(file, ".html")
+        with scratch() as folder:
+            page = html.render(live_page_of_config(self.config, self._source, folder))
+        write_file(path, page)
+        return path
 
     def __repr__(self) -> str:
         config = self.config
@@ -273,13 +394,12 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         return table.dropna(how="all", subset=list(runs))
 
     @cached_property
-    def runs(self) -> xr.DataTree:
-        """The time series of every run: ``runs["jam_left"]["machine.tau"]``, with units in ``attrs``, and of the
-        turns in steady running: ``runs["steady"]``. The file result.nc holds the runs."""
-        import xarray as xr
-
-        runs, record = series.tree(self.record), self.record
-        return runs.assign({"steady": xr.DataTree(record.steady)}) if "steady" in record.answers else runs
+    def runs(self) -> Mapping[str, xr.Dataset]:
+        """The time series of every run by its name, Datasets over ``time``: ``runs["jam_left"]["machine.tau"]``, with
+        units in ``attrs``; and those of the turns in steady running: ``runs["steady"]``. The file result.nc holds the
+        runs."""
+        runs = {name: node.to_dataset() for name, node in series.tree(self.record).children.items()}
+        return Named(runs | ({"steady": self.record.steady} if "steady" in self.record.answers else {}))
 
     @property
     def verdict(self) -> str:
@@ -300,6 +420,19 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         return [note["text"] for note in self._numbers["notes"]]
 
 
+def _named(file: Any, ending: str) -> Path:
+    """The path of a file that must have this ending."""
+    check_kind("file", file, str | Path, "the path of a file")
+    if Path(file).suffix.lower() != ending:
+        raise InputError(f"file = {shown(str(file))}: must end in {ending}")
+    return Path(file)
+
+
+def _as_words(progress: TaskProgress) -> Callable[[str], None]:
+    """The function by which an export reports its work, which has no amount."""
+    return lambda what: progress(what, 0.0, 1.0)
+
+
 def _plain(value: Any) -> Any:
     """A value from Python in the form that a TOML file would give."""
     if isinstance(value, Mapping):
@@ -308,6 +441,7 @@ def _plain(value: Any) -> Any:
         return [_plain(each) for each in value]
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
+    value = as_text(value)
     return str(value) if isinstance(value, Path) else value
 
 

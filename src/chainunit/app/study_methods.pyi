@@ -1,4 +1,6 @@
 # Made by docs/make_types.py from the list of capabilities.
+from ..capabilities.comparison.study_method import ComparisonResult as ComparisonResult
+from ..capabilities.comparison.study_method import compare as _compare
 from ..capabilities.identification.study_method import IdentificationResult as IdentificationResult
 from ..capabilities.identification.study_method import identify as _identify
 from ..capabilities.optimize.study_method import BestResult as BestResult
@@ -8,9 +10,10 @@ from ..capabilities.sweep.study_method import sweep as _sweep
 from ..capabilities.watch.study_method import WatchResult as WatchResult
 from ..capabilities.watch.study_method import watch as _watch
 
-__all__ = ["BestResult", "IdentificationResult", "SweepResult", "WatchResult"]
+__all__ = ["BestResult", "ComparisonResult", "IdentificationResult", "SweepResult", "WatchResult"]
 
 class StudyMethods:
+    compare = _compare
     identify = _identify
     optimize = _optimize
     sweep = _sweep

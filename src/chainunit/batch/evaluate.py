@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, RunError, shown
+from ..core.declared_numbers import in_declared_unit, magnitude_and_unit
+from ..core.errors import InputError, RemarkWarning, RunError, check_kind
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from ..core.native.operations import ARGUMENT
 from ..core.quantities import Variable
 from ..core.symbolic_trace import outputs_of
-from ..core.units import convert, scale, split
+from ..core.units import scale
 from . import arrays
 from .equations import Equations, Result, equations, find, names_of
 from .native import Reductions, aligned, native_kernel
@@ -81,8 +82,9 @@ def evaluate(
     ----------
     model : the model, such as `ChamberForces`; a model with states takes each state from `values`
     values : by the name of a parameter, input or state: a number, a DataArray, or an array of one dimension, which
-        becomes the dimension of that name. A DataArray whose ``units`` differ from the declared units is
-        converted. Dimensions of the same name belong together; all others are combined.
+        becomes the dimension of that name. A text or a quantity of pint has its unit; a DataArray whose ``units``
+        differ from the declared units is converted. Dimensions of the same name belong together; all others are
+        combined. A dimension along which one value alone varies has this value as its coordinate.
     outputs : names of the outputs, or of quantities beside them (`Model.further`: ``crank_torque``,
         ``force(pivot)``); by default all outputs
     by : names of parameters, inputs and states by which each output is differentiated; the derivatives are exact,
@@ -106,6 +108,7 @@ def evaluate(
     InputError
         for an unknown name, a value that is missing or of a wrong unit, and sizes that do not fit.
     """
+    check_kind("values", values, Mapping, "a mapping of names to values")
     if engine not in ENGINES:
         raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
     reductions: Reductions = ()
@@ -161,6 +164,7 @@ class Grid:
                         f"{name}: has {size} values over {dim}, another one has {self.sizes[str(dim)]}"
                     )
             self._coords |= {str(k): c for k, c in x.coords.items()}
+        self._name_places(given)
         if over is not None and over not in self.sizes:
             raise InputError(
                 f"over = {over!r}: no such dimension; there are {', '.join(self.sizes) or 'none'}"
@@ -178,6 +182,14 @@ class Grid:
         }
         self._bounds: list[tuple[str, Any]] = []
         self._arguments = [self._flat(v, given.get(v.name), base[v.name]) for v in equations.arguments]
+
+    def _name_places(self, given: Mapping[str, xr.DataArray]) -> None:
+        """Give each dimension along which one argument alone varies, and which has no coordinate, the values of this
+        argument as its coordinate."""
+        for dim in set(self.sizes) - set(self._coords):
+            along = [x for x in given.values() if dim in x.dims]
+            if len(along) == 1 and along[0].ndim == 1:
+                self._coords[dim] = along[0].variable
 
     def _loops(self) -> None:
         """Divide the dimensions into outer ones and the inner one, the longest."""
@@ -353,40 +365,39 @@ class Grid:
             "long_name": "reason for which there is no result",
         }
         variables["reason"] = (dims, memory.reason.reshape(shape), flags)
-        coords = {name: c for name, c in self._coords.items() if set(map(str, c.dims)) <= set(dims)}
+        coords = {
+            name: c
+            for name, c in self._coords.items()
+            if set(map(str, c.dims)) <= set(dims) and name not in variables
+        }
         return xr.Dataset(variables, coords)
 
 
 def _array(variable: Variable, x: Any) -> xr.DataArray:
-    """The values of an argument as a DataArray in the declared unit; over its own dimension they are coordinates."""
+    """The values of an argument as a DataArray in the declared unit, with the values of one dimension as a coordinate
+    of the argument's name."""
     import xarray as xr
 
+    attributes = {"units": variable.unit, "long_name": variable.description}
     if isinstance(x, xr.DataArray):
-        unit = x.attrs.get("units")
+        parts = magnitude_and_unit(x.data)
+        unit = x.attrs.get("units") if parts is None else parts[1]
+        values = x.values if parts is None else parts[0]
         if unit is not None and unit != variable.unit:
             try:
                 factor, offset = scale(str(unit), variable.unit, variable.kind)
             except ValueError as error:
                 raise InputError(f"{variable.name} in {unit}: {error}") from error
-            x = x * factor + offset
-        return _array(variable, x.values) if x.dims == (variable.name,) else x
-    try:
-        # numpy takes None for a number that is not finite
-        values = np.asarray(_in_unit(variable, x) if isinstance(x, str | None) else x, float)
-    except (TypeError, ValueError):
-        words = f"must be a number in {variable.unit}, a text with a unit, an array or a DataArray"
-        raise InputError(f"{variable.name} = {shown(x)}: {words}") from None
-    if values.ndim > 1:
-        raise InputError(f"{variable.name}: has {values.ndim} dimensions; give them names, in a DataArray")
-    attributes = {"units": variable.unit, "long_name": variable.description}
-    coords = {variable.name: (variable.name, values, attributes)} if values.ndim else {}
-    return xr.DataArray(values, coords, [variable.name] if values.ndim else [])
-
-
-def _in_unit(variable: Variable, text: str | None) -> float:
-    """The number of a text such as "150 mm", in the declared unit; a ValueError for a text that is none."""
-    parts = None if text is None else split(text)
-    if parts is None:
-        raise ValueError(text)
-    number, unit = parts
-    return convert(number, unit, variable.unit, variable.kind) if unit else number
+            values = values * factor + offset
+        x = x.copy(data=values).assign_attrs(attributes)
+        if x.dims == (variable.name,):
+            return _array(variable, x.values)
+        # one dimension of another name has these values, too
+        return x.assign_coords({variable.name: (x.dims, values, attributes)}) if x.ndim == 1 else x
+    values = in_declared_unit(variable, x)
+    if np.ndim(values) > 1:
+        raise InputError(
+            f"{variable.name}: has {np.ndim(values)} dimensions; give them names, in a DataArray"
+        )
+    dims = [variable.name] if np.ndim(values) else []
+    return xr.DataArray(values, {name: (name, values, attributes) for name in dims}, dims)

@@ -6,14 +6,37 @@ import difflib
 import itertools
 import json
 import re
+import traceback
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import date, time
+from pathlib import Path
 from typing import Any
 
+_LINES = 8
+"""Largest number of lines of a message in a notebook."""
 
-class InputError(ValueError):
+
+class ShortTraceback(BaseException):
+    """An error that a notebook shows by the line of the user, its class and its message, without the frames of this
+    package."""
+
+    def _render_traceback_(self) -> list[str]:
+        """The lines that IPython shows."""
+        frames = traceback.extract_tb(self.__traceback__)
+        package = str(Path(__file__).parents[1])
+        inside = next(
+            (k for k, frame in enumerate(frames) if frame.filename.startswith(package)), len(frames)
+        )
+        place = [f"line {each.lineno}: {each.line}" for each in frames[:inside][-1:] if each.line]
+        lines = str(self).splitlines() or [""]
+        more = [f"... and {len(lines) - _LINES} more"] if len(lines) > _LINES else []
+        head = f"{type(self).__name__}: "
+        return [*place, head + lines[0], *lines[1:_LINES], *more]
+
+
+class InputError(ShortTraceback, ValueError):
     """A value of the user is outside its allowed range; the message is one line.
 
     `key` is the full name of the refused value in its file. An error that stands for several refusals has
@@ -53,7 +76,13 @@ class GeometryError(InputError):
     names: tuple[str, ...] = ()
 
 
-class RunError(RuntimeError):
+class UnknownNameError(InputError, KeyError):
+    """A name that is not declared."""
+
+    __str__ = BaseException.__str__
+
+
+class RunError(ShortTraceback, RuntimeError):
     """A run stopped early; `partial` holds the earlier results, if there are any."""
 
     partial: Any = None
@@ -116,6 +145,18 @@ class Faults:
         """
         if self.errors:
             raise InputError.joined(self.errors)
+
+
+def check_kind(name: str, value: Any, kind: Any, words: str = "") -> None:
+    """Refuse a `value` of a script that is not of its kind; `words` say what it must be.
+
+    Raises
+    ------
+    InputError
+        in one line.
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"{name} = {shown(value)}: must be {words or kind.__qualname__}", name)
 
 
 def near_name(given: str, known: Iterable[str]) -> str:

@@ -21,7 +21,9 @@ from operator import attrgetter
 from typing import Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
 from . import bounds, messages
+from .brief import briefly_shown
 from .descriptions import Described
+from .errors import UnknownNameError, near_name
 
 T = TypeVar("T")
 
@@ -306,7 +308,7 @@ def group(declared: type, description: str, *, default: Any = None) -> Any:
 def declaration(cls: type[T]) -> type[T]:
     """Make `cls` a declaration: a frozen dataclass with keyword-only fields."""
     # no slots: declarations may inherit from several others
-    return dataclass(frozen=True, kw_only=True)(cls)
+    return briefly_shown(dataclass(frozen=True, kw_only=True)(cls))
 
 
 Fields = Sequence[tuple[str, Any, Any]]
@@ -315,7 +317,7 @@ Fields = Sequence[tuple[str, Any, Any]]
 
 def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
     """A declaration with these fields and those of `bases`."""
-    return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
+    return briefly_shown(dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True))
 
 
 def fields_of(declared: type, *, without: Sequence[str] = ()) -> Fields:
@@ -452,12 +454,14 @@ class Layout:
 
         Raises
         ------
-        KeyError
+        UnknownNameError
             for a name that is not declared.
         """
         unknown = set(values) - set(self.names)
         if unknown:
-            raise KeyError(f"no variable {sorted(unknown)[0]!r} in {self.cls.__qualname__}")
+            name = min(unknown, key=str)
+            near = near_name(str(name), self.names)
+            raise UnknownNameError(f"no variable {name!r} in {self.cls.__qualname__}{near}")
         if default is not None:
             base = self.values(default)
         else:

@@ -10,8 +10,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..core.declared_numbers import in_declared_unit, number_in
 from ..core.engines import MATH, numpy_
-from ..core.errors import GeometryError
+from ..core.errors import GeometryError, check_kind
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, Quantity, Variable
 from ..mechanism.models import InverseMachine
@@ -50,6 +51,9 @@ _ROCKER = {
 }
 
 
+_SPEED = Variable("crank_speed", "speed of the crank", Quantity("rad/s", ""))
+
+
 class ChainUnitMachine(Machine):
     """A chain unit with checked parameters; arguments, arrays and errors are those of `Machine`.
 
@@ -68,7 +72,7 @@ class ChainUnitMachine(Machine):
         /,
         *,
         model: type[ChamberForces] = ChamberForces,
-        **values: float,
+        **values: Any,
     ) -> None:
         super().__init__(model, parameters, **values)
 
@@ -87,19 +91,23 @@ class ChainUnitMachine(Machine):
         *,
         l: float = 1.5,
         l1: float = 1.35,
-        **values: float,
+        **values: Any,
     ) -> Self:
         """The machine with the ratios and the frame of the papers 000 and 001.
 
         The ratios are rho = r/l, lam = h/l, mu = e/l1 and zeta = z/z_max with z_max = 2 l1 sqrt(1 - mu); l2 = l1 - e.
         The frame has c = sqrt(l^2 - r^2) and hy = h, so that crank and rocker are parallel at phi = 0.
         """
+        numbers = {"rho": rho, "lam": lam, "mu": mu, "zeta": zeta}
+        rho, lam, mu, zeta = (number_in("1", name, x, "ratio of lengths") for name, x in numbers.items())
+        l, l1 = number_in("m", "l", l, "coupler"), number_in("m", "l1", l1, "wall")
         lengths = ratios(rho, lam, mu, zeta, l, l1)
         return cls({**lengths, **(parameters or {}), **values})
 
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
+        _check_loads(left, right)
         values = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
         inputs: Inputs = self.inputs(ChamberForces.input_layout.by_name(values))
         return inputs
@@ -270,7 +278,7 @@ class ChainUnitMachine(Machine):
         """Mean pull in web and wall of each side with weight [N] over `points` angles of a crank turn at constant
         `crank_speed` [rad/s]: shape (rods, ..., points), webs first; see `chain_unit.organ_pulls`."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
-        speed = np.asarray(crank_speed, float)[..., None]
+        speed = np.asarray(in_declared_unit(_SPEED, crank_speed))[..., None]
         # at constant speed the speed of the rocker grows with that of the crank, its acceleration with the square
         rocker = self.forces(phi, self.p.ratio, 0.0, left, right).rocker
         pulls = self.organ_pulls(rocker.psi, rocker.w * speed, rocker.a * speed**2, left, right)
@@ -285,7 +293,8 @@ class ChainUnitMachine(Machine):
         """The least pull at an end of the webs [N] over `points` angles of a crank turn at constant motor speed `w`,
         for each speed in `w`; infinite where no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
-        out = self.forces(phi, np.asarray(w, float)[..., None], 0.0, left, right)
+        w = np.asarray(in_declared_unit(_SPEED, w))
+        out = self.forces(phi, w[..., None], 0.0, left, right)
         pulls = [getattr(out, side).web_pull for side in self.loaded_sides(Feed(left=left, right=right))]
         return np.min(pulls, axis=(0, -1)) if pulls else np.full(np.shape(w), np.inf)
 
@@ -306,6 +315,7 @@ class ChainUnitMachine(Machine):
         """Lowest crank speed [rad/s] at which a web goes slack somewhere in the turn, as its mean pull falls below
         zero: 0 if a web is slack at rest, infinity if no web is up to `highest`. Above this speed two rigid bars are
         no model of a chain. An end of a web may be pushed at a lower speed: there a chain sags."""
+        _check_loads(left, right)
         webs = len(self.loaded_sides(Feed(left=left, right=right)))
 
         def pull(crank_speed: Any) -> Any:
@@ -320,6 +330,12 @@ class ChainUnitMachine(Machine):
         """Lowest crank speed [rad/s] at which an end of a web is pushed somewhere in the turn, as `slack_speed`;
         there a chain sags."""
         return _first_loss(lambda w: self.least_web_pull(w * self.p.ratio, left, right), highest)
+
+
+def _check_loads(left: Any, right: Any) -> None:
+    """Refuse loads of the sides that are of another type."""
+    for name, loads in (("left", left), ("right", right)):
+        check_kind(name, loads, SideLoads)
 
 
 def _first_loss(pull: Callable[[Any], Any], highest: float) -> float:

@@ -16,6 +16,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.declared_numbers import number_in
 from ..core.engines import MATH
 from ..core.errors import GeometryError
 from ..core.model import Requirement
@@ -169,6 +170,8 @@ class CrankRocker:
         GeometryError
             for a swing outside 0 to 180 degrees, or a rocker so long that the pressure angle reaches 90 degrees.
         """
+        eta, l = number_in("rad", "eta", eta, "swing"), number_in("m", "l", l, "coupler")
+        lam = number_in("1", "lam", lam, "rocker by coupler")
         if not 0.0 < eta < math.pi:
             raise GeometryError(f"swing = {math.degrees(eta):g} deg: must be > 0 and < 180 deg")
         h = lam * l

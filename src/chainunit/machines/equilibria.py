@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..core.brief import briefly_shown
 from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
 from ..groups.loads import GuideLosses, PinLosses
@@ -97,6 +98,7 @@ class Rest(NamedTuple):
     potential: Any
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class Equilibria:
     """All equilibria of a machine over the way of its driver, in rising order, and its holding torque."""

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
+from ..core.declared_numbers import in_declared_unit, one_number
 from ..core.engines import numpy_
-from ..core.errors import InputError
+from ..core.errors import InputError, check_kind, shown
 from ..core.quantities import Variable, complaint
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
@@ -25,24 +26,24 @@ _XP = numpy_()
 class Machine:
     """A machine with checked parameters: its `model`, and its parameters `p`.
 
-    Angles and speeds count at the motor, as in the FMU; with ``ratio`` 1 at the crank. Every
-    argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that is not
+    Angles and speeds count at the motor, as in the FMU; with ``ratio`` 1 at the crank. Every argument may be a number
+    or an array in SI units, a text such as "160 mm", or a quantity of pint; shapes broadcast, and outputs have the
+    common shape. A value that is not
     finite, or a load outside its declared bounds, raises an `InputError` that names it; in an array this holds for
     each value. A value that exceeds a bound only by rounding counts as the bound.
 
     Parameters
     ----------
     model : the inverse model of the machine
-    parameters : its `Parameters`, or values (SI) by the names of parameters, e.g. ``{"r": 0.2, "crank.m": 35.0}``;
+    parameters : its `Parameters`, or values by the names of parameters, e.g. ``{"r": 0.2, "crank.m": 35.0}``;
         all other parameters have the values of the packaged machine.
     **values : values by names without a dot.
 
     Raises
     ------
-    KeyError
-        for a name that is not declared.
     InputError, GeometryError
-        for values out of bounds and lengths that cannot turn, in one line.
+        for a name that is not declared, values of another type or out of bounds, and lengths that cannot turn, in
+        one line.
 
     Examples
     --------
@@ -55,17 +56,27 @@ class Machine:
     in_place: ClassVar[str] = ""
     """Words on what the results without a run are of, where the runs have another model; else empty."""
 
-    def __init__(self, model: type[InverseMachine], parameters: Any = None, /, **values: float) -> None:
-        base = parameters if isinstance(parameters, model.Parameters) else model.Parameters()
-        by_name = {} if isinstance(parameters, model.Parameters) else dict(parameters or {})
+    def __init__(self, model: type[InverseMachine], parameters: Any = None, /, **values: Any) -> None:
         self.model = model
-        self.p: Any = model.check(model.parameter_layout.from_names({**by_name, **values}, base))
+        if isinstance(parameters, model.Parameters):
+            parameters = model.parameter_layout.by_name(parameters)
+        check_kind("parameters", parameters, Mapping | None, _NAMED)
+        self.p: Any = self._checked({**(parameters or {}), **values}, model.Parameters())
 
-    def replace(self, parameters: Mapping[str, float] | None = None, /, **values: float) -> Self:
+    def _checked(self, values: Mapping[str, Any], base: Any) -> Any:
+        """The checked parameters `base` with other values by name."""
+        layout = self.model.parameter_layout
+        declared = {v.name: v for v in layout.variables}
+        numbers = {
+            name: one_number(declared[name], value) if name in declared else value
+            for name, value in values.items()
+        }
+        return self.model.check(layout.from_names(numbers, base))
+
+    def replace(self, parameters: Mapping[str, Any] | None = None, /, **values: Any) -> Self:
         """The same machine with new values of some parameters; the arguments are as of the constructor."""
         machine = copy.copy(self)
-        layout = self.model.parameter_layout
-        machine.p = self.model.check(layout.from_names({**(parameters or {}), **values}, self.p))
+        machine.p = self._checked({**(parameters or {}), **values}, self.p)
         return machine
 
     def __repr__(self) -> str:
@@ -102,11 +113,10 @@ class Machine:
 
         Raises
         ------
-        KeyError
-            for a name that is not an input.
         InputError
-            see the class.
+            for a name that is not an input; see also the class.
         """
+        check_kind("inputs", values, Mapping, _NAMED)
         layout = self.model.input_layout
         numbers = layout.values(layout.from_names(dict(values)))
         return layout.instance([admit(v, x) for v, x in zip(layout.variables, numbers, strict=True)])
@@ -136,7 +146,10 @@ class Machine:
         return self._outputs(self.inputs({"phi": phi, "w": w, "a": a, **self._feed(feed)}))
 
     def _feed(self, feed: Any) -> dict[str, Any]:
-        return self.model.feed_layout.by_name(self.model.Feed() if feed is None else feed)
+        try:
+            return self.model.feed_layout.by_name(self.model.Feed() if feed is None else feed)
+        except AttributeError:
+            raise InputError(f"feed = {shown(feed)}: must be the Feed of {self.model.name}") from None
 
     def _outputs(self, u: Any) -> Any:
         part = self.model.parts[0]
@@ -148,11 +161,10 @@ class Machine:
 
         Raises
         ------
-        KeyError
-            for a name that is not an input.
         InputError
-            see the class.
+            for a name that is not an input; see also the class.
         """
+        check_kind("inputs", inputs, Mapping, _NAMED)
         u = self.inputs({**dict.fromkeys(self.model.input_layout.names, 0.0), **inputs})
         outputs: dict[str, Any] = {}
         state = self.state(u)
@@ -191,6 +203,7 @@ class Machine:
         """
         from .equilibria import equilibria
 
+        self._feed(feed)
         return equilibria(self, feed)
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
@@ -224,6 +237,9 @@ class Machine:
         return ()
 
 
+_NAMED = "a mapping of names to values"
+
+
 def admit(variable: Variable, value: Any) -> Any:
     """A float or an array of values that the declaration admits; a value that exceeds a bound by rounding is set to
     the bound.
@@ -231,9 +247,9 @@ def admit(variable: Variable, value: Any) -> Any:
     Raises
     ------
     InputError
-        for a value that the declaration does not admit.
+        for a value that the declaration does not admit, of another type, and of a unit of another kind.
     """
-    q, x = variable.quantity, array(value)
+    q, x = variable.quantity, in_declared_unit(variable, value)
     # the extremes of an array with a NaN are NaN
     for extreme in (np.min(x), np.max(x)) if np.size(x) else ():
         if not q.admits(float(extreme)):

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
+from ..core.brief import briefly_shown
 from ..core.planar import Vec2
 from ..groups.driver import Driver
 from ..groups.group import Group, Joint
@@ -56,6 +57,7 @@ class Topology(NamedTuple):
         return {link: tuple(each) for link, each in pins.items()}
 
 
+@briefly_shown
 @dataclass
 class Linkage:
     """A mechanism with one driver. Places in the frame [m], others in the frame of their link; loads as

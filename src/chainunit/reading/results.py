@@ -14,6 +14,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, dataclass_transform
 
+from ..core.brief import briefly_shown
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import group, quantity
 from .text import array_entry, entry
@@ -91,7 +92,9 @@ def part(
 @dataclass_transform(frozen_default=True, field_specifiers=(quantity, group, part))
 def result(cls: Any = None, *, frozen: bool = True) -> Any:
     """Make `cls` a result: a dataclass with declared parts."""
-    return partial(result, frozen=frozen) if cls is None else dataclasses.dataclass(frozen=frozen)(cls)
+    if cls is None:
+        return partial(result, frozen=frozen)
+    return briefly_shown(dataclasses.dataclass(frozen=frozen)(cls))
 
 
 class _Derived(property):

@@ -29,6 +29,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails
 
 from ..core import units
+from ..core.declared_numbers import as_text, kind_words, number_of_text
 from ..core.errors import InputError, near_name, printable, shown
 from ..core.inputs import TOML, file_text
 from ..core.messages import unit_behind
@@ -48,16 +49,19 @@ def to_number(variable: Variable, given: Any) -> float:
     ValueError
         for a text that is no number, a unit of another kind, or a value out of bounds.
     """
+    given = as_text(given)
     if variable.type == "Boolean":
         fits = isinstance(given, int | float) and given in (0, 1)
     else:
         fits = isinstance(given, int | float | str) and not isinstance(given, bool)
     if not fits:
-        raise ValueError(f"{variable.name} = {shown(given)}: must be {_kind(variable)}")
+        raise ValueError(f"{variable.name} = {shown(given)}: must be {kind_words(variable)}")
     try:
-        value = _converted(variable, given) if isinstance(given, str) else float(given)
+        value = number_of_text(variable, given) if isinstance(given, str) else float(given)
     except OverflowError:
-        raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
+        raise ValueError(
+            f"{variable.name}: the number is too large; must be {kind_words(variable)}"
+        ) from None
     if not variable.quantity.admits(value):
         meant = _meant(variable, given)
         hints = [
@@ -70,31 +74,6 @@ def to_number(variable: Variable, given: Any) -> float:
 
 
 _SENSE = '; the sense of a linkage is that of its driver: positive = "clockwise" in [driver] of its file'
-
-
-def may_be_share(variable: Variable) -> bool:
-    """Whether a quantity may be given in percent: no count, and no ratio of gears."""
-    low, high = variable.quantity.low, variable.quantity.high
-    if variable.type != "Real":
-        return False
-    return variable.unit != "1" or variable.kind == "percent" or (low < 1.0 and high <= 100.0)
-
-
-def _converted(variable: Variable, text: str) -> float:
-    parts = units.split(text)
-    try:
-        if parts is not None:
-            number, written = parts
-            if set(written) & set("%‰") and not may_be_share(variable):
-                raise ValueError(written)
-            return units.convert(number, written, variable.unit, variable.kind) if written else number
-    except ValueError:
-        pass
-    counted = variable.type != "Real"
-    hint = "" if counted else units.spelling(text, variable.unit, variable.kind)
-    other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
-    other = f"; {printable(other)}" if other else ""
-    raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{other}{hint}")
 
 
 def option_value(name: str, text: str, unit: str, description: str, most: float = math.inf) -> float:
@@ -222,17 +201,6 @@ def _meant(variable: Variable, given: Any) -> str | None:
         if variable.quantity.admits(value) and variable.quantity.is_usual(value):
             return f"{parts[0]:.15g} {unit}"
     return None
-
-
-def _kind(variable: Variable) -> str:
-    fitting = units.fitting(variable.unit, variable.kind)
-    if variable.type != "Real":
-        return f"{variable.quantity.allowed_range} ({variable.description})"
-    if variable.unit == "1":
-        share = ', or a text such as "8 %"' if fitting else ""
-        return f"a pure number{share} ({variable.description})"
-    declared = variable.unit.replace(".", " ")
-    return f'a number in {declared}, or a text such as "2 {fitting[0]}" ({variable.description})'
 
 
 Title = Annotated[str, AfterValidator(printable)]

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.brief import briefly_shown
 from ..core.errors import RunError
 from ..reading.results import InUnit, difference, part, result
 from .plant import ANGLE
@@ -114,6 +115,7 @@ def assemble(
     )
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class Fit(NormalEquations):
     """The best fit, and the number of `rounds` that it took. `starts` is the number of points from which it was

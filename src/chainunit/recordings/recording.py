@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.brief import briefly_shown
 from ..core.errors import Faults, InputError, meant, near_name, printable
 from ..core.inputs import decoded_by_marks, file_bytes, unzipped
 from ..core.units import must_be, of_other_kind, scale
@@ -27,6 +28,7 @@ from .logger_table import FEWEST, LoggerTable, name_and_unit, read_table
 from .measurands import COLUMNS, MEASURANDS, PHASES, SIGNALS, Measurand
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class Recording:
     """The rows of a file: `time` [s], shape (n,), and the `columns` by the name of the quantity, each of shape (n,),

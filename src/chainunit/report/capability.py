@@ -11,9 +11,11 @@ from ..study.config import Config
 from ..study.drive import Drive
 from ..study.record import StudyRecord
 from ..study.registry import capabilities as registered
+from ..work.progress import TaskProgress
 from .blocks import Block, Source
 from .lines import Line
 from .live.quantities import LiveQuantity
+from .reported_result import ReportedResult
 from .supplement import Supplement
 
 
@@ -35,6 +37,9 @@ class AnyStudy(Protocol):
     """A study from Python, `chainunit.Study`, as a capability knows it."""
 
     config: Config
+
+    def run(self, *, progress: TaskProgress | None = None) -> ReportedResult[Any, Any]:
+        """The result of the study."""
 
     def of_tables(self, tables: dict[str, Any], source: str) -> Self:
         """A study of the same kind with other `tables` of a study file; paths in them are relative to `source`."""

@@ -29,7 +29,7 @@ from .figure import (
 )
 from .lines import capital
 from .page_figures import classes
-from .style import BARS, FILLS, HATCHES, INK, class_colours, draw, look_of, pyplot
+from .style import BARS, FILLS, HATCHES, INK, canvas, class_colours, draw, look_of, styled
 
 _ROW, _COLUMN = 2.5, 4.3  # of a panel [in]
 _LETTERS = 11.5  # of a title, to an inch
@@ -58,17 +58,19 @@ def write(figures: Iterable[Figure], folder: Path, units: Units, are_small: bool
     centimetres on paper."""
     size = _SMALL if are_small else 1.0
     plots = {each.file: partial(_figure, each, units, size) for each in figures if each.file}
-    with pyplot().rc_context({"axes.labelsize": _LABELS} if are_small else {}):
-        return draw(plots, folder)
+    return draw(plots, folder, {"axes.labelsize": _LABELS} if are_small else None)
+
+
+def drawn(figure: Figure, units: Units) -> Any:
+    """The figure as one of matplotlib, as large as for a screen."""
+    with styled():
+        return _figure(figure, units)
 
 
 def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
     """The lines along which `z`, shape (len(y), len(x)), equals `level`, each as its points, shape (n, 2). The
     longest comes first. No line runs through NaN."""
-    plt = pyplot()
-    figure, axis = plt.subplots()
-    lines = axis.contour(x, y, np.ma.masked_invalid(z), levels=[level]).allsegs[0]
-    plt.close(figure)
+    lines = canvas().subplots().contour(x, y, np.ma.masked_invalid(z), levels=[level]).allsegs[0]
     return sorted(lines, key=len, reverse=True)
 
 
@@ -81,9 +83,8 @@ def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
     tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if has_titles else 0.0)
     is_named = any(panel.y.names for _, _, panel in figure.all_panels())
     height = tall * (max(size, _NAMED) if is_named else size)
-    drawing, axes = pyplot().subplots(
-        rows, columns, figsize=(width, height), squeeze=False, height_ratios=heights, width_ratios=widths
-    )
+    drawing = canvas(figsize=(width, height))
+    axes = drawing.subplots(rows, columns, squeeze=False, height_ratios=heights, width_ratios=widths)
     places = {(r, c) for r, c, _ in figure.all_panels()}
     for place in np.ndindex(rows, columns):
         if place not in places:

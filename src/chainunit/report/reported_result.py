@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
 
-from ..core.errors import WriteError
+from ..core.errors import WriteError, check_kind
 from ..core.files import atomic_file
+from ..core.named import Named
 from ..core.temporary_folders import in_temporary_folder
-from ..work.progress import TaskProgress, quiet
+from ..work.progress import TaskProgress
 from . import files, html, terminal
 from .blocks import Report
+from .notebook import shown_progress
+from .result_figures import ResultFigure
 from .task import Outcome, Question, Task
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class ReportedResult(Generic[Question, Outcome]):
@@ -40,8 +47,18 @@ class ReportedResult(Generic[Question, Outcome]):
         WriteError
             for a file that cannot be written; the others are written.
         """
+        check_kind("folder", folder, str | Path | None, "the path of a folder")
+        kind = "a function of task, work done and total work"
+        check_kind("progress", progress, Callable | None, kind)
+        with shown_progress(progress) as shown:
+            return cls._made(question, folder, shown, **options)
+
+    @classmethod
+    def _made(
+        cls, question: Question, folder: str | Path | None, progress: TaskProgress, **options: Any
+    ) -> Self:
         task = cls._task
-        compute = partial(task.outcome, question, progress=progress or quiet, **options)
+        compute = partial(task.outcome, question, progress=progress, **options)
         if folder is not None:
             with task.claimed(question, Path(folder)) as place:
                 result = cls(question, compute(folder=place), place)
@@ -65,8 +82,38 @@ class ReportedResult(Generic[Question, Outcome]):
         """The report that `repr` shows."""
         return self._report
 
+    @cached_property
+    def answers(self) -> pd.DataFrame:
+        """The numbers of the answer, a row each, in SI units: the column "unit", and columns of numbers."""
+        return answers_table(self._answer_rows())
+
+    def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
+        """By row and column, the entries of result.json that `answers` has; by default all of its single numbers."""
+        return {name: {"value": entry} for name, entry in _single_numbers(self._report.result)}
+
+    @property
+    def verdict(self) -> str:
+        """The judgements of the report, a line each; of a result that judges nothing its first sentence."""
+        return "\n".join(terminal.judgements(self._report))
+
+    @property
+    def warnings(self) -> list[str]:
+        """The warnings, a text each."""
+        return terminal.remarks(self._report, "warning")
+
+    @property
+    def notes(self) -> list[str]:
+        """The assumptions behind the numbers, a text each."""
+        return terminal.remarks(self._report, "note")
+
+    @cached_property
+    def figures(self) -> Mapping[str, ResultFigure]:
+        """The figures of the report by name: a notebook shows one, and its `save` writes it into a file."""
+        report = self._report
+        return Named({each.name: ResultFigure(each, report.units) for each in report.figures})
+
     def to_json(self) -> str:
-        """All numbers with their units, as the text of result.json."""
+        """All numbers with their units, as the text of the file of numbers."""
         return files.numbers_text(self._shown)
 
     def save(self, folder: str | Path, png: bool = False) -> list[Path]:
@@ -80,6 +127,7 @@ class ReportedResult(Generic[Question, Outcome]):
         WriteError
             for a file that cannot be written; the others are written.
         """
+        check_kind("folder", folder, str | Path, "the path of a folder")
         task = self._task
         with task.claimed(self._question, Path(folder)) as place:
             if task.kept is None or self._folder is None:
@@ -97,11 +145,33 @@ class ReportedResult(Generic[Question, Outcome]):
         return paths
 
     def __repr__(self) -> str:
-        return terminal.plain(self._shown)
+        return terminal.brief(self._shown, len(self.warnings))
 
     def _repr_html_(self) -> str:
         """The same as HTML, for notebooks."""
         return html.fragment(self._shown)
+
+
+def answers_table(rows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """A table with a row for each entry: its unit, and its numbers by column. A number is one of result.json, with
+    value and unit; one that is None is NaN."""
+    import pandas as pd
+
+    table = {}
+    for name, row in rows.items():
+        unit = next(iter(row.values()))["unit"]
+        values = {column: entry["value"] for column, entry in row.items()}
+        table[name] = {"unit": unit} | {k: float("nan") if x is None else x for k, x in values.items()}
+    return pd.DataFrame.from_dict(table, orient="index")
+
+
+def _single_numbers(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, below in node.items():
+        if isinstance(below, Mapping) and "unit" in below and "value" in below:
+            if not isinstance(below["value"], list | str | bool):
+                yield prefix + name, below
+        elif isinstance(below, Mapping):
+            yield from _single_numbers(below, f"{prefix}{name}.")
 
 
 def _copy(file: Path, target: Path) -> None:

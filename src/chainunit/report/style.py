@@ -81,27 +81,31 @@ def look_of(look: int | str) -> dict[str, Any]:
     return LOOKS[look] if isinstance(look, str) else LINES[look % len(LINES)]
 
 
-def pyplot() -> Any:
-    """The plots of matplotlib, which draws into files alone."""
+def canvas(**options: Any) -> Any:
+    """A new figure of matplotlib, of which its list of open figures knows nothing: a script or a notebook keeps its
+    own backend."""
+    from matplotlib.figure import Figure
+
+    return Figure(**options)
+
+
+def styled(more: Mapping[str, Any] | None = None) -> Any:
+    """The context with the look of every plot, and `more` settings of matplotlib."""
     import matplotlib
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot
-
-    return matplotlib.pyplot
+    return matplotlib.rc_context({**STYLE, **(more or {})})
 
 
-def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:
-    """Draw each figure into its file in `folder`, a PNG; returns the files."""
+def draw(
+    plots: Mapping[str, Callable[[], Any]], folder: Path, more: Mapping[str, Any] | None = None
+) -> list[Path]:
+    """Draw each figure into its file in `folder`, a PNG, with `more` settings of matplotlib; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    files, plt = [], pyplot()
-    with plt.rc_context(STYLE):
+    files = []
+    with styled(more):
         for name, make in plots.items():
             figure = make()
-            try:
-                with atomic_file(folder / name) as part:
-                    figure.savefig(part, format="png")
-            finally:
-                plt.close(figure)
+            with atomic_file(folder / name) as part:
+                figure.savefig(part, format="png")
             files.append(folder / name)
     return files

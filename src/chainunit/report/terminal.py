@@ -145,16 +145,67 @@ def _fitted(block: Block, console: Console, units: Units, room: int) -> str:
     return ""
 
 
-def plain(report: Report, width: int = 120) -> str:
-    """The short form as plain text, in lines of at most `width` letters."""
+_GRADES = ("good", "partly", "bad", "alarm")
+"""Severities of the judgements that are a verdict."""
+
+
+def judgements(report: Report) -> list[str]:
+    """The judgements of the answer; of a report without one the first sentence."""
+    blocks = report.blocks("short")
+    graded = [each for each in blocks if _role(each) in _GRADES]
+    first = [each for each in blocks if _role(each) == "plain"][:1]
+    return [words for each in graded or first for words in _sentences(each, report.units)]
+
+
+def remarks(report: Report, role: str) -> list[str]:
+    """The warnings of a report (`role` "warning") or its notes ("note"), a sentence each."""
+    blocks = [each for each in report.blocks("short") if _role(each) == role]
+    return [words for each in blocks for words in _sentences(each, report.units)]
+
+
+_MOST_LETTERS = 1990
+"""Largest length of the text for a screen of Python."""
+
+
+def brief(report: Report, count: int, width: int = 100) -> str:
+    """The judgements, the texts and the tables of the short form for which there is room, as plain text, and the
+    number of the warnings, `count`. A table is cut to its first rows."""
     out = io.StringIO()
     console = Console(
         file=out, width=width, markup=False, highlight=False, force_jupyter=False, no_color=True
     )
-    if report.failure:
-        console.print(f"The run stopped early: {plain_line(report.failure)}.", soft_wrap=True)
-    show(report, console)
-    return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
+    end = f"Warnings: {count}. " if count else ""
+    end += "All numbers: answers, to_json()."
+    pieces = [f"The run stopped early: {plain_line(report.failure)}."] if report.failure else []
+    title, room = report.title, _MOST_LETTERS - len(end) - sum(map(len, pieces))
+    for block in report.blocks("short"):
+        if _role(block) in (*_LAST, "remark"):
+            continue
+        if isinstance(block, Table):
+            text = _cut(block, console, report.units, room - len(title) - 1)
+            text, title = (f"{title}\n{text}".lstrip("\n"), "") if text else ("", title)
+        else:
+            text = "\n".join(_sentences(block, report.units))
+            if _role(block) in _GRADES:
+                text = shorten(text, max(room - 1, 80), placeholder=" ...") if len(text) >= room else text
+        if text.strip() and len(text) < room:
+            pieces.append(text)
+            room -= len(text) + 1
+    return "\n".join([*pieces, end])
+
+
+def _cut(table: Table, console: Console, units: Units, room: int) -> str:
+    """A table of at most so many letters, without its last rows where there are too many; else empty."""
+    rows = [row for row in table.rows if row.form != "long"]
+    for count in range(len(rows), 0, -1):
+        part = replace(table, rows=tuple(rows[:count]))
+        text = _printed(console, partial(_show_table, part, console, units))
+        lines = [line.rstrip() for line in text.splitlines()]
+        if count < len(rows):
+            lines.append(f"... and {len(rows) - count} more")
+        if len(text := "\n".join(lines)) < room:
+            return text
+    return ""
 
 
 def _role(block: Block) -> str:

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ..core.brief import briefly_shown
 from ..core.errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
 from ..core.quantities import Layout, variables
 from ..drives.catalogue import CatalogueMotor
@@ -61,6 +62,7 @@ from .sections import (
 )
 
 
+@briefly_shown
 @dataclasses.dataclass(frozen=True)
 class FileContents:
     """The contents of a study file, as they stand in it, and where each value comes from."""
@@ -108,6 +110,7 @@ class FileContents:
         return any(name.startswith(f"{section}.") for name in self.given)
 
 
+@briefly_shown
 @dataclasses.dataclass(frozen=True)
 class Config:
     """A study, checked: machine, motor, loads, runs and events by the names of their runs."""

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..core.brief import briefly_shown
 from ..core.errors import InputError
 from ..core.quantities import Layout
 from ..drives.contactor import CONTACTOR_EDGE, StarDelta
@@ -47,6 +48,7 @@ def _component(machine: Machine) -> ModelComponent:
     return ModelComponent(machine.model, machine.p)
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class Drive:
     """A `motor` with its `parameters` that turns a `machine`; `follows` says whether it follows the reference

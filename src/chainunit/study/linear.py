@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.engines import MATH
-from ..core.errors import InputError, RunError, near_name, refusal_prefix, shown
+from ..core.errors import InputError, RunError, check_kind, near_name, refusal_prefix, shown
 from ..core.model import Model
 from ..core.quantities import Quantity, Variable
 from ..mechanism.models import DirectMachine, InverseMachine
@@ -231,6 +231,7 @@ def _values(model: type[Model], at: At) -> dict[str, float]:
                 )
             pairs[name] = text
         at = pairs
+    check_kind("at", at, Mapping, "a text, or a mapping of names to values")
     values = {}
     for name, given in at.items():
         k = place("state or input", name, variables)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.brief import briefly_shown
 from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
 from ..machines.equilibria import Equilibria
@@ -94,6 +95,7 @@ class Swing:
     time_ratio: Value = quantity("1", "time ratio: slow stroke over quick return")
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class LinkageFindings:
     """The findings on a linkage: `q` are the places of the driver [rad], shape (n,), `outputs` the outputs there by
@@ -164,8 +166,8 @@ class _Way:
         return values
 
 
-def speed_of_driver(machine: Machine, given: str | None) -> float:
-    """The speed of the driver of a linkage [rad/s, m/s] from an option, or the usual one.
+def speed_of_driver(machine: Machine, given: str | None, name: str = "--speed") -> float:
+    """The speed of the driver of a linkage [rad/s, m/s] from an option or argument of that name, or the usual one.
 
     Raises
     ------
@@ -174,7 +176,7 @@ def speed_of_driver(machine: Machine, given: str | None) -> float:
     """
     unit = "m/s" if machine.model.slides else "rad/s"
     most = FASTEST[unit]
-    return option_value("--speed", given or USUAL_SPEEDS[unit], unit, "speed of the driver", most)
+    return option_value(name, given or USUAL_SPEEDS[unit], unit, "speed of the driver", most)
 
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:

@@ -167,6 +167,14 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
     return f"Not in it: {'; '.join(names)}. Its loads are those of normal running."
 
 
+def remarks_on_export(config: Config) -> list[str]:
+    """Sentences on the parts of a study that its FMU or package does not have, and on the limits of its model."""
+    words = [left_out(config.operation, config.given_events)]
+    if config.file.tables.get("organ") != "chain":
+        words += beyond_two_bars(config.machine, config.feed, config.run.crank_speed)
+    return list(filter(None, words))
+
+
 def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
     """A line for each limit of two bars an organ that a crank speed [rad/s] passes, see `study.verdict`."""
     limits = limits_of_organs(machine, feed, ("N.m",))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias
 
+from ..core.brief import briefly_shown
 from ..core.descriptions import of_driver
 from ..core.errors import RunError
 from ..drives.catalogue import CatalogueMotor
@@ -82,6 +83,7 @@ class Spread:
     """range of the peaks crank_torque, motor_torque and rocker_torque [N m]"""
 
 
+@briefly_shown
 @dataclass
 class StudyRecord:
     """The record of a study, which `run_study` fills. Its mappings are by the names of the runs:

@@ -11,9 +11,9 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ..core.declared_numbers import may_be_share
 from ..core.quantities import Variable
 from ..drives.catalogue import catalogue
-from ..reading.tables import may_be_share
 from ..reading.unit_patterns import pattern, zero
 from .entry_values import MOST_FILES
 from .event import TYPES

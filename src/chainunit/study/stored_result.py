@@ -50,7 +50,17 @@ def read_result(path: Path) -> StoredResult:
         raise InputError(
             f"{path}: has no result (No such file or directory); make it by chainunit study -o {path}"
         )
-    data = json_of(file_bytes(file, JSON), str(file), "result of a study")
+    return stored_result(file, json_of(file_bytes(file, JSON), str(file), "result of a study"))
+
+
+def stored_result(file: Path, data: Any) -> StoredResult:
+    """The result with the content `data` of its file.
+
+    Raises
+    ------
+    InputError
+        for the content of another file.
+    """
     if not isinstance(data, dict) or not isinstance(data.get("answers"), dict) or "chainunit" not in data:
         raise InputError(f"{file}: is no result of a study; chainunit study writes {FILE}")
     return StoredResult(file, data)

@@ -88,17 +88,19 @@ class CompiledSimulation(Simulation):
     ) -> None:
         self._system = CompiledSystem(system)
         self.time, self.signals = start_time, dict(signals or {})
-        self._checked(self.signals)
+        self._graph = system
+        self._check_signals()
         start = {full: float(at_time(signal, start_time)) for full, signal in self.signals.items()}
         self._states = self._system.start(start)
         self._saved = self.time, self._states
 
-    def _checked(self, signals: Mapping[str, Any]) -> None:
-        for full, signal in signals.items():
+    def _check_signals(self) -> None:
+        for full, signal in self.signals.items():
             if full not in self._system.inputs:
                 raise InputError(f"{full}: no such input of the system")
             if not is_evaluated(signal):
                 raise InputError(f"{full}: a compiled system takes numbers and profiles as signals")
+        self.signals = self._graph.in_units(self.signals, "input")
 
     @property
     def states(self) -> Any:
@@ -140,9 +142,6 @@ class CompiledSimulation(Simulation):
             for full in kept
         }
         return xr.Dataset(variables, {"time": ("time", times[chosen], {"units": "s", "long_name": "time"})})
-
-    def check_states(self) -> None:
-        """See `Simulation`; the state can always be saved."""
 
     def save(self) -> float:
         """Keep the state, and return its time [s]."""
@@ -204,7 +203,7 @@ def _advance(
     if not simulations:
         return []
     for simulation in simulations:
-        simulation._checked(simulation.signals)
+        simulation._check_signals()
     system, signals = simulations[0]._system, [simulation.signals for simulation in simulations]
     if any(
         each._system.model is not system.model or each.signals.keys() != signals[0].keys()

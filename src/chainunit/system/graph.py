@@ -16,6 +16,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from ..core.brief import briefly_shown
+from ..core.declared_numbers import has_own_unit, number_in, one_number
 from ..core.errors import InputError, shown
 from ..core.model import Model, Terminal
 from ..core.ports import FLANGE, LOAD, PortSlopes
@@ -42,14 +44,23 @@ class Connector:
     type: Type = "Real"
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class ModelComponent:
-    """A model with its `parameters`, an instance of its declaration. `file` is its FMU, or None before the export;
+    """A model with its `parameters`, an instance of its declaration; texts and quantities of pint have their units.
+    `file` is its FMU, or None before the export;
     the start values in the file do not count."""
 
     model: type[Model]
     parameters: Any
     file: Path | None = None
+
+    def __post_init__(self) -> None:
+        layout = self.model.parameter_layout
+        values = layout.by_name(self.parameters)
+        if any(map(has_own_unit, values.values())):
+            numbers = {v.name: one_number(v, values[v.name]) for v in layout.variables}
+            object.__setattr__(self, "parameters", layout.from_names(numbers))
 
     @cached_property
     def terminals(self) -> Mapping[str, Terminal]:
@@ -86,6 +97,7 @@ class ModelComponent:
         return self.model.name
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class FmuComponent:
     """An FMU `file`; see `chainunit.system.foreign`. `names` maps names of the system to names of the FMU, where they
@@ -117,6 +129,7 @@ class Bond:
     flanges: tuple[Terminal, Terminal]
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class System:
     """Components and their connections.
@@ -159,8 +172,7 @@ class System:
                 raise InputError(f"{target}: is connected to {sources[target]} and to {source}")
             self._check_ends(source, target)
             sources[target] = source
-        for full in self.start:
-            self.connector(full, "parameter", "input")
+        object.__setattr__(self, "start", self.in_units(self.start, "parameter", "input"))
 
     # -- names
 
@@ -186,6 +198,24 @@ class System:
         if connector is None or (causalities and connector.causality not in causalities):
             raise InputError(f"{full}: no such {' or '.join(causalities) or 'variable'} in the system")
         return connector
+
+    def in_units(self, values: Mapping[str, Any], *causalities: str) -> dict[str, Any]:
+        """Values by full name of a variable: a text or a quantity of pint as a number in the unit of the variable,
+        all others as they are.
+
+        Raises
+        ------
+        InputError
+            where there is no such variable of one of these causalities, and for a unit of another kind.
+        """
+        return {
+            full: self._in_unit(self.connector(full, *causalities), full, x) for full, x in values.items()
+        }
+
+    def _in_unit(self, connector: Connector, full: str, value: Any) -> Any:
+        if not has_own_unit(value):
+            return value
+        return number_in(connector.unit or "1", full, value, connector.description)
 
     def terminal(self, full: str) -> tuple[str, Terminal]:
         """For the full name of a terminal: the name of the component, and the terminal."""

@@ -60,6 +60,9 @@ class ModelExchange(FmuSimulation):
         if method not in METHODS:
             raise InputError(f"method = {method}: must be one of {', '.join(METHODS)}")
         self._rtol, self._method = rtol, getattr(scipy.integrate, method)
+        super().__init__(system, signals, start_time)
+
+    def _initialize(self) -> None:
         self._pace: float | None = None
         """next step of the solver [s]"""
         self._refusal: DiscardError | None = None
@@ -68,9 +71,6 @@ class ModelExchange(FmuSimulation):
         """next time event of the FMUs [s]"""
         self.events = 0
         """number of events since the start, without those at the begin of a run"""
-        super().__init__(system, signals, start_time)
-
-    def _initialize(self) -> None:
         super()._initialize()
         self._units: list[ExchangeInstance] = list(self._instances.values())
         ends = np.cumsum([0, *(unit.n_states for unit in self._units)])

@@ -7,16 +7,18 @@ states first, then the outputs that depend on them. So every recorded row belong
 from __future__ import annotations
 
 import math
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
+from ..core.declared_numbers import number_in
 from ..core.errors import InputError, InterruptedRunError, RunError
 from ..core.files import atomic_file
 from ..work.interrupts import stoppable
@@ -58,6 +60,10 @@ class RunOptions:
     file: Path | None
 
 
+_PastRun = tuple[dict[str, Any], RunOptions]
+"""The signals and the arguments of a run that can be repeated."""
+
+
 class Simulation(ABC):
     """A running system, from whose saved state branches can run; use it as a context manager."""
 
@@ -80,8 +86,8 @@ class Simulation(ABC):
 
     def run(
         self,
-        stop: float,
-        step: float,
+        stop: float | str,
+        step: float | str,
         progress: Progress | None = None,
         *,
         guards: Mapping[str, float] | None = None,
@@ -93,7 +99,7 @@ class Simulation(ABC):
 
         Parameters
         ----------
-        stop, step : [s]
+        stop, step : [s], or texts such as "2 ms"
         progress : is called with the simulated time now and then
         guards : limits by full name of an output: where the absolute value passes the limit at the end of a step, the
             run ends with that row; in Model Exchange it ends with a row at the instant of the passage
@@ -119,6 +125,8 @@ class Simulation(ABC):
         WriteError
             where the `file` cannot be written.
         """
+        stop = number_in("s", "stop", stop, "time to which the run goes")
+        step = number_in("s", "step", step, "communication step")
         check_forward(self.time, stop, step)
         if not every >= 1 or every % 1:
             raise InputError(f"every = {every:g}: must be a whole number >= 1")
@@ -142,9 +150,10 @@ class Simulation(ABC):
     def restore(self) -> None:
         """Return to the saved state, from which another branch can run."""
 
-    @abstractmethod
-    def check_states(self) -> None:
-        """Refuse a system whose state cannot be saved."""
+    @property
+    def without_states(self) -> list[str]:
+        """The components whose state cannot be saved: to `restore` then runs the system from its start again."""
+        return []
 
 
 class FmuSimulation(Simulation):
@@ -176,28 +185,35 @@ class FmuSimulation(Simulation):
         self._instances: dict[str, Any] = {}
         self._state: dict[str, Any] = {}
         self._journal: list[str] = []
+        self._start = self.time, dict(self.signals)
+        self._past: list[_PastRun] = []
+        """the runs since the start, where a state cannot be saved"""
+        self._saved_past: list[_PastRun] = []
         try:
             self._open()
-            self._transfers = self._schedule()
-            self._initialize()
+            self._instantiate()
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """Free every instance and the unpacked files."""
+        self._free_instances()
+        for fmu in self._fmus.values():
+            fmu.close()
+        self._fmus = {}
+
+    def _free_instances(self) -> None:
         for name, instance in self._instances.items():
             if name in self._state:
                 instance.forget(self._state[name])
             instance.close()
-        for fmu in self._fmus.values():
-            fmu.close()
-        self._instances, self._fmus, self._state = {}, {}, {}
+        self._instances, self._state = {}, {}
 
     # -- set-up
 
     def _open(self) -> None:
-        """Unpack the FMUs, each file once, and instantiate the components."""
+        """Unpack the FMUs, each file once."""
         archives: dict[Any, Fmu] = {}
         for name, component in self.system.components.items():
             if component.file is None:
@@ -210,7 +226,13 @@ class FmuSimulation(Simulation):
                     connector = component.connectors.get(variable.name)
                     variable.unit = variable.unit or (connector.unit if connector else None)
             self._fmus[name] = archives[key]
-            self._instances[name] = self.instances(archives[key], name, self._journal)
+
+    def _instantiate(self) -> None:
+        """Instantiate the components, and bring them to the start."""
+        for name, fmu in self._fmus.items():
+            self._instances[name] = self.instances(fmu, name, self._journal)
+        self._transfers = self._schedule()
+        self._initialize()
 
     def _schedule(self) -> list[tuple[Instance, Any, list[tuple[Instance, Any, list[int]]]]]:
         """Groups of connected outputs in an order in which each output is final when it is read. A group has its
@@ -274,8 +296,8 @@ class FmuSimulation(Simulation):
     def _signal_inputs(self) -> list[tuple[Instance, Any, list[str]]]:
         """Handles of the inputs with signals."""
         connected = {target for _, target in self.system.connections}
+        self.signals = self.system.in_units(self.signals, "input")
         for full in self.signals:
-            self.system.connector(full, "input")
             if full in connected:
                 raise InputError(f"{full}: is connected, it cannot have a signal")
         return self._handles(self.signals)
@@ -317,6 +339,9 @@ class FmuSimulation(Simulation):
         import xarray as xr
 
         start, file = self.time, options.file
+        if self.without_states:
+            kept = replace(options, progress=None, every=sys.maxsize, file=None)
+            self._past.append((dict(self.signals), kept))
         n = max(1, math.ceil((options.stop - start) / options.step - 1e-9))
         recorders, guarded = self._recorders(options.names), self._guarded(options.guards)
         room = n // options.every + 2 if file is None else rows.BLOCK
@@ -400,42 +425,53 @@ class FmuSimulation(Simulation):
 
     # -- branching
 
-    def save(self) -> float:
-        """Save the present state of every FMU, in place of the last saved one; returns the time.
+    @property
+    def without_states(self) -> list[str]:
+        """See `Simulation`."""
+        return [name for name, fmu in self._fmus.items() if not fmu.interface.canGetAndSetFMUstate]
 
-        Raises
-        ------
-        InputError
-            where an FMU cannot give its state.
-        """
-        self.check_states()
-        for name, instance in self._instances.items():
-            if name in self._state:
-                instance.forget(self._state[name])
-            self._state[name] = instance.state()
+    def save(self) -> float:
+        """Save the present state of every FMU, in place of the last saved one; returns the time. Where an FMU cannot
+        give its state, the runs since the start are remembered in its place."""
+        if self.without_states:
+            self._saved_past = list(self._past)
+        else:
+            for name, instance in self._instances.items():
+                if name in self._state:
+                    instance.forget(self._state[name])
+                self._state[name] = instance.state()
         self._saved_at = self.time
         return self.time
 
-    def check_states(self) -> None:
-        """Refuse a system whose state cannot be saved.
+    def restore(self) -> None:
+        """Return to the saved state, from which another branch can run. Where an FMU cannot give its state, all FMUs
+        begin again, and the runs up to the saved time are repeated.
 
         Raises
         ------
-        InputError
-            where an FMU cannot give its state.
+        RunError
+            where an FMU fails in one of these runs.
         """
-        for name, fmu in self._fmus.items():
-            if not fmu.interface.canGetAndSetFMUstate:
-                raise InputError(
-                    f"{name} ({fmu.file.name}): cannot save its state (canGetAndSetFMUstate), so that no event can "
-                    "branch from steady running; ask its maker for an FMU that can"
-                )
-
-    def restore(self) -> None:
-        """Return to the saved state, from which another branch can run."""
-        for name, instance in self._instances.items():
-            instance.restore(self._state[name])
+        if self.without_states:
+            self._repeat(self._saved_past)
+        else:
+            for name, instance in self._instances.items():
+                instance.restore(self._state[name])
         self.time = self._saved_at
+
+    def _repeat(self, runs: Sequence[_PastRun]) -> None:
+        """Make these runs from the start again; the signals stay as they are."""
+        signals = self.signals
+        self._free_instances()
+        self._past = []
+        self.time, first = self._start
+        self.signals = dict(first)
+        self._instantiate()
+        for self.signals, options in runs:
+            failure = self._run(options)[1]
+            if failure is not None:
+                raise failure
+        self.signals = signals
 
 
 def beyond(guarded: Sequence[Guarded]) -> bool:

@@ -204,8 +204,8 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     assert found.is_described and "A mill" in repr(found)
     again = json.loads((tmp_path / "again" / "result.json").read_text("utf-8"))
     assert again["numbers"] == result["numbers"] and again["courses"] == result["courses"]
-    numbers = found.numbers
-    assert list(numbers.index) == list(TRUTH) and numbers["is_told"].sum() == 2
+    numbers = found.answers
+    assert list(numbers.index) == list(TRUTH) and numbers["is_determined"].sum() == 2
     assert math.isnan(numbers.loc["machine.left.web_mass", "value"])
 
 

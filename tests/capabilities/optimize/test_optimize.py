@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from command import chainunit
 from linkage_files import pressed_both_ways
+from reports import plain
 
 from chainunit import ChainUnitMachine, Study
 from chainunit.capabilities.optimize import checks
@@ -35,7 +36,6 @@ from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.reading.results import as_data
-from chainunit.report.terminal import plain
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
 from chainunit.study.heading import Heading

@@ -21,6 +21,7 @@ import pytest
 import sweeps
 import xarray as xr
 from command import chainunit
+from reports import plain
 from scipy.stats import qmc, spearmanr
 
 from chainunit import GeometryError, InputError, Study
@@ -39,7 +40,6 @@ from chainunit.core.native.compilers import compiler
 from chainunit.core.quantities import Quantity, Variable
 from chainunit.reading.results import as_data
 from chainunit.report.figure import Hatch, hatch_lines
-from chainunit.report.terminal import plain
 from chainunit.study.block_runs import Cause
 from chainunit.study.choice import choose, drive_of
 from chainunit.study.config import parse
@@ -405,7 +405,7 @@ def test_the_largest_loads_come_first_and_the_limit_of_the_current_is_told():
     hard, soft = (Study.from_text(ONE_JAM.format(force)).sweep(workers=1) for force in (3889, 300))
     assert hard.table["current_peak"].max() == pytest.approx(limit, rel=1e-3)
     assert json.loads(hard.to_json())["current_limit"]["value"] == limit
-    assert "The current is at its limit, 4.4 A," in repr(hard)
+    assert "The current is at its limit, 4.4 A," in " ".join(hard.notes)
     assert soft.table["current_peak"].max() < 0.9 * limit
     assert json.loads(soft.to_json())["current_limit"]["value"] is None
 
@@ -585,9 +585,8 @@ def test_points_beyond_the_limits_of_two_bars_are_counted():
     assert points == {topic: topics.count(topic) for topic in topics} | {"rocker torque": both}
     assert points["rocker torque"] > points["slack speed"] > 0
     assert organs["slack speed"]["limit"]["value"] == pytest.approx(slack)
-    assert "goes slack: 14.3 % of the points. The limit of the study's machine and feed is 6.73" in repr(
-        result
-    )
+    said = " ".join(result.warnings)
+    assert "goes slack: 14.3 % of the points. The limit of the study's machine and feed is 6.73" in said
     still = text.format("peak(tau)", "machine.r", [0.14, 0.15])
     (organ,) = json.loads(Study.from_text(still).sweep(workers=1).to_json())["organs"]
     assert organ["topic"] == "rocker torque" and organ["share"]["value"] == 1.0
@@ -608,13 +607,13 @@ def test_shares_are_left_out_where_they_are_not_defined(grid, spread):
             for each in of.values()
         )
     words = "of the points have no value, and the parameters of the others are not independent"
-    assert words in repr(grid) and words not in repr(spread)
+    assert words in " ".join(grid.notes) and words not in " ".join(spread.notes)
     assert "moves it most" not in grid._repr_html_() and "moves it most" in spread._repr_html_()
 
 
 def test_the_spread_names_the_ranges_that_are_no_tolerances(spread):
     assert json.loads(spread.to_json())["evenly"] == ["machine.r"]
-    assert "machine.r has no tolerance: the spread counts each of their values" in repr(spread)
+    assert "machine.r has no tolerance: the spread counts each of their values" in " ".join(spread.notes)
     text = SPREAD.replace('from = "130 mm"\nto = "170 mm"', 'tolerance = "2 mm"')
     numbers = json.loads(Study.from_text(text.replace("200", "16")).sweep(workers=1).to_json())
     assert numbers["evenly"] == [] and numbers["spread"]
@@ -880,7 +879,7 @@ def test_a_damaged_batch_is_told(tmp_path):
     assert json.loads((tmp_path / "result.json").read_text("utf-8"))["damaged_batches"]["value"] == 0
     batches.damage(store, "machine_r", 0)
     words = f"1 batch of points in {store.name} was damaged, and was computed anew"
-    assert words in repr(study.sweep(tmp_path, workers=1))
+    assert words in plain(study.sweep(tmp_path, workers=1)._report)
     assert made_anew(3, "runs", "x") == "3 batches of runs in x were damaged, and were computed anew"
 
 

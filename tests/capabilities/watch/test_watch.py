@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command import chainunit
+from reports import plain
 from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit import InputError, Study
@@ -49,6 +50,11 @@ def study_text(machine, **watch):
             *(f"{name} = {json.dumps(str(x) if isinstance(x, Path) else x)}" for name, x in keys.items()),
         ]
     )
+
+
+def said_of(result):
+    """The short form of the report of a result, as one line."""
+    return " ".join(plain(result._report).split())
 
 
 GAINS = {
@@ -115,7 +121,7 @@ def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     columns, rng = ("motor.i", "motor.u", "motor.w"), np.random.default_rng(3)
     write_recording(synthetic(drive, columns, run, logger, rng), tmp_path / "ramp.csv.gz")
     (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file="ramp.csv.gz"), "utf-8")
-    found = Study.from_file(tmp_path / "mine.toml").watch().watched
+    found = Study.from_file(tmp_path / "mine.toml").watch().record
     assert {each.side for each in found.alarms} == {"left"} and found.is_described
     time, shift = found.recording.time, Profile(0.0, ((30.0, 10.0, 12.0),))
     beyond = [shift(t) > x for t, x in zip(time, found.outputs["imbalance.feed_threshold"], strict=True)]
@@ -129,7 +135,7 @@ def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     wrong = TRUTH["machine"] | {"left.wall_mass": 81.0}
     (tmp_path / "mine.toml").write_text(study_text(wrong, end=40), "utf-8")
     found = Study.from_file(tmp_path / "mine.toml").watch()
-    assert not found.watched.is_described and watch_page.TASK.shortfall(found.watched) == ""
+    assert not found.record.is_described and watch_page.TASK.shortfall(found.record) == ""
     assert "does not describe the begin of the recording" in " ".join(repr(found).split())
     doubts = json.loads(found.to_json())["doubts"]
     assert any("remains in motor.i" in each for each in doubts)
@@ -150,7 +156,7 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
         (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], end=60, **more), "utf-8")
         found = Study.from_file(tmp_path / "mine.toml").watch()
         results.append(json.loads(found.to_json()))
-        thresholds.append(np.median(found.watched.outputs["imbalance.feed_threshold"]))
+        thresholds.append(np.median(found.record.outputs["imbalance.feed_threshold"]))
     assert results[0]["widening"]["value"] == 1.0
     # a web that is heavier by 1 kg is as good as feed
     assert results[1]["uncertainty"]["value"] == pytest.approx(1.0, abs=0.1)
@@ -191,7 +197,7 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     found = Study.from_file(tmp_path / "mine.toml").watch()
     alarms = found.alarms
     assert {each.side for each in alarms} == {"left"} and 70.0 < alarms[0].begin < 70.5 + TURN
-    words = " ".join(repr(found).split())
+    words = said_of(found)
     assert "No rows from 30.00 s to 33.01 s: the observer starts anew behind this gap." in words
     assert "No rows from 49.99 s to 51.1" in words
     assert "The identification of this machine failed: its model does not describe its recordings." in words
@@ -201,7 +207,7 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     assert (
         f"The noise of the measured speed at the begin is {noise['speed']:.2g} times the stated one" in words
     )
-    assert found.watched.parameters["noise.w"] == pytest.approx(0.002 * noise["speed"] * 150.0, rel=0.01)
+    assert found.record.parameters["noise.w"] == pytest.approx(0.002 * noise["speed"] * 150.0, rel=0.01)
 
 
 def test_the_noise_of_columns_that_the_observer_does_not_use():
@@ -219,7 +225,7 @@ def test_a_sensor_that_fails_behind_the_begin(tmp_path):
     """It makes a false alarm, which the page doubts; a machine that stops is watched all the same."""
     stuck = changed(tmp_path, motor_i=lambda t, x: np.where(t > 35.0, x[7000], x))
     (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file=stuck), "utf-8")
-    words = " ".join(repr(Study.from_file(tmp_path / "mine.toml").watch()).split())
+    words = said_of(Study.from_file(tmp_path / "mine.toml").watch())
     assert "Overload of the" in words and "motor.i keeps the value" in words
     doubt = (
         "from 35 to 59.995 s: a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
@@ -229,7 +235,7 @@ def test_a_sensor_that_fails_behind_the_begin(tmp_path):
         name: lambda t, x: np.where(t > 50.0, 0.0, x) for name in ("motor_i", "motor_u", "motor_w", "mark")
     }
     changed(tmp_path, **stop)
-    words = " ".join(repr(Study.from_file(tmp_path / "mine.toml").watch()).split())
+    words = said_of(Study.from_file(tmp_path / "mine.toml").watch())
     assert "motor.w keeps the value 0 rad/s from 50" in words
 
 

@@ -23,9 +23,10 @@ def compare(
 
     Writes report.html, comparison.json and comparison.md into the output folder.
     """
+    from ...study.stored_result import read_result
     from .page import TASK
 
-    carry_out(TASK, (first, second), output, whole=whole, png=png)
+    carry_out(TASK, (read_result(first), read_result(second)), output, whole=whole, png=png)
 
 
 COMMANDS = (compare,)

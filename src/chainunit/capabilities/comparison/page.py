@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from ...report import blocks as b
 from ...report.lines import Aside, Line, Name, capital, line
 from ...report.task import Task
 from ...study.measures import MEASURES
-from ...study.stored_result import read_result
+from ...study.stored_result import StoredResult
 from .comparison import compare
 
 _SIDES = ("a", "b")
@@ -155,6 +154,6 @@ def _row(s: b.Source, run: str, name: str, is_short: bool) -> b.TableRow:
     return b.TableRow((title, *numbers), form="both" if is_short else "long")
 
 
-TASK: Task[tuple[Path, Path], Mapping[str, Any]] = Task(
-    "compare", lambda paths, folder, progress: compare(*map(read_result, paths)), comparison_report
+TASK: Task[tuple[StoredResult, StoredResult], Mapping[str, Any]] = Task(
+    "compare", lambda pair, folder, progress: compare(*pair), comparison_report
 )

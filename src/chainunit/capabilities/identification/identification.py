@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core.brief import briefly_shown
 from ...core.errors import Faults, InputError
 from ...drives.induction_motor import InductionMotor
 from ...recordings.fit import MOST_ROUNDS, Fit, fit
@@ -75,6 +76,7 @@ class ComparedColumn(NamedTuple):
     simulated: Any
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class IdentifiedMachine:
     """An identified machine.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,20 +33,20 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
         """Whether the model describes the recordings: the residuals may be noise."""
         return self.found.is_described
 
-    @property
-    def numbers(self) -> pd.DataFrame:
-        """The sought numbers by name: value, standard deviation, interval of 95 % (low, high), unit, and whether the
+    @cached_property
+    def answers(self) -> pd.DataFrame:
+        """The sought numbers by name: unit, value, standard deviation, interval of 95 % (low, high), and whether the
         recordings determine the number; the value of one that they do not determine is no number."""
         import pandas as pd
 
         rows = {
             name: {
+                "unit": each.unknown.unit,
                 "value": each.value if each.is_determined else float("nan"),
                 "deviation": each.deviation,
                 "low": each.low,
                 "high": each.high,
-                "unit": each.unknown.unit,
-                "is_told": each.is_determined,
+                "is_determined": each.is_determined,
             }
             for name, each in self.found.estimates.items()
         }

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.brief import briefly_shown
 from ...core.temporary_folders import scratch
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
@@ -35,6 +36,7 @@ class FrontPoint:
     values: tuple[float, float]
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class Best:
     """What a search found. Without a machine that meets all limits, `answer` is None and `conflict` says why."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ...core.errors import RunError
 from ...fmu.backends import Backend
@@ -30,6 +32,14 @@ class BestResult(ReportedResult[Config, OptimizedStudy]):
     def best(self) -> Best:
         """All that the search found."""
         return self._outcome.best
+
+    def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
+        """For each free parameter and each quantity its value today and of the best machine, and its limits."""
+        numbers = self._report.result
+        return {
+            name: {column: entry[column] for column in ("today", "best", "min", "max")}
+            for name, entry in (numbers["parameters"] | numbers["quantities"]).items()
+        }
 
     @property
     def met(self) -> bool:

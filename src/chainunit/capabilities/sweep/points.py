@@ -18,6 +18,7 @@ import numpy as np
 
 from ... import __version__
 from ...batch.evaluate import ReasonKind, StateReason, reasons_of
+from ...core.brief import briefly_shown
 from ...core.errors import InputError
 from ...core.quantities import Layout, Quantity, Variable
 from ...core.system_description import reference
@@ -268,6 +269,7 @@ class PassedPoints(NamedTuple):
     best: tuple[int, ...]
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class SweepFindings:
     """The results of a sweep, in the store of `outcome`."""

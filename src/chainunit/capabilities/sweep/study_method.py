@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
@@ -27,6 +28,15 @@ class SweepResult(ReportedResult[Config, SweptStudy]):
     def summary(self) -> SweepSummary:
         """Extremes, best points, influences and spread, as the report reads them."""
         return self._outcome.summary
+
+    def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
+        """For each result the least and the largest value over all points, and the value of the study."""
+        numbers = self._report.result
+        return {
+            name: {end: rows[end][name] for end in ("least", "largest") if rows.get(end)}
+            | {"study": numbers["nominal"][name]}
+            for name, rows in numbers["extremes"].items()
+        }
 
     @property
     def dataset(self) -> xr.Dataset:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.brief import briefly_shown
 from ...core.quantities import quantity
 from ...reading.results import OWN, Estimate, InUnit, part, result
 from ...reading.text import shown_in
@@ -229,6 +230,7 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
     )
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class SweptStudy:
     """A study whose sweep was run: its `findings`, and its numbers, which are made once for report and Python."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...core.quantities import quantity
+from ...core.quantities import Variable, quantity
 from ...machines.load_observer import LoadObserver
 from ...reading.results import InUnit, part, result
 from ...reading.text import shown_in
@@ -223,5 +223,10 @@ def _course(watched: WatchedRecording) -> dict[str, InUnit]:
 
 def _units() -> dict[str, str]:
     """The units of the outputs and states of the observer."""
+    return {name: v.unit for name, v in declared_outputs().items()}
+
+
+def declared_outputs() -> dict[str, Variable]:
+    """The declarations of the outputs and states of the observer, by name."""
     layouts = [*(each.layout for each in LoadObserver.parts), LoadObserver.state_layout]
-    return {v.name: v.unit for layout in layouts if layout is not None for v in layout.variables}
+    return {v.name: v for layout in layouts if layout is not None for v in layout.variables}

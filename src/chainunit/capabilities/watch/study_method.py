@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import TaskProgress
 from .page import TASK
+from .result import declared_outputs
 from .watch import Alarm, WatchedRecording
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class WatchResult(ReportedResult[Config, WatchedRecording]):
@@ -18,14 +25,33 @@ class WatchResult(ReportedResult[Config, WatchedRecording]):
     _task = TASK
 
     @property
-    def watched(self) -> WatchedRecording:
-        """The alarms and the outputs of the observer at all rows."""
+    def record(self) -> WatchedRecording:
+        """All that the watch found, as the report reads it."""
         return self._outcome
+
+    @cached_property
+    def watched(self) -> xr.Dataset:
+        """The outputs of the observer at all rows of the recording, over ``time``, with units in ``attrs``."""
+        import xarray as xr
+
+        watched, declared = self.record, declared_outputs()
+        time = ("time", watched.recording.time, {"units": "s", "long_name": "time of the recording"})
+        outputs = {
+            name: ("time", values, {"units": declared[name].unit, "long_name": declared[name].description})
+            for name, values in watched.outputs.items()
+        }
+        return xr.Dataset(outputs, {"time": time}, {"title": watched.config.title})
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
         """The alarms in order: side, begin, end and ground of each."""
-        return self.watched.alarms
+        return self.record.alarms
+
+    def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
+        """The medians of the outputs after the time of learning and before the first alarm, with deviations and
+        thresholds."""
+        usual: Mapping[str, Mapping[str, Any]] = self._report.result["usual"]
+        return usual
 
 
 def watch(

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.brief import briefly_shown
 from ...core.errors import Faults, InputError
 from ...core.inputs import JSON, file_bytes, json_of
 from ...core.quantities import Layout
@@ -107,6 +108,7 @@ class MachineErrors:
     failed: bool
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class WatchedRecording:
     """A recording with the outputs of the observer at its rows.

@@ -29,6 +29,12 @@ def live_of_config(config: Config, folder: Path) -> LiveMachine:
     return of_study(config, choice.drive, choice.tables, choice.proposal)
 
 
+def live_page_of_config(config: Config, source: str, folder: Path) -> b.Report:
+    """The report with the live machine of a study from the `source`; errors as of `live_page`."""
+    live = live_of_config(config, folder)
+    return _report(config.title or "Study", "Live study", whole_of(live.data.get("organs", "")), live, source)
+
+
 def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
     """The report with the live machine of a study file or a linkage file, or of the packaged study without a file;
     `speed` is that of the driver of a linkage.
@@ -44,9 +50,7 @@ def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
             raise InputError(
                 "--speed is for a linkage; leave it out: the speed of a study is run.crank_speed in its file"
             )
-        live = live_of_config(config, folder)
-        whole = whole_of(live.data.get("organs", ""))
-        return _report(config.title or "Study", "Live study", whole, live, str(file or "packaged example"))
+        return live_page_of_config(config, str(file or "packaged example"), folder)
     machine = Machine(read_linkage(file))
     live = of_linkage(machine, speed_of_driver(machine, speed), file.name)
     return _report(machine.model.description, "Live linkage", "the file", live, str(file))
