@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,6 +23,7 @@ from chainunit.drives.induction_motor import InductionMotor
 from chainunit.recordings import fit as fitting
 from chainunit.recordings import residuals
 from chainunit.recordings.fit import fit, normal_equations
+from chainunit.recordings.inspection import inspect_runs
 from chainunit.recordings.plant import Plant
 from chainunit.recordings.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.recordings.recording import Recording
@@ -190,6 +192,43 @@ def test_a_wrong_gear_strains_the_clock(loaded):
     wrong = problem_of(recording, ratio=51.0)
     (drift,) = [each for each in sensor_conflicts(wrong, fit(wrong)) if each.name == "run0.drift"]
     assert abs(drift.deviations) > 50.0 and drift.value == pytest.approx(5e-5 * drift.deviations)
+
+
+@pytest.mark.parametrize(
+    ("left_out", "column"),
+    [((), "mark"), (("mark",), "motor.count"), (("mark", "motor.count"), "motor.i")],
+)
+def test_the_stated_speed_is_that_of_the_recording(loaded, left_out, column):
+    """Another one is refused by the column that tells it best, with the speed of the recording; a run with that speed
+    is accepted."""
+    recording = without(loaded, *left_out)
+
+    def run_at(speed):
+        problem = problem_of(recording)
+        values = problem.runs[0].values | {"motor.w_ref": 50.0 * speed}
+        run = RecordedRun("run", recording, speed, values)
+        return Problem(problem.plant, [run], SOUGHT, SENSORS)
+
+    for stated in (28.0 / 26.0, 0.985):
+        with pytest.raises(InputError) as refusal:
+            inspect_runs(run_at(stated * SPEED), 1)
+        words = str(refusal.value)
+        assert f"column {column}" in words and f"crank_speed is {stated * SPEED:.5g} rad/s" in words
+        (remedy,) = re.findall('crank_speed = "(.*) rev/min"', words)
+        assert float(remedy) * np.pi / 30.0 == pytest.approx(SPEED, rel=1e-3)
+        inspect_runs(run_at(float(remedy) * np.pi / 30.0), 1)
+
+
+def test_a_fit_that_still_improves_says_so(loaded, monkeypatch):
+    """It stops after the most rounds, and names the column that it does not describe."""
+    problem = problem_of(without(loaded, "motor.count"))
+    assert fit(problem).is_ended
+    monkeypatch.setattr(fitting, "MOST_ROUNDS", 2)
+    cut = fit(problem)
+    assert not cut.is_ended
+    worst, size = cut.worst
+    assert size == pytest.approx(max(np.sqrt(np.mean(each.residuals**2)) for each in cut.comparisons))
+    assert np.sqrt(np.mean(worst.residuals**2)) == pytest.approx(size)
 
 
 def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):

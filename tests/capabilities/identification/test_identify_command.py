@@ -21,6 +21,7 @@ from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
 from chainunit.reading.results import as_data
+from chainunit.recordings import fit as fitting
 from chainunit.recordings.measurands import MEASURANDS
 from chainunit.recordings.unknown import Unknown
 from chainunit.report import blocks
@@ -305,6 +306,17 @@ def test_a_wrong_gear_is_recognised(tmp_path):
     assert any(not each["is_noise"] for each in result["residuals"])
     file = (tmp_path / "out" / "identified.toml").read_text("utf-8")
     assert file.startswith("# The model does not describe the recordings")
+
+
+def test_a_fit_without_an_end(tmp_path, monkeypatch):
+    """The model does not describe the recording, and the column from which it is farthest is named."""
+    write(tmp_path, "loaded.csv.gz", heads={})
+    (tmp_path / "mine.toml").write_text(FILE, "utf-8")
+    monkeypatch.setattr(fitting, "MOST_ROUNDS", 2)
+    found = Study.from_file(tmp_path / "mine.toml").identify()
+    assert not found.is_described and not json.loads(found.to_json())["fit"]["is_ended"]
+    (words,) = [each for each in sentences(found.found) if "still improved" in each]
+    assert re.search(r"farthest from (motor\.[iuw]|mark) of the run loaded, with residuals of", words)
 
 
 def test_what_was_known_and_is_contradicted(tmp_path):

@@ -123,9 +123,9 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no bound
+        """Whether the fit ended, the residuals may be noise, clocks, sensors and known numbers are as they are known, and no bound
         is active."""
-        if self.prior_conflicts or self.posterior.active_bounds:
+        if not self.best.is_ended or self.prior_conflicts or self.posterior.active_bounds:
             return False
         are_rejected = any(test.is_rejected for test in self.score_tests)
         return not are_rejected and all(test.is_noise for test in self.residual_tests)
@@ -187,7 +187,7 @@ def identify(
     InputError
         for a study without that table, and with a line for each fault of the recordings.
     RunError
-        where the fit does not end.
+        if the machine does not run with the start values.
     """
     plan = plan_of(config.plans)
     workers = min(2, os.cpu_count() or 1)

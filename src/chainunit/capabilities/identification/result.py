@@ -117,6 +117,7 @@ class FitCounts:
     """Counts of the fit."""
 
     rounds: int = quantity("1", "rounds of the best start")
+    is_ended: bool = part("whether a further round would not improve the fit")
     starts: int = quantity("1", "number of starts")
     agreeing: int = quantity("1", "number of starts that ended at the best fit")
 
@@ -177,7 +178,7 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
             for unknown, each in fitted_values(machine.problem, best)
             if unknown.is_nuisance
         },
-        fit=FitCounts(best.rounds, best.starts, best.agreeing),
+        fit=FitCounts(best.rounds, best.is_ended, best.starts, best.agreeing),
         remarks=list(remarks(machine)),
         courses={run.name: _courses(machine, run.name) for run in machine.plan.runs},
     )
@@ -297,7 +298,15 @@ def sentence_before_fit(plan: IdentificationPlan, before: Information) -> str:
 def sentences(machine: IdentifiedMachine) -> list[str]:
     """Sentences that judge an identification."""
     active_bounds = machine.posterior.active_bounds
-    words = [
+    words = list[str]()
+    if not machine.best.is_ended:
+        worst, size = machine.best.worst
+        words.append(
+            f"The fit still improved in its last round, and is farthest from {worst.column} of the run {worst.run}, "
+            f"with residuals of {size:.2g} times its noise; check the unit and the sign of this column, crank_speed "
+            "and the gear ratio"
+        )
+    words += [
         f"{each}: the model does not describe the recordings; check the gear ratio, the units of the columns and the "
         "data of the sensors"
         for each in machine.prior_conflicts

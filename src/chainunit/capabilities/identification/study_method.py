@@ -67,7 +67,7 @@ def identify(
     InputError
         for a study without the table [identify], and with a line for each fault of the recordings.
     RunError
-        where the fit does not end.
+        if the machine does not run with the start values.
     WriteError
         for a file that cannot be written; the others are written.
     """
