@@ -28,7 +28,7 @@ import numpy as np
 from figures import parser, save, table
 
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.score_tests import score_tests
+from chainunit.capabilities.identification.suspects import known_number_tests
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.api import ChainUnitOfChains
@@ -214,7 +214,8 @@ def result(trial: str, k: int) -> dict[str, Any]:
     asked = problem(of)
     began = time.perf_counter()
     best = fit(asked)
-    suspects = score_tests(asked, best)
+    known = known_number_tests(asked, best)
+    tests = [*known.tests, *([known.law] if known.law else [])]
     figures = {
         "kind": of.kind, "angle": of.angle, "rate": of.rate, "wrong": of.wrong, "rounds": best.rounds,
         "checks": [
@@ -222,8 +223,8 @@ def result(trial: str, k: int) -> dict[str, Any]:
             for c in residual_tests(best)
         ],
         "strains": [each.name for each in (*sensor_conflicts(asked, best), *prior_conflicts(asked.sought, best))],
-        "suspicions": {each.name: (each.change, each.deviation) for each in suspects},
-        "suspicious": [each.name for each in suspects if each.is_rejected],
+        "suspicions": {each.name: (each.change, each.deviation) for each in tests},
+        "suspicious": [each.name for each in tests if each.is_rejected],
     }  # fmt: skip
     around = posterior(asked, best)
     figures["held"] = around.active_bounds

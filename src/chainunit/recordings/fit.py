@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import RunError
+from ..core.errors import InputError, RunError
 from ..reading.results import InUnit, difference, part, result
 from .plant import ANGLE
 from .problem import MARK_ANGLE, OUTLIER, Comparison, Problem, SimulatedRun
@@ -259,10 +259,10 @@ class _LevenbergMarquardt:
         return equations
 
     def _evaluate_if_possible(self, z: Any, scales: Scales | None) -> NormalEquations | None:
-        """The normal equations at these values, or None where the machine does not run with them."""
+        """The normal equations at these values; None if they make no machine, or one that does not run."""
         try:
             return self.evaluate(z, scales)
-        except RunError:
+        except (InputError, RunError):
             return None
 
     def minimize(self, best: NormalEquations, scales: Scales | None, enough: float) -> NormalEquations:
