@@ -358,8 +358,8 @@ def _on_known_numbers(known: KnownNumbers) -> Iterator[str]:
     explaining = [str(each) for each in known.sets if each.describes]
     if explaining:
         yield (
-            f"The model describes the recordings with {'; or with '.join(explaining)}: measure these numbers, or seek "
-            "them (identify.parameter)"
+            f"The model describes the recordings with {'; or with '.join(explaining)}: measure these numbers, or "
+            "seek them (identify.parameter)"
         )
     if not explaining and known.is_law_rejected:
         yield (
