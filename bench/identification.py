@@ -556,6 +556,29 @@ def recognised(figures: Mapping[str, Any]) -> str:
     return table(["recorded machine", "trials", "recognised"], cells)
 
 
+def known_words(figures: Mapping[str, Any]) -> str:
+    """The figures of `known`."""
+    f = figures
+    return (
+        f"{f['machines']} machines, {f['numbers']:,} numbers, of which {100.0 * f['cover']:.1f} % are within their "
+        f"intervals of 95 %. {100.0 * f['alarms']:.2g} % of the machines are taken for another one."
+    )
+
+
+def doubted_words(figures: Mapping[str, Any]) -> str:
+    """The figures of `doubted`."""
+    f = figures
+    return (
+        f"{f['machines']} machines, of which {f['told']} are told. Of these, {f['both']} have both wrong numbers "
+        f"among their suspects, which are {f['suspects']:.0f} (median), and {f['one']} have one of them at least; "
+        f"{f['first']} have the two as first set of suspects. An identification with its suspects takes "
+        f"{f['seconds']:.0f} s (median)."
+    )
+
+
+SUSPICION = {"known": known_words, "doubted": doubted_words}
+
+
 def tables(figures: Mapping[str, Any]) -> dict[str, str]:
     """The tables and sentences of the figures in Markdown, by name."""
     own = [trial for trial in ("bare", "weighed") if trial in figures]
@@ -564,6 +587,7 @@ def tables(figures: Mapping[str, Any]) -> dict[str, str]:
         **{f"{trial}_words": words(figures[trial]) for trial in own},
         **{f"{trial}_goals": goal_table(figures[trial]) for trial in own},
         "recognised": recognised(figures),
+        **{f"{trial}_words": words(figures[trial]) for trial, words in SUSPICION.items() if trial in figures},
     }
 
 

@@ -140,6 +140,7 @@ def fit(
     progress: Callable[[int, float], None] = lambda *_: None,
     starts: int = 1,
     seed: int = 0,
+    most: int | None = None,
 ) -> Fit:
     """The values of the unknowns that fit best, from `z` or from the start values, and from `starts` - 1 random ones.
 
@@ -147,6 +148,10 @@ def fit(
     step with a simulated one of another load, and each of the starts costs little. There, and in the whole, a column
     counts by its deviation as long as it deviates by more than its noise: else the most exact one, such as the count
     of an encoder, alone would lead. The unknowns of clocks and sensors follow all others without simulation.
+
+    Parameters
+    ----------
+    most : most rounds of the first turns, and of the whole; without it `MOST_ROUNDS`
 
     Raises
     ------
@@ -156,7 +161,9 @@ def fit(
     counter = itertools.count(1)
 
     def rounds_of(part: Problem) -> _LevenbergMarquardt:
-        return _LevenbergMarquardt(part, workers, lambda cost: progress(next(counter), cost))
+        return _LevenbergMarquardt(
+            part, workers, lambda cost: progress(next(counter), cost), most or MOST_ROUNDS
+        )
 
     first, rng = _first_turns(problem), np.random.default_rng(seed)
     z = problem.initial_point(workers) if z is None else z
@@ -234,8 +241,9 @@ def _measured_noises(at: NormalEquations) -> dict[tuple[str, str], float]:
 class _LevenbergMarquardt:
     """The rounds of a fit, by Levenberg's and Marquardt's method."""
 
-    def __init__(self, problem: Problem, workers: int, progress: Callable[[float], None]) -> None:
+    def __init__(self, problem: Problem, workers: int, progress: Callable[[float], None], most: int) -> None:
         self._problem, self._workers, self._progress, self._count = problem, workers, progress, 0
+        self._most = most
         self._damping = DAMPING
         self.is_cut = False
         """whether the rounds were spent while the fit still improved"""
@@ -243,7 +251,7 @@ class _LevenbergMarquardt:
     @property
     def are_spent(self) -> bool:
         """Whether all rounds from a start are made."""
-        return self._count >= MOST_ROUNDS
+        return self._count >= self._most
 
     def reweight(self, at: NormalEquations, scales: Scales | None) -> NormalEquations:
         """The same point, with columns that count otherwise."""

@@ -45,8 +45,10 @@ WRONG, ASSUMED = 0.2, 1.0
 """Standard deviation of a known number that may be wrong, in parts of it, and of one that is assumed."""
 RANGE = 4.0
 """Factor by which a known number may be wrong."""
-FEW, SEARCHES = 3, 4
+FEW, SEARCHES = 3, 3
 """Number of sets of suspects with which the recordings are fitted again in a search, and most searches."""
+MOST_ROUNDS = 15
+"""Most rounds of a fit with suspects: it begins near its end if they are the right ones."""
 MARGIN = 25.0
 """Sum of squares, in parts of that of noise, by which a set of suspects may be worse than the best one."""
 MOST_SETS = 12
@@ -191,34 +193,44 @@ class _Search:
         self._failed = set[frozenset[str]]()
 
     def sets(self) -> Iterator[SuspectSet]:
-        """The sets that explain the recordings about as well as the best one, the best first."""
+        """The sets that explain the recordings about as well as the best one, the best first. If none explains them,
+        the form is that of a point which is far from the right one, and the best sets are named without a margin."""
         freed = self._best_freed()
-        ranked = freed.ranked()
+        ranked, is_explained = freed.ranked(), any(self._describes(names) for names in self._fits)
         near = [(names, cost) for names, cost in ranked if cost - ranked[0][1] < MARGIN]
+        if not is_explained:
+            near = ranked[:MOST_SETS]
         smallest = [(names, cost) for names, cost in near if not any(other < names for other, _ in near)]
         for k, (names, cost) in enumerate(smallest[:MOST_SETS]):
-            if k < FEW:
+            if is_explained and k < FEW:
                 self._fit_with(names, freed)
             yield self._set(names, freed, cost - smallest[0][1])
 
     def _best_freed(self) -> _Freed:
         """The known numbers, freed around the best fit with one or two of them."""
-        freed = _Freed.around(self._problem, self._best, self._more, self._workers)
-        for _ in range(SEARCHES):
-            ranked = (names for names, _ in freed.ranked()[: 2 * FEW])
-            promising = [names for names in ranked if names not in self._fits][:FEW]
-            is_explained = False
-            for names in promising:
-                self._fit_with(names, freed)
-                if is_explained := self._describes(names) is True:
-                    break
-            if not promising or not self._fits:
+        first = freed = _Freed.around(self._problem, self._best, self._more, self._workers)
+        for k in range(SEARCHES):
+            ranked = [names for names, _ in freed.ranked()]
+            if self._try(ranked, freed) or not self._fits:
                 break
-            winner = min(self._fits, key=lambda names: _cost(*self._fits[names]))
-            freed = _Freed.around(*self._fits[winner], self._more, self._workers)
-            if is_explained:
-                break
-        return freed
+            if k == 0:
+                # far from straight, the form shows a second number only after the first one is right
+                self._try([names for names in ranked if len(names) == 1], first)
+            freed = _Freed.around(*self._fits[self._winner()], self._more, self._workers)
+        return _Freed.around(*self._fits[self._winner()], self._more, self._workers) if self._fits else freed
+
+    def _winner(self) -> frozenset[str]:
+        return min(self._fits, key=lambda names: _cost(*self._fits[names]))
+
+    def _try(self, ranked: Sequence[frozenset[str]], freed: _Freed) -> bool:
+        """Fit the recordings with the first of these sets that were not tried; whether the search has its end, as one
+        of them describes the recordings, or none is left."""
+        promising = [names for names in ranked[: 2 * FEW] if names not in self._fits][:FEW]
+        for names in promising:
+            self._fit_with(names, freed)
+            if self._describes(names):
+                return True
+        return not promising
 
     def _fit_with(self, names: frozenset[str], freed: _Freed) -> None:
         """Fit the recordings with these numbers sought, too, from the values that the quadratic form promises."""
@@ -226,10 +238,12 @@ class _Search:
             return
         self._progress(" and ".join(sorted(names)))
         wider, z = _wider(self._problem, self._best.z, [u for u in self._more if u.name in names])
-        for name, x in freed.values(names).items():
-            z[wider.place[name]] = x
+        for name, x in freed.point(names).items():
+            if name in wider.place:
+                z[wider.place[name]] = x
+        z = np.clip(z, *wider.bounds)
         try:
-            self._fits[names] = wider, fit(wider, z, self._workers)
+            self._fits[names] = wider, fit(wider, z, self._workers, most=MOST_ROUNDS)
         except (RunError, InputError):
             self._failed.add(names)
 
@@ -285,10 +299,13 @@ class _Freed:
         free = [k for k in range(len(at.z)) if k not in set(places)]
         self._now = at.z[places] - np.array([u.start for u in more])
         self._prior = np.array([u.prior_deviation for u in more]) ** -2.0
+        self._free = {u.name: float(at.z[k]) for k, u in enumerate(problem.unknowns) if k in set(free)}
         scale = 1.0 / np.sqrt(np.diag(at.matrix)[free])
         inner = at.matrix[np.ix_(free, free)] * np.outer(scale, scale)
         cross = scale[:, None] * at.fisher[np.ix_(free, places)]
         own: Any = np.linalg.solve(inner, np.column_stack([cross, scale * at.gradient[free]]))
+        # the steps of all others, and how they follow these numbers
+        self._others = scale * own[:, -1], scale[:, None] * own[:, :-1]
         self._alone = np.diag(at.fisher)[places]
         self._form = at.fisher[np.ix_(places, places)] - cross.T @ own[:, :-1]
         # of the recordings alone: the weights of these numbers are counted by themselves
@@ -317,6 +334,16 @@ class _Freed:
         places = self._places(names)
         changes = self._solution(places)[0]
         return {self._names[k]: self._more[k].start + float(x) for k, x in zip(places, changes, strict=True)}
+
+    def point(self, names: Collection[str]) -> dict[str, float]:
+        """The same with the values of all other unknowns that follow."""
+        values = self.values(names)
+        known = zip(self._more, self._now, strict=True)
+        steps = [values.get(u.name, u.start) - u.start - now for u, now in known]
+        own, following = self._others
+        changes = own - following @ np.array(steps)
+        others = zip(self._free.items(), changes, strict=True)
+        return {name: x + float(change) for (name, x), change in others} | values
 
     def ranked(self) -> list[tuple[frozenset[str], float]]:
         """The sets of one and of two numbers with their sums of squares, the best first."""
