@@ -35,7 +35,8 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
     @property
     def numbers(self) -> pd.DataFrame:
         """The sought numbers by name: value, standard deviation, interval of 95 % (low, high), unit, and whether the
-        recordings determine the number; the value of one that they do not determine is no number."""
+        recordings determine the number; the value of one that they do not determine is no number. If the model does
+        not describe the recordings, deviation and interval are those that were known before."""
         import pandas as pd
 
         rows = {
