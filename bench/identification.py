@@ -30,7 +30,12 @@ import numpy as np
 from figures import parser, save, table
 
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.suspects import known_number_tests, suspect_sets
+from chainunit.capabilities.identification.suspects import (
+    REJECTION,
+    KnownNumbers,
+    known_number_tests,
+    suspect_sets,
+)
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.api import ChainUnitOfChains
@@ -320,6 +325,12 @@ def stated_problem(of: Stated) -> Problem:
     return Problem(Plant(model, columns, [u.name for u in asked]), runs, asked, sensors)
 
 
+def is_shown(of: Stated, name: str, known: KnownNumbers) -> bool:
+    """Whether the recordings show that a known number is wrong, if all others are right."""
+    (test,) = [each for each in known.tests if each.name == name]
+    return abs(of.stated[name] - of.values[name]) > REJECTION * test.deviation
+
+
 def stated_result(trial: str, k: int) -> dict[str, Any]:
     """The identification of the machine of this number."""
     of = stated(trial, k)
@@ -334,7 +345,8 @@ def stated_result(trial: str, k: int) -> dict[str, Any]:
     )
     sets = () if is_described else suspect_sets(asked, best)
     return {
-        "wrong": of.wrong, "is_described": is_described, "is_ended": best.is_ended, "is_noise": is_noise,
+        "wrong": of.wrong, "shown": [name for name in of.wrong if is_shown(of, name, known)],
+        "is_described": is_described, "is_ended": best.is_ended, "is_noise": is_noise,
         "strains": [each.name for each in conflicts], "held": around.active_bounds, "rounds": best.rounds,
         "rejected": [each.name for each in known.tests if each.is_rejected], "law": known.is_law_rejected,
         "sets": [
@@ -483,6 +495,7 @@ def suspicion(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "machines": len(trials),
         "told": len(told),
         "both": sum(own <= some for own, some in zip(wrong, suspects, strict=True)),
+        "shown": sum(set(each["shown"]) <= some for each, some in zip(told, suspects, strict=True)),
         "one": sum(bool(own & some) for own, some in zip(wrong, suspects, strict=True)),
         "first": sum(
             bool(each["sets"]) and own == set(each["sets"][0]["names"])
@@ -570,7 +583,8 @@ def doubted_words(figures: Mapping[str, Any]) -> str:
     f = figures
     return (
         f"{f['machines']} machines, of which {f['told']} are told. Of these, {f['both']} have both wrong numbers "
-        f"among their suspects, which are {f['suspects']:.0f} (median), and {f['one']} have one of them at least; "
+        f"among their suspects, which are {f['suspects']:.0f} (median), {f['shown']} have all those that the "
+        f"recordings show to be wrong if all others are right, and {f['one']} have one at least; "
         f"{f['first']} have the two as first set of suspects. An identification with its suspects takes "
         f"{f['seconds']:.0f} s (median)."
     )

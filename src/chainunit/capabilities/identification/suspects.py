@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -51,6 +51,8 @@ MOST_ROUNDS = 15
 """Most rounds of a fit with suspects: it begins near its end if they are the right ones."""
 MARGIN = 25.0
 """Sum of squares, in parts of that of noise, by which a set of suspects may be worse than the best one."""
+NEARLY, OTHERS = 40.0, 6
+"""Factor on this margin within which the quadratic form is no judge, and number of sets that are fitted there."""
 MOST_SETS = 12
 """Most sets of suspects that are named."""
 _CHANGE = 0.05
@@ -196,15 +198,35 @@ class _Search:
         """The sets that explain the recordings about as well as the best one, the best first. If none explains them,
         the form is that of a point which is far from the right one, and the best sets are named without a margin."""
         freed = self._best_freed()
-        ranked, is_explained = freed.ranked(), any(self._describes(names) for names in self._fits)
-        near = [(names, cost) for names, cost in ranked if cost - ranked[0][1] < MARGIN]
-        if not is_explained:
-            near = ranked[:MOST_SETS]
-        smallest = [(names, cost) for names, cost in near if not any(other < names for other, _ in near)]
-        for k, (names, cost) in enumerate(smallest[:MOST_SETS]):
-            if is_explained and k < FEW:
+        ranked = freed.ranked()
+        costs = {names: cost - ranked[0][1] for names, cost in ranked}
+        if any(self._describes(names) for names in self._fits):
+            # the form is that of small changes: what it holds for near is fitted
+            enough = [names for names, cost in costs.items() if cost < MARGIN]
+            near = [
+                names
+                for names, cost in _sorted(costs)
+                if cost < NEARLY * MARGIN and not any(other < names for other in enough)
+            ]
+            for names in near[:OTHERS]:
                 self._fit_with(names, freed)
-            yield self._set(names, freed, cost - smallest[0][1])
+            of_fits = self._costs()
+            costs = {names: of_fits.get(names, max(0.0, cost)) for names, cost in costs.items()}
+            kept = _smallest(names for names, cost in _sorted(costs) if cost < MARGIN)
+        else:
+            kept = list(costs)
+        for names in kept[:MOST_SETS]:
+            yield self._set(names, freed, costs[names])
+
+    def _costs(self) -> dict[frozenset[str], float]:
+        """The sums of squares of the fits beyond the least one, in parts of that of its noise."""
+        weights = self._fits[self._winner()][1].weights
+        scales = {key: 1.0 / weight for key, weight in weights.items()}
+        costs = {
+            names: assemble(problem, best.z, best.comparisons, scales).cost
+            for names, (problem, best) in self._fits.items()
+        }
+        return {names: cost - min(costs.values()) for names, cost in costs.items()}
 
     def _best_freed(self) -> _Freed:
         """The known numbers, freed around the best fit with one or two of them."""
@@ -263,6 +285,16 @@ class _Search:
             for name, x in sorted(values.items(), key=lambda each: -abs(each[1] / known[each[0]].start - 1.0))
         )
         return SuspectSet(tuple(suspects), excess, self._describes(names))
+
+
+def _sorted(costs: Mapping[frozenset[str], float]) -> list[tuple[frozenset[str], float]]:
+    return sorted(costs.items(), key=lambda each: each[1])
+
+
+def _smallest(sets: Iterable[frozenset[str]]) -> list[frozenset[str]]:
+    """The sets that have none of the others in them."""
+    listed = list(sets)
+    return [names for names in listed if not any(other < names for other in listed)]
 
 
 def _describes(problem: Problem, best: Fit, suspects: Collection[str]) -> bool:
