@@ -10,6 +10,8 @@
 # - `weighed`: masses are known to 5 %, gains of the sensors to 1 %.
 # - `wrong`: the recorded machine is another one than the fitted model.
 # - `slight`: it is another one, too, but moves the torque by no more than some percent, or at standstill alone.
+# - `known`: masses, inertias, motor and gains are known; the feed, the friction and a weighed web are sought.
+# - `doubted`: the same, with any two of the known numbers wrong by 20 %.
 
 # %%
 from __future__ import annotations
@@ -28,7 +30,12 @@ import numpy as np
 from figures import parser, save, table
 
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.score_tests import score_tests
+from chainunit.capabilities.identification.suspects import (
+    REJECTION,
+    KnownNumbers,
+    known_number_tests,
+    suspect_sets,
+)
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.api import ChainUnitOfChains
@@ -79,7 +86,19 @@ SLIGHT: dict[str, dict[str, float]] = {
 }
 """The same with little difference."""
 OTHERS = {"wrong": WRONG, "slight": SLIGHT}
-TRIALS = {"bare": 200, "weighed": 100, "wrong": 102, "slight": 20}
+CONVERTER = [f"motor.{loop}_control.{gain}" for loop in ("speed", "current") for gain in ("kp", "ki")]
+MOTOR = ["motor.armature.R", "motor.armature.L", "motor.armature.k", "motor.rotor.J"]
+DIMENSIONS = [f"machine.{name}" for name in ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")]
+MASSES = [
+    *(f"machine.{body}.{x}" for body in ("crank", "coupler", "rocker") for x in ("m", "s", "I")),
+    *(f"machine.{rod}" for rod in RODS if rod != "left.web_mass"),
+]
+KNOWN = [*CONVERTER, *MOTOR, *DIMENSIONS, *MASSES]
+"""Numbers that are known in the trials `known`, and two of which are wrong in `doubted`."""
+SPREAD, MISTAKE, WEB, BRIEF = 0.15, 0.2, 0.1, 30.0
+"""Part by which known masses, motors and gains are drawn around the packaged ones; that by which two of them are
+stated wrong; standard deviation of the weighed web, in parts of it; and the time of a recording [s]."""
+TRIALS = {"bare": 200, "weighed": 100, "wrong": 102, "slight": 20, "known": 100, "doubted": 100}
 """Number of machines of each kind of trial."""
 SHARP = 0.005
 """Standard deviation in parts of the value from which on a number is told sharply."""
@@ -214,7 +233,8 @@ def result(trial: str, k: int) -> dict[str, Any]:
     asked = problem(of)
     began = time.perf_counter()
     best = fit(asked)
-    suspects = score_tests(asked, best)
+    known = known_number_tests(asked, best)
+    tests = [*known.tests, *([known.law] if known.law else [])]
     figures = {
         "kind": of.kind, "angle": of.angle, "rate": of.rate, "wrong": of.wrong, "rounds": best.rounds,
         "checks": [
@@ -222,8 +242,8 @@ def result(trial: str, k: int) -> dict[str, Any]:
             for c in residual_tests(best)
         ],
         "strains": [each.name for each in (*sensor_conflicts(asked, best), *prior_conflicts(asked.sought, best))],
-        "suspicions": {each.name: (each.change, each.deviation) for each in suspects},
-        "suspicious": [each.name for each in suspects if each.is_rejected],
+        "suspicions": {each.name: (each.change, each.deviation) for each in tests},
+        "suspicious": [each.name for each in tests if each.is_rejected],
     }  # fmt: skip
     around = posterior(asked, best)
     figures["held"] = around.active_bounds
@@ -237,6 +257,111 @@ def result(trial: str, k: int) -> dict[str, Any]:
         ]  # fmt: skip
     figures["seconds"] = time.perf_counter() - began
     return figures
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A machine of which all but a few numbers are known: the true `values` by full name, the `stated` ones of the
+    known numbers, and those of them that are `wrong`."""
+
+    seed: int
+    values: dict[str, float]
+    stated: dict[str, float]
+    wrong: tuple[str, ...]
+
+
+def stated(trial: str, k: int) -> Stated:
+    """The machine of this number of the trials `known` and `doubted`, whose numbers are the same."""
+    rng, base = np.random.default_rng([k, 41]), drive("dc")
+    motor = DcMotor.parameter_layout.by_name(base.parameters)
+    packaged = {f"machine.{name}": x for name, x in base.machine.by_name.items()}
+    packaged |= {f"motor.{name}": x for name, x in motor.items()}
+    known = {name: float(packaged[name] * (1.0 + SPREAD * rng.uniform(-1.0, 1.0))) for name in KNOWN}
+    known |= {name: float(packaged[name]) for name in DIMENSIONS}
+    values = {f"machine.{name}": float(rng.uniform(*RANGES[name])) for name in (*FEED, "pin.friction")}
+    values["machine.left.web_mass"] = float(packaged["machine.left.web_mass"] * rng.uniform(0.85, 1.15))
+    wrong = tuple(map(str, rng.choice(KNOWN, 2, replace=False))) if trial == "doubted" else ()
+    mistakes = {name: known[name] * (1.0 + MISTAKE * float(rng.choice([-1.0, 1.0]))) for name in wrong}
+    return Stated(k, values | known, known | mistakes, wrong)
+
+
+def stated_problem(of: Stated) -> Problem:
+    """The recordings of a loaded and an empty run, with what is sought, by the drive as it is stated."""
+    rng, speed, base, runs = np.random.default_rng([of.seed, 43]), SPEED["dc"], drive("dc"), []
+    columns, mark = measured("dc", "mark"), float(rng.uniform(-0.35, 0.35))
+    for name in ("loaded", "empty"):
+        none = dict.fromkeys((f"machine.{x}" for x in FEED), 0.0) if name == "empty" else {}
+        logger = Logger(
+            rate=200.0, noise=NOISE, full=FULL, bits=BITS, mark_angle=mark,
+            offset={"motor.i": float(0.004 * FULL["motor.i"] * rng.standard_normal())},
+            drift=float(rng.uniform(-5e-5, 5e-5)),
+        )  # fmt: skip
+        known = {"motor.w_ref": base.ratio * speed}
+        run = HiddenRun(
+            speed, BRIEF, of.values | known | none, float(rng.uniform(0.0, 2.0 * math.pi)),
+            float(rng.uniform(293.15, 325.0)),
+        )  # fmt: skip
+        runs.append(RecordedRun(name, synthetic(base, columns, run, logger, rng), speed, known | none))
+    numbers = {
+        kind: {name.removeprefix(kind): x for name, x in of.stated.items() if name.startswith(kind)}
+        for kind in ("motor.", "machine.")
+    }
+    motor = DcMotor.parameter_layout.from_names(numbers["motor."], base.parameters)
+    web = of.values["machine.left.web_mass"] * (1.0 + WEB * float(rng.standard_normal()))
+    units = {
+        v.name: v.unit
+        for x in (ChamberForces.parameter_layout, ChamberForces.input_layout)
+        for v in x.variables
+    }
+    asked = [
+        *(Unknown.within(f"machine.{name}", units[name], *RANGES[name]) for name in (*FEED, "pin.friction")),
+        Unknown("machine.left.web_mass", "kg", web, 0.5 * web, 1.5 * web, WEB * web),
+    ]
+    model = Drive(DcMotor, motor, base.machine.replace(numbers["machine."]))
+    sensors = {
+        name: Sensor(NOISE, 2.0 * FULL[name] / 2**BITS, 0.0, 0.02 * FULL[name] if name == "motor.i" else 0.0)
+        for name in columns
+    }
+    return Problem(Plant(model, columns, [u.name for u in asked]), runs, asked, sensors)
+
+
+def is_shown(of: Stated, name: str, known: KnownNumbers) -> bool:
+    """Whether the recordings show that a known number is wrong, if all others are right."""
+    (test,) = [each for each in known.tests if each.name == name]
+    return abs(of.stated[name] - of.values[name]) > REJECTION * test.deviation
+
+
+def stated_result(trial: str, k: int) -> dict[str, Any]:
+    """The identification of the machine of this number."""
+    of = stated(trial, k)
+    asked = stated_problem(of)
+    began = time.perf_counter()
+    best = fit(asked)
+    known, around = known_number_tests(asked, best), posterior(asked, best)
+    conflicts = [*sensor_conflicts(asked, best), *prior_conflicts(asked.sought, best)]
+    is_noise = all(test.is_noise for test in residual_tests(best))
+    is_described = (
+        best.is_ended and is_noise and not (conflicts or around.active_bounds or known.are_rejected)
+    )
+    sets = () if is_described else suspect_sets(asked, best)
+    return {
+        "wrong": of.wrong, "shown": [name for name in of.wrong if is_shown(of, name, known)],
+        "is_described": is_described, "is_ended": best.is_ended, "is_noise": is_noise,
+        "strains": [each.name for each in conflicts], "held": around.active_bounds, "rounds": best.rounds,
+        "rejected": [each.name for each in known.tests if each.is_rejected], "law": known.is_law_rejected,
+        "sets": [
+            {"names": [x.name for x in each.suspects], "excess": each.excess, "describes": each.describes}
+            for each in sets
+        ],
+        "numbers": [
+            {
+                "name": m.name, "true": of.values[m.name], "value": m.value, "deviation": m.deviation, "low": m.low,
+                "high": m.high, "spread": m.prior_deviation, "fitted": float(x), "bound": float(s),
+            }
+            for m, x, s in zip(around.marginals, best.z, best.deviations, strict=False)
+        ],
+        "seconds": time.perf_counter() - began,
+    }  # fmt: skip
 
 
 # %% [markdown]
@@ -347,7 +472,39 @@ def summary(trials: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]
             if own := [each for each in trials[trial] if each["wrong"] == name]:
                 found = float(np.mean([is_wrong(each) for each in own]))
                 figures.setdefault(trial, {})[name] = {"machines": len(own), "found": found}
+    if own := trials["known"]:
+        figures["known"] = {
+            "machines": len(own),
+            **coverage(own),
+            "alarms": float(np.mean([not each["is_described"] for each in own])),
+            "seconds": float(np.median([each["seconds"] for each in own])),
+        }
+    if own := trials["doubted"]:
+        figures["doubted"] = suspicion(own)
     return figures
+
+
+def suspicion(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """How many machines with two wrong numbers are not described, and what the suspects of these contain: both wrong
+    numbers, in one set or in several; and the coverage of the machines that are described nevertheless."""
+    told = [each for each in trials if not each["is_described"]]
+    suspects = [{name for some in each["sets"] for name in some["names"]} for each in told]
+    wrong = [set(each["wrong"]) for each in told]
+    quiet = [each for each in trials if each["is_described"]]
+    return {
+        "machines": len(trials),
+        "told": len(told),
+        "both": sum(own <= some for own, some in zip(wrong, suspects, strict=True)),
+        "shown": sum(set(each["shown"]) <= some for each, some in zip(told, suspects, strict=True)),
+        "one": sum(bool(own & some) for own, some in zip(wrong, suspects, strict=True)),
+        "first": sum(
+            bool(each["sets"]) and own == set(each["sets"][0]["names"])
+            for own, each in zip(wrong, told, strict=True)
+        ),
+        "suspects": float(np.median([len(some) for some in suspects])) if told else 0.0,
+        "cover_of_others": coverage(quiet)["cover"] if quiet else None,
+        "seconds": float(np.median([each["seconds"] for each in trials])),
+    }
 
 
 def kept(folder: Path, trial: str, count: int) -> list[dict[str, Any]]:
@@ -412,6 +569,30 @@ def recognised(figures: Mapping[str, Any]) -> str:
     return table(["recorded machine", "trials", "recognised"], cells)
 
 
+def known_words(figures: Mapping[str, Any]) -> str:
+    """The figures of `known`."""
+    f = figures
+    return (
+        f"{f['machines']} machines, {f['numbers']:,} numbers, of which {100.0 * f['cover']:.1f} % are within their "
+        f"intervals of 95 %. {100.0 * f['alarms']:.2g} % of the machines are taken for another one."
+    )
+
+
+def doubted_words(figures: Mapping[str, Any]) -> str:
+    """The figures of `doubted`."""
+    f = figures
+    return (
+        f"{f['machines']} machines, of which {f['told']} are told. Of these, {f['both']} have both wrong numbers "
+        f"among their suspects, which are {f['suspects']:.0f} (median), {f['shown']} have all those that the "
+        f"recordings show to be wrong if all others are right, and {f['one']} have one at least; "
+        f"{f['first']} have the two as first set of suspects. An identification with its suspects takes "
+        f"{f['seconds']:.0f} s (median)."
+    )
+
+
+SUSPICION = {"known": known_words, "doubted": doubted_words}
+
+
 def tables(figures: Mapping[str, Any]) -> dict[str, str]:
     """The tables and sentences of the figures in Markdown, by name."""
     own = [trial for trial in ("bare", "weighed") if trial in figures]
@@ -420,6 +601,7 @@ def tables(figures: Mapping[str, Any]) -> dict[str, str]:
         **{f"{trial}_words": words(figures[trial]) for trial in own},
         **{f"{trial}_goals": goal_table(figures[trial]) for trial in own},
         "recognised": recognised(figures),
+        **{f"{trial}_words": words(figures[trial]) for trial, words in SUSPICION.items() if trial in figures},
     }
 
 
@@ -437,7 +619,7 @@ def main() -> None:
         for k in range(count):
             file = given.folder / f"{trial}-{k}.json"
             if not file.exists():
-                figures = result(trial, k)
+                figures = (stated_result if trial in ("known", "doubted") else result)(trial, k)
                 file.write_text(json.dumps(figures) + "\n", "utf-8")
                 print(
                     f"{trial} {k + 1} of {count}: {figures['rounds']} rounds, {figures['seconds']:.1f} s",

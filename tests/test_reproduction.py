@@ -216,7 +216,10 @@ def test_command_line(tmp_path):
     for r in rows:
         assert r["shown"] in page and r["shown"] in text
     assert all(f"({figure.name})" in text for figure in (tmp_path / "out").glob("*.png"))
-    assert "21 agree, 43 corrected, 89 that the papers should state." in process.stdout
+    # the answer comes first
+    count = "21 agree, 43 corrected, 89 that the papers should state."
+    assert -1 < process.stdout.find(count) < process.stdout.find("Paper 000")
+    assert -1 < page.find('id="opening"') < page.find(count) < page.find("<table")
 
 
 def test_the_documentation_shows_these_rows():

@@ -78,6 +78,7 @@ def report(rows: Sequence[PaperNumber]) -> Report:
         "The papers, reproduced and corrected",
         "Every number that the papers print, beside the computed one",
         {"chainunit": __version__, "rows": as_data(rows)},
-        (),
-        (*sections, Section("count", "Count", (Text((count,)),))),
+        (Text((count,)),),
+        sections,
+        opening_title="The answer",
     )

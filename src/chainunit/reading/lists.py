@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
+from ..core import units
 from ..core.errors import Faults, InputError, meant, near_name, one_of, refusal_prefix, shown
 from ..core.quantities import Variable
 from .tables import given_values, read_table, schema, to_number
@@ -81,13 +82,18 @@ class Entry(Faults):
         return None
 
     def quantity(self, name: str, variable: Variable, value: Any) -> float:
-        """The `value` of a key in the unit of the `variable`; not a number, with a fault, where it is wrong."""
+        """The `value` of a key in the unit of the `variable`; not a number, with a fault, where it is wrong. An angle
+        of more than a turn without a unit is one in degrees."""
         key = self.key(name)
         with self.collected():
             try:
-                return to_number(dataclasses.replace(variable, name=key), value)
+                number = to_number(dataclasses.replace(variable, name=key), value)
             except ValueError as error:
                 raise InputError(f"{error}{self.more}", key) from None
+            if variable.unit == "rad" and not units.has_unit(value) and abs(number) > 2.0 * math.pi:
+                words = f'is more than a turn; {units.IN_RADIANS}; was "{value} deg" meant?'
+                raise InputError(f"{key}: {words}{self.more}", key)
+            return number
         return math.nan
 
 

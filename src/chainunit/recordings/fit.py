@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.brief import briefly_shown
-from ..core.errors import RunError
+from ..core.errors import InputError, RunError
 from ..reading.results import InUnit, difference, part, result
 from .plant import ANGLE
 from .problem import MARK_ANGLE, OUTLIER, Comparison, Problem, SimulatedRun
@@ -119,11 +119,20 @@ def assemble(
 @dataclass(frozen=True)
 class Fit(NormalEquations):
     """The best fit, and the number of `rounds` that it took. `starts` is the number of points from which it was
-    sought, and `agreeing` of them led to it."""
+    sought, and `agreeing` of them led to it. `is_ended` tells whether no further round would improve it; a fit that
+    still improves after `MOST_ROUNDS` is that of a model which does not describe the recordings."""
 
     rounds: int
     starts: int
     agreeing: int
+    is_ended: bool = True
+
+    @property
+    def worst(self) -> tuple[Comparison, float]:
+        """The comparison with the largest residuals, and their RMS in standard deviations of its noise."""
+        squares = self.mean_squares
+        worst = max(self.comparisons, key=lambda each: squares[each.run, each.column])
+        return worst, math.sqrt(squares[worst.run, worst.column])
 
 
 def fit(
@@ -133,6 +142,7 @@ def fit(
     progress: Callable[[int, float], None] = lambda *_: None,
     starts: int = 1,
     seed: int = 0,
+    most: int | None = None,
 ) -> Fit:
     """The values of the unknowns that fit best, from `z` or from the start values, and from `starts` - 1 random ones.
 
@@ -141,15 +151,21 @@ def fit(
     counts by its deviation as long as it deviates by more than its noise: else the most exact one, such as the count
     of an encoder, alone would lead. The unknowns of clocks and sensors follow all others without simulation.
 
+    Parameters
+    ----------
+    most : most rounds of the first turns, and of the whole; without it `MOST_ROUNDS`
+
     Raises
     ------
     RunError
-        where the fit does not end in `MOST_ROUNDS` rounds.
+        if the machine does not run with the start values.
     """
     counter = itertools.count(1)
 
     def rounds_of(part: Problem) -> _LevenbergMarquardt:
-        return _LevenbergMarquardt(part, workers, lambda cost: progress(next(counter), cost))
+        return _LevenbergMarquardt(
+            part, workers, lambda cost: progress(next(counter), cost), most or MOST_ROUNDS
+        )
 
     first, rng = _first_turns(problem), np.random.default_rng(seed)
     z = problem.initial_point(workers) if z is None else z
@@ -171,7 +187,7 @@ def fit(
     whole = rounds.minimize(whole, _measured_noises(whole), 0.0)
     agreeing = sum(end.cost < SAME_POINT * best.cost for end in ends) if ends else 1
     point = whole.z, whole.comparisons, whole.weights, whole.cost, whole.gradient, whole.fisher
-    return Fit(*point, whole.matrix, next(counter) - 1, starts, agreeing)
+    return Fit(*point, whole.matrix, next(counter) - 1, starts, agreeing, not rounds.is_cut)
 
 
 def _first_turns(problem: Problem) -> Problem:
@@ -200,7 +216,7 @@ def _random_start(problem: Problem, z: Any, rng: Any) -> Any:
 def _fit_roughly(rounds: _LevenbergMarquardt, z: Any) -> NormalEquations:
     """From `z` on, the fit with columns that count by their deviations, until all deviate by their noise."""
     best = rounds.evaluate(z, None)
-    while max((scales := _scales(best)).values()) > NEAR:
+    while not rounds.are_spent and max((scales := _scales(best)).values()) > NEAR:
         before = best.mean_squares
         best = rounds.minimize(best, scales, 0.02)
         if all(best.mean_squares[key] > 0.9 * share for key, share in before.items()):
@@ -227,9 +243,17 @@ def _measured_noises(at: NormalEquations) -> dict[tuple[str, str], float]:
 class _LevenbergMarquardt:
     """The rounds of a fit, by Levenberg's and Marquardt's method."""
 
-    def __init__(self, problem: Problem, workers: int, progress: Callable[[float], None]) -> None:
+    def __init__(self, problem: Problem, workers: int, progress: Callable[[float], None], most: int) -> None:
         self._problem, self._workers, self._progress, self._count = problem, workers, progress, 0
+        self._most = most
         self._damping = DAMPING
+        self.is_cut = False
+        """whether the rounds were spent while the fit still improved"""
+
+    @property
+    def are_spent(self) -> bool:
+        """Whether all rounds from a start are made."""
+        return self._count >= self._most
 
     def reweight(self, at: NormalEquations, scales: Scales | None) -> NormalEquations:
         """The same point, with columns that count otherwise."""
@@ -245,18 +269,14 @@ class _LevenbergMarquardt:
         return equations
 
     def _evaluate_if_possible(self, z: Any, scales: Scales | None) -> NormalEquations | None:
-        """The normal equations at these values, or None where the machine does not run with them."""
-        if self._count == MOST_ROUNDS:
-            raise RunError(
-                f"the fit did not end in {MOST_ROUNDS} rounds; start nearer, or give narrower bounds"
-            )
+        """The normal equations at these values; None if they make no machine, or one that does not run."""
         try:
             return self.evaluate(z, scales)
-        except RunError:
+        except (InputError, RunError):
             return None
 
     def minimize(self, best: NormalEquations, scales: Scales | None, enough: float) -> NormalEquations:
-        """The least sum of squares, up to the share `enough` of it."""
+        """The least sum of squares, up to the share `enough` of it, or where the rounds are spent."""
         problem, growth = self._problem, 2.0
         best = self.reweight(best, scales)
         while self._damping < 1e12:
@@ -264,6 +284,9 @@ class _LevenbergMarquardt:
             step = z - best.z
             expected = float(2.0 * step @ best.gradient - step @ best.matrix @ step)
             if expected < max(ENOUGH, enough * best.cost):
+                return best
+            if self.are_spent:
+                self.is_cut = True
                 return best
             trial = self._evaluate_if_possible(z, scales)
             gain = best.cost - trial.cost if trial else 0.0

@@ -16,8 +16,8 @@ from ..core.units import scale
 from ..study.arrays import rms, stretches
 from .logger_table import name_and_unit
 from .measurands import COUNTS, MEASURANDS, OFFSET_SHARE
-from .plant import MOVING
-from .problem import Problem, likeness, mark_times, measured_speed, speed_column
+from .plant import CRANK, MOVING, Response
+from .problem import Problem, RecordedRun, likeness, mark_times, mean_speed, measured_speed, speed_column
 from .recording import Recording
 
 MISSING = 0.2
@@ -52,6 +52,13 @@ its simulated course that tells its sign."""
 WIDE, NEAR = 5.0, 1.2
 """Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
 on the sought numbers; and of a speed or a voltage under control."""
+CLOCK = 5e-4
+"""Part of the speed by which the clock of a logger may be wrong."""
+ALIKE, AROUND = 0.6, 1.5
+"""Correlation of a column with itself one turn later from which it tells the turn; and the factor around the stated
+time of a turn within which the turn is sought."""
+GAINS = 3.0
+"""Standard deviations by which the gain of a sensor of speed may be wrong."""
 _ROWS_STUCK = 20
 OF_SPEED = ("motor.w", "crank.w", "motor.u")
 """Quantities whose sizes follow from the speed."""
@@ -87,8 +94,13 @@ def inspect_runs(problem: Problem, workers: int) -> None:
         speeds = [run.crank_speed, *(w / ratio for _, _, w in getattr(reference, "changes", ()))]
         faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
     faults.refuse()
+    unsteady = {run.name: _unsteadiness(run, ratio) for run in problem.runs}
     for run in problem.runs:
         response = problem.simulate(run, problem.start_values, workers)
+        if not unsteady[run.name] and (wrong := inspect_speed(run, response, ratio, problem.speed_gain)):
+            # with a wrong speed the simulated columns tell nothing
+            faults.add(wrong)
+            continue
         expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
         # of less than a turn the RMS is that of an angle
         known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
@@ -103,11 +115,22 @@ def inspect_runs(problem: Problem, workers: int) -> None:
         faults.add(inspect_columns(run.recording, expected, run.off))
     faults.refuse()
     for run in problem.runs:
-        reference = run.values.get("motor.w_ref")
-        if not hasattr(reference, "changes"):
-            faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
+        faults.add(unsteady[run.name])
+        if not _has_changes(run):
             faults.add(inspect_work(run.recording, ratio, run.off))
     faults.refuse()
+
+
+def _has_changes(run: RecordedRun) -> bool:
+    """Whether changes of the speed are stated."""
+    return hasattr(run.values.get("motor.w_ref"), "changes")
+
+
+def _unsteadiness(run: RecordedRun, ratio: float) -> list[InputError]:
+    """The fault of a run without stated changes of the speed that is not steady."""
+    if _has_changes(run):
+        return []
+    return inspect_steadiness(run.recording, ratio, run.off, "motor.w_ref" in run.values)
 
 
 def inspect_motion(
@@ -127,6 +150,97 @@ def inspect_motion(
         *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
         *_counted(recording),
     ]
+
+
+def inspect_speed(run: RecordedRun, response: Response, ratio: float, gain: float) -> list[InputError]:
+    """That the crank turns at the speed of the run's reference, as far as the simulated one does.
+
+    Parameters
+    ----------
+    response : the simulated run
+    gain : standard deviation of the gain of the sensor of the speed [1]
+    """
+    if "motor.w_ref" not in run.values or _has_changes(run):
+        return []
+    driven = run.recording if run.off is None else run.recording.part(end=run.off)
+    turning = _turning_speed(driven, run.crank_speed, ratio, gain)
+    if turning is None:
+        return []
+    name, speed, error = turning
+    time = np.clip(driven.time[[0, -1]], response.time[0], response.time[-1])
+    simulated = float(np.ptp(np.interp(time, response.time, response.values[CRANK])) / np.ptp(time))
+    # a control without an integral part lets the speed droop under load, by another amount under another one
+    droop = 2.0 * abs(simulated / run.crank_speed - 1.0)
+    if abs(speed / run.crank_speed - 1.0) <= error + droop:
+        return []
+    measured, stated = (f"{x:.5g} rad/s ({_per_minute(x)})" for x in (speed, run.crank_speed))
+    geared = ", or correct machine.ratio" if name in ("motor.w", "motor.count") else ""
+    text = (
+        f"the crank turns at {measured}, and crank_speed is {stated}; write crank_speed = "
+        f'"{_per_minute(speed)}" into the table of this recording{geared}'
+    )
+    return [_fault(run.recording, name, text)]
+
+
+def _per_minute(speed: float) -> str:
+    return f"{speed * 30.0 / math.pi:.5g} rev/min"
+
+
+def _turning_speed(
+    recording: Recording, crank_speed: float, ratio: float, gain: float
+) -> tuple[str, float, float] | None:
+    """The column that tells the speed of the crank, the mean speed by it [rad/s], and the part of it by which it may
+    be wrong. It is a mark, the count of an encoder, a column with turns that are alike, or the measured speed; None
+    without one."""
+    span = float(recording.time[-1] - recording.time[0])
+    clock = CLOCK + recording.step / span
+    for name, is_there in (
+        ("mark", len(mark_times(recording)) > FEWEST_TURNS),
+        ("motor.count", "motor.count" in recording.columns),
+    ):
+        if is_there:
+            return name, mean_speed(RecordedRun("", recording, crank_speed), ratio), clock
+    turns = [
+        (like, name, turn)
+        for name in recording.columns
+        if MEASURANDS[name].analog
+        for like, turn in [_turn(recording, name, 2.0 * math.pi / crank_speed)]
+        if like > ALIKE
+    ]
+    if turns:
+        _, name, turn = max(turns)
+        return name, 2.0 * math.pi / turn, 2.0 * clock
+    speed = measured_speed(recording, ratio)
+    return None if speed is None else (speed_column(recording), float(np.mean(speed)), clock + GAINS * gain)
+
+
+def _turn(recording: Recording, name: str, stated: float) -> tuple[float, float]:
+    """The correlation of a column with itself a turn later, and the time of a turn [s] at which it is largest, within
+    a factor of the `stated` one: first one turn later, and then as many as the half of the recording has."""
+    time = np.arange(recording.time[0], recording.time[-1], recording.step)
+    x = np.interp(time, recording.time, recording.columns[name])
+    x = x - np.mean(x)
+
+    def likeness_after(lags: Any) -> Any:
+        return np.array([np.corrcoef(x[:-lag], x[lag:])[0, 1] if np.ptp(x) else 0.0 for lag in lags])
+
+    def best(low: float, high: float, size: int) -> tuple[float, float]:
+        low_lag, high_lag = max(1, math.floor(low)), min(math.ceil(high), len(x) // 2)
+        if low_lag >= high_lag:
+            return 0.0, low
+        lags = np.unique(np.linspace(low_lag, high_lag, min(size, high_lag - low_lag + 1)).astype(int))
+        likes = likeness_after(lags)
+        k = int(np.argmax(likes))
+        return float(likes[k]), float(lags[k])
+
+    rows = stated / recording.step
+    like, lag = best(rows / AROUND, rows * AROUND, 200)
+    turns, spread = 1, max(3.0, 0.02 * lag)
+    while like > ALIKE and 2.0 * turns * lag + spread < 0.5 * len(x):
+        turns *= 2
+        like, total = best(turns * lag - spread, turns * lag + spread, 200)
+        lag = total / turns
+    return like, lag * recording.step
 
 
 def inspect_columns(

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.quantities import Variable
 from ..drives.free_rotor import FreeRotor
 from ..machines.machine import Machine
 from ..study.drive import Drive
@@ -130,6 +131,10 @@ class AnyPlant(ABC):
         """The same plant, of which these parameters and inputs are sought."""
 
     @abstractmethod
+    def parameters(self) -> Iterator[tuple[Variable, float]]:
+        """The parameters of the system by full name, with their known values in their declared units."""
+
+    @abstractmethod
     def nuisances(self, run: Overview) -> Iterator[Nuisance]:
         """The numbers that it needs of a run beside the values of parameters and inputs."""
 
@@ -241,6 +246,11 @@ class Plant(AnyPlant):
     def with_names(self, by: Sequence[str]) -> Plant:
         """The same plant, of which the parameters and inputs `by` are sought."""
         return Plant(self._drive, self._measured, by)
+
+    def parameters(self) -> Iterator[tuple[Variable, float]]:
+        """Those of motor, converter and machine."""
+        layout, p = self._loop.system.model.parameter_layout, self._loop.system.p
+        yield from zip(layout.variables, map(float, layout.values(p)), strict=True)
 
     @cached_property
     def _free(self) -> SourcedLoop:

@@ -36,6 +36,8 @@ AHEAD = 0.04
 STANDING, SMOOTHED = 0.1, 0.1
 """Share of the crank speed of a run below which the machine stands, and the time over which its speed is averaged for
 that [s]."""
+SPEEDS = ("crank.w", "motor.w")
+"""Columns that tell the speed, the first one best."""
 MARK_ANGLE = "mark.angle"
 """Name of the crank angle at the mark among the unknowns."""
 _CHANGE = 0.2
@@ -167,6 +169,11 @@ class Problem:
     def start_values(self) -> Any:
         """The start values, shape (unknowns,)."""
         return np.array([u.start for u in self.unknowns])
+
+    @property
+    def speed_gain(self) -> float:
+        """The largest standard deviation of the gain of a sensor of speed [1]."""
+        return max((self.sensors[name].gain for name in SPEEDS if name in self.sensors), default=0.0)
 
     @property
     def prior_deviations(self) -> Any:
@@ -437,7 +444,7 @@ def mark_times(recording: Recording) -> Any:
 
 def speed_column(recording: Recording) -> str:
     """The column that tells the speed; empty without one."""
-    return next((name for name in ("crank.w", "motor.w") if name in recording.columns), "")
+    return next((name for name in SPEEDS if name in recording.columns), "")
 
 
 def measured_speed(recording: Recording, ratio: float) -> Any:

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..batch.evaluate import evaluate
 from ..core.errors import InputError, RunError
+from ..core.quantities import Variable
 from ..drives.free_rotor import FreeRotor
 from ..machines.machine import Machine
 from ..study.drive import Drive
@@ -95,6 +96,11 @@ class MeasuredShaft(AnyPlant):
     def with_names(self, by: Sequence[str]) -> MeasuredShaft:
         """The same plant, of which the parameters and inputs `by` are sought."""
         return MeasuredShaft(self.machine, self._measured, by)
+
+    def parameters(self) -> Iterator[tuple[Variable, float]]:
+        """Those of the machine."""
+        for v in self.machine.model.parameter_layout.variables:
+            yield replace(v, name=f"machine.{v.name}"), float(self.machine.by_name[v.name])
 
     def nuisances(self, run: Overview) -> Iterator[Nuisance]:
         """The motion of a steady run; the state at which the motor is switched off, and what then turns with the

@@ -24,3 +24,11 @@ class Unknown:
     def within(cls, name: str, unit: str, low: float, high: float) -> Unknown:
         """One of which only the bounds are known."""
         return cls(name, unit, 0.5 * (low + high), low, high, (high - low) / math.sqrt(12.0), is_even=True)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The ends of the interval that contains the number beforehand: its bounds, or 95 % of its prior in them."""
+        if self.is_even:
+            return self.low, self.high
+        half = 1.96 * self.prior_deviation
+        return max(self.low, self.start - half), min(self.high, self.start + half)

@@ -66,11 +66,9 @@ def _from(folder: Path, file: Path) -> str:
         return file.resolve().as_posix()
 
 
-def toml_text(tables: Mapping[str, Any], notes: Mapping[str, str] | None = None, head: str = "") -> str:
-    """Tables as a TOML text, which reads as these tables again. Comments are `head`, in the first line, and `notes`
-    on values by full name."""
-    comment = f"# {head}\n" if head else ""
-    return comment + "\n".join(_lines(tables, "", notes or {})).strip() + "\n"
+def toml_text(tables: Mapping[str, Any], notes: Mapping[str, str] | None = None) -> str:
+    """Tables as a TOML text, which reads as these tables again. Comments are `notes` on values by full name."""
+    return "\n".join(_lines(tables, "", notes or {})).strip() + "\n"
 
 
 def _lines(table: Mapping[str, Any], prefix: str, notes: Mapping[str, str]) -> Iterator[str]:

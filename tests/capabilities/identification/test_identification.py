@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,13 +16,14 @@ from chainunit import InputError, RunError
 from chainunit.capabilities.identification import information as what_runs_tell
 from chainunit.capabilities.identification.information import information
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.score_tests import score_tests
+from chainunit.capabilities.identification.suspects import known_number_tests, suspect_sets
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.recordings import fit as fitting
 from chainunit.recordings import residuals
 from chainunit.recordings.fit import fit, normal_equations
+from chainunit.recordings.inspection import inspect_runs
 from chainunit.recordings.plant import Plant
 from chainunit.recordings.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.recordings.recording import Recording
@@ -57,9 +59,12 @@ SOUGHT = (
 SENSORS = {"motor.i": Sensor(offset=0.2, gain=0.01), "motor.u": Sensor(resolution=250.0 / 2048.0)}
 
 
-def drive_of(**parameters):
+def drive_of(motor=(), **parameters):
+    """The packaged drive with other values of its `motor`, by full name, and of its machine."""
     config = parse("")
-    return Drive(DcMotor, config.motor.parameters, config.machine.replace(parameters))
+    values = {name.removeprefix("motor."): x for name, x in dict(motor).items()}
+    of_motor = DcMotor.parameter_layout.from_names(values, config.motor.parameters)
+    return Drive(DcMotor, of_motor, config.machine.replace(parameters))
 
 
 def recorded(empty=False, seed=4, **more):
@@ -75,13 +80,13 @@ def without(recording, *names):
     return Recording(recording.source, recording.time, columns, recording.heads)
 
 
-def problem_of(*recordings, empty=(), sought=SOUGHT, **machine):
+def problem_of(*recordings, empty=(), sought=SOUGHT, motor=(), **machine):
     measured = [name for name in recordings[0].columns if name != "mark"]
     runs = [
         RecordedRun(f"run{k}", each, SPEED, FORCES | {"motor.w_ref": 150.0} | (NO_FEED if k in empty else {}))
         for k, each in enumerate(recordings)
     ]
-    plant = Plant(drive_of(**machine), measured, [u.name for u in sought])
+    plant = Plant(drive_of(motor, **machine), measured, [u.name for u in sought])
     return Problem(plant, runs, sought, SENSORS)
 
 
@@ -192,18 +197,85 @@ def test_a_wrong_gear_strains_the_clock(loaded):
     assert abs(drift.deviations) > 50.0 and drift.value == pytest.approx(5e-5 * drift.deviations)
 
 
+@pytest.mark.parametrize(
+    ("left_out", "column"),
+    [((), "mark"), (("mark",), "motor.count"), (("mark", "motor.count"), "motor.i")],
+)
+def test_the_stated_speed_is_that_of_the_recording(loaded, left_out, column):
+    """Another one is refused by the column that tells it best, with the speed of the recording; a run with that speed
+    is accepted."""
+    recording = without(loaded, *left_out)
+
+    def run_at(speed):
+        problem = problem_of(recording)
+        values = problem.runs[0].values | {"motor.w_ref": 50.0 * speed}
+        run = RecordedRun("run", recording, speed, values)
+        return Problem(problem.plant, [run], SOUGHT, SENSORS)
+
+    for stated in (28.0 / 26.0, 0.985):
+        with pytest.raises(InputError) as refusal:
+            inspect_runs(run_at(stated * SPEED), 1)
+        words = str(refusal.value)
+        assert f"column {column}" in words and f"crank_speed is {stated * SPEED:.5g} rad/s" in words
+        (remedy,) = re.findall('crank_speed = "(.*) rev/min"', words)
+        assert float(remedy) * np.pi / 30.0 == pytest.approx(SPEED, rel=1e-3)
+        inspect_runs(run_at(float(remedy) * np.pi / 30.0), 1)
+
+
+def test_a_fit_that_still_improves_says_so(loaded, monkeypatch):
+    """It stops after the most rounds, and names the column that it does not describe."""
+    problem = problem_of(without(loaded, "motor.count"))
+    assert fit(problem).is_ended
+    monkeypatch.setattr(fitting, "MOST_ROUNDS", 2)
+    cut = fit(problem)
+    assert not cut.is_ended
+    worst, size = cut.worst
+    assert size == pytest.approx(max(np.sqrt(np.mean(each.residuals**2)) for each in cut.comparisons))
+    assert np.sqrt(np.mean(worst.residuals**2)) == pytest.approx(size)
+
+
 def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):
     """The crank that is 2 % longer is told from the right one, with its right length; the residuals of the right
-    machine agree with its numbers."""
+    machine agree with its numbers. No speed by which a law is smooth is among them."""
     recordings = [without(each, "motor.count") for each in (loaded, empty)]
     right = problem_of(*recordings, empty=(1,))
-    found = score_tests(right, fit(right), names=("r", "z", "pin.w_smooth"))
-    assert [each.name for each in found] == ["machine.r", "machine.z", "machine.pin.w_smooth"]
-    assert not any(each.is_rejected for each in found)
+    found = known_number_tests(right, fit(right))
+    names = {each.name for each in found.tests}
+    assert {
+        "machine.r",
+        "machine.z",
+        "motor.speed_control.kp",
+        "motor.armature.R",
+        "machine.coupler.m",
+    } <= names
+    assert not any("smooth" in name for name in names) and not names & {u.name for u in SOUGHT}
+    assert not found.are_rejected and found.law is not None
     wrong = problem_of(*recordings, empty=(1,), r=0.153)
-    (own,) = score_tests(wrong, fit(wrong), names=("r",))
+    found = known_number_tests(wrong, fit(wrong))
+    (own,) = [each for each in found.tests if each.name == "machine.r"]
     assert own.is_rejected and own.known == 0.153
     assert own.known + own.change == pytest.approx(0.15, abs=4.0 * own.deviation) and own.deviation < 5e-4
+
+
+@pytest.mark.second
+def test_wrong_gains_are_the_suspects(loaded, empty):
+    """Of a converter whose gains are taken for others; with those of the recorded one the model describes the
+    recordings."""
+    recordings = [without(each, "motor.count") for each in (loaded, empty)]
+    right = {"motor.speed_control.kp": 0.1017, "motor.speed_control.ki": 0.6102}
+    factors = {"motor.speed_control.kp": 0.6, "motor.speed_control.ki": 1.3}
+    wrong = {name: factors[name] * x for name, x in right.items()}
+    problem = problem_of(*recordings, empty=(1,), motor=wrong)
+    best = fit(problem)
+    assert known_number_tests(problem, best).are_rejected
+    first, *others = suspect_sets(problem, best, assumed=["motor.speed_control.kp"])
+    assert first.describes and first.excess == 0.0 and others == []
+    assert {each.name: each.known for each in first.suspects} == pytest.approx(wrong)
+    assert {each.name: each.preferred for each in first.suspects} == pytest.approx(right, rel=0.03)
+    assert {each.name: each.stated for each in first.suspects} == {
+        "motor.speed_control.kp": False,
+        "motor.speed_control.ki": True,
+    }
 
 
 @pytest.mark.second
@@ -212,23 +284,25 @@ def test_another_law_of_friction_is_suspicious():
     law = {"machine.pin.w_smooth": 0.2}
     recordings = [without(recorded(k == 1, 4 + k, **law), "motor.count") for k in range(2)]
     wrong = problem_of(*recordings, empty=(1,))
-    (own,) = score_tests(wrong, fit(wrong), names=("pin.w_smooth",))
+    own = known_number_tests(wrong, fit(wrong)).law
     assert own.is_rejected and own.known == 0.02
     assert own.known + own.change == pytest.approx(0.2, abs=0.02 + 4.0 * own.deviation)
 
 
 def test_a_law_with_which_the_machine_does_not_run_is_left_out(loaded, monkeypatch):
-    """The derivative stands in its place."""
+    """One that is nearer to that of the model stands in its place."""
     problem = problem_of(without(loaded, "motor.count"))
-    best, own = fit(problem), Problem.comparisons
+    best, own, laws = fit(problem), Problem.comparisons, []
 
     def comparisons(self, z, workers=1):
-        if "machine.pin.w_smooth" in self.place and z[self.place["machine.pin.w_smooth"]] > 0.1:
+        laws.append(self.runs[0].values.get("machine.pin.w_smooth", 0.0))
+        if laws[-1] > 0.1:
             raise RunError("it stalls")
         return own(self, z, workers)
 
     monkeypatch.setattr(Problem, "comparisons", comparisons)
-    (found,) = score_tests(problem, best, names=("pin.w_smooth",))
+    found = known_number_tests(problem, best).law
+    assert laws[-2:] == [0.2, 0.04]
     assert np.isfinite(found.change) and not found.is_rejected
 
 

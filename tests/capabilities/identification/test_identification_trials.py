@@ -69,3 +69,31 @@ def test_a_machine_at_its_bounds(bench):
 @pytest.mark.parametrize("k", [0, 1, 2])
 def test_another_friction_chains_and_another_gear_are_recognised(bench, k):
     assert bench.is_wrong(bench.result("wrong", k))
+
+
+def test_figures_of_suspects_that_are_known(bench):
+    """A machine that is told with both wrong numbers in the first set, one with both in two sets, one with one of
+    them, and one that is not told."""
+
+    def trial(*sets, is_described=False):
+        number = {"name": "machine.x", "true": 1.0, "value": 1.1, "deviation": 0.1, "low": 0.9, "high": 1.3}
+        number |= {"spread": 1.0, "fitted": 1.1, "bound": 0.1}
+        return {
+            "wrong": ["a", "b"], "shown": ["a"], "is_described": is_described, "seconds": 2.0, "numbers": [number],
+            "sets": [{"names": names, "excess": 0.0, "describes": None} for names in sets],
+        }  # fmt: skip
+
+    trials = [trial(["b", "a"], ["c"]), trial(["a", "c"], ["b"]), trial(["a"]), trial(is_described=True)]
+    found = bench.suspicion(trials)
+    assert [found[key] for key in ("machines", "told", "both", "shown", "one", "first")] == [4, 3, 2, 3, 3, 1]
+    assert found["suspects"] == 3.0 and found["cover_of_others"] == 1.0
+
+
+@pytest.mark.slow
+def test_two_wrong_known_numbers_are_the_suspects(bench):
+    """A gain of the converter and the mass of a web, each stated wrong by 20 %; the same machine with right numbers
+    is described."""
+    found, right = bench.stated_result("doubted", 2), bench.stated_result("known", 2)
+    assert not found["is_described"] and found["sets"][0]["describes"]
+    assert set(found["wrong"]) <= {name for some in found["sets"] for name in some["names"]}
+    assert right["is_described"] and right["sets"] == []

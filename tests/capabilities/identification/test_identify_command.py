@@ -21,6 +21,7 @@ from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
 from chainunit.reading.results import as_data
+from chainunit.recordings import fit as fitting
 from chainunit.recordings.measurands import MEASURANDS
 from chainunit.recordings.unknown import Unknown
 from chainunit.report import blocks
@@ -294,17 +295,45 @@ def test_further_runs_beside_numbers_that_are_all_determined():
     assert "None of these runs" not in shown(3.0) and "would make the numbers sharper" in shown(3.0)
 
 
-def test_a_wrong_gear_is_recognised(tmp_path):
-    """The exit status is 1, and the judgement names the column; the numbers are kept."""
+def test_a_wrong_crank_is_recognised(tmp_path):
+    """The exit status is 1, nothing is determined, no interval is narrower than before, no study file is written, and
+    the crank is a suspect."""
     write(tmp_path, "loaded.csv.gz", heads={})
     (tmp_path / "mine.toml").write_text(FILE + "[machine]\nr = 0.16\n", "utf-8")
     done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 1
-    assert "The model does not describe the recordings." in " ".join(done.stdout.split())
+    assert "The model does not describe the recordings. No number is determined" in " ".join(
+        done.stdout.split()
+    )
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     assert any(not each["is_noise"] for each in result["residuals"])
-    file = (tmp_path / "out" / "identified.toml").read_text("utf-8")
-    assert file.startswith("# The model does not describe the recordings")
+    assert result["told"]["value"] == 0 and result["combinations"] == [] == result["proposals"]
+    for own in result["numbers"].values():
+        assert not own["told"] and own["value"]["value"] is None and own["fitted"]["value"] is None
+        assert own["deviation"] == own["given_deviation"]
+    feed, web = (result["numbers"][name] for name in ("feed.left.material_mass", "machine.left.web_mass"))
+    assert (feed["from"]["value"], feed["to"]["value"]) == (10.0, 60.0)
+    assert web["to"]["value"] - web["from"]["value"] == pytest.approx(2 * 1.96 * 0.2 * 21.6)
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(result["covariance"]["matrix"])),
+        [each["given_deviation"]["value"] for each in result["numbers"].values()],
+    )
+    assert not (tmp_path / "out" / "identified.toml").exists()
+    suspects = [each["name"] for some in result["suspects"] for each in some["suspects"]]
+    assert "machine.r" in suspects and not any("smooth" in name for name in suspects)
+    first = result["suspects"][0]
+    assert first["describes"] and first["suspects"][0]["known"]["value"] == 0.16
+
+
+def test_a_fit_without_an_end(tmp_path, monkeypatch):
+    """The model does not describe the recording, and the column from which it is farthest is named."""
+    write(tmp_path, "loaded.csv.gz", heads={})
+    (tmp_path / "mine.toml").write_text(FILE, "utf-8")
+    monkeypatch.setattr(fitting, "MOST_ROUNDS", 2)
+    found = Study.from_file(tmp_path / "mine.toml").identify()
+    assert not found.is_described and not json.loads(found.to_json())["fit"]["is_ended"]
+    (words,) = [each for each in sentences(found.found) if "still improved" in each]
+    assert re.search(r"farthest from (motor\.[iuw]|mark) of the run loaded, with residuals of", words)
 
 
 def test_what_was_known_and_is_contradicted(tmp_path):
@@ -324,7 +353,7 @@ def test_what_was_known_and_is_contradicted(tmp_path):
         in words
     )
     damping = result["numbers"]["machine.joint_damping"]
-    assert 1.0 < damping["from"]["value"] < damping["to"]["value"] <= 1.1
+    assert (damping["from"]["value"], damping["to"]["value"]) == (0.1, 1.1)
     assert not result["numbers"]["machine.joint_damping"]["told"]
 
 

@@ -101,6 +101,10 @@ def test_values_of_the_study_and_the_results():
         ("[sweep]\nmethod = 'grid'\n" + R + "points = 1\n", "must be a whole number >= 2"),
         ("[[sweep.parameter]]\nname = 'event.jam_left.force'\nvalues = [100]\n", "add sweep.measures"),
         ("[sweep]\nevent = 'jam_left'\n" + R, "is of measures"),
+        (
+            "[[sweep.parameter]]\nname = 'event.jam_left.crank_angle'\nvalues = [90]\n",
+            'is more than a turn; a number without a unit is in radians; was "90 deg" meant?',
+        ),
         ("[sweep]\nmeasures = ['stall_time']\nevent = 'jam'\n" + R, 'sweep.event = "jam": must be one of'),
         ("[[event]]\ntype = 'start'\nside = 'left'\n[sweep]\nmeasures = ['stall_time']\n" + R, "steady running"),
         ("[system]\nmotor = 'IE3 4-pole 0.75 kW, 80M'\n" + R.replace("machine.r", "machine.ratio"), "rated speed"),

@@ -21,8 +21,8 @@ def identify(
     """Identify masses, friction and feed of a real machine from recordings of its motor.
 
     Says what the recordings can tell before anything is fitted. Writes identified.toml, report.html, result.json,
-    result.md and pictures into the output folder. The exit status is 1 where the model does not describe the
-    recordings.
+    result.md and pictures into the output folder. If the model does not describe the recordings, the exit status is
+    1, and there is no identified.toml.
     """
     question = study_file(config)
     from .page import TASK

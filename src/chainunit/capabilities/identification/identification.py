@@ -38,7 +38,7 @@ from ...work.progress import TaskProgress, quiet
 from .information import Combination, Information, information
 from .posterior import Posterior, posterior
 from .reading import IdentificationPlan, PlannedRun
-from .score_tests import ScoreTest, score_tests
+from .suspects import KnownNumbers, known_number_tests, suspect_sets
 
 CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
 """Gains of the control of a motor, of which the course of its current depends."""
@@ -51,7 +51,8 @@ it."""
 class FittedNumber:
     """A sought number: its value in the best fit, `fitted`, which has a meaning together with those of all others;
     its mean `value` in the distribution that the recordings leave, its standard deviation, the ends of its interval
-    of 95 %, and whether the recordings determine it."""
+    of 95 %, and whether the recordings determine it. If the model does not describe the recordings, they tell nothing
+    about the number: deviation and interval are those that were known before."""
 
     unknown: Unknown
     fitted: float
@@ -83,7 +84,7 @@ class IdentifiedMachine:
 
     `information_at_start` is the information of the runs at the start values, with further runs in order;
     `information_at_fit` the same at the fitted values. `best` are the normal equations there, `posterior` is the
-    distribution of the sought numbers around them, and `score_tests` are those of known numbers.
+    distribution of the sought numbers around them, and `known` has the tests of known numbers with the suspects.
     """
 
     config: Config
@@ -94,11 +95,17 @@ class IdentifiedMachine:
     posterior: Posterior
     information_at_fit: Information
     residual_tests: tuple[ResidualTest, ...]
-    score_tests: tuple[ScoreTest, ...]
+    known: KnownNumbers
 
     @property
     def estimates(self) -> dict[str, FittedNumber]:
         """The sought numbers by the full names of the study file."""
+        marginals = zip(self.plan.sought, self.best.z, self.posterior.marginals, strict=False)
+        if not self.is_described:
+            return {
+                own.name: FittedNumber(own, float(x), own.start, own.prior_deviation, *own.interval, False)
+                for own, x, _ in marginals
+            }
         determined = {each.name: each.is_determined for each in self.information_at_fit.determinations}
         return {
             own.name: FittedNumber(
@@ -110,27 +117,24 @@ class IdentifiedMachine:
                 each.high,
                 determined[each.name] and not _bound_of(own, float(x)),
             )
-            for own, x, each in zip(
-                self.plan.sought,
-                self.best.z[: len(self.plan.sought)],
-                self.posterior.marginals,
-                strict=True,
-            )
+            for own, x, each in marginals
         }
 
     @property
     def covariance(self) -> Any:
-        """The covariance of the sought numbers, shape (sought, sought)."""
+        """The covariance of the sought numbers, shape (sought, sought): if the model does not describe the
+        recordings, that of the knowledge before."""
+        if not self.is_described:
+            return np.diag([u.prior_deviation**2 for u in self.plan.sought])
         return self.posterior.covariance
 
     @property
     def is_described(self) -> bool:
-        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no bound
-        is active."""
-        if self.prior_conflicts or self.posterior.active_bounds:
+        """Whether the fit ended, the residuals may be noise, clocks, sensors and known numbers are as they are known,
+        and no bound is active."""
+        if not self.best.is_ended or self.prior_conflicts or self.posterior.active_bounds:
             return False
-        are_rejected = any(test.is_rejected for test in self.score_tests)
-        return not are_rejected and all(test.is_noise for test in self.residual_tests)
+        return not self.known.are_rejected and all(test.is_noise for test in self.residual_tests)
 
     @property
     def prior_conflicts(self) -> list[PriorConflict]:
@@ -189,7 +193,7 @@ def identify(
     InputError
         for a study without that table, and with a line for each fault of the recordings.
     RunError
-        where the fit does not end.
+        if the machine does not run with the start values.
     """
     plan = plan_of(config.plans)
     workers = min(2, os.cpu_count() or 1)
@@ -219,8 +223,27 @@ def identify(
     progress("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False, at=best)
     around = posterior(problem, best, workers, plan.seed)
-    tests = tuple(residual_tests(best)), tuple(score_tests(problem, best, workers))
-    return IdentifiedMachine(config, plan, problem, before, best, around, after, *tests)
+    known, residuals = known_number_tests(problem, best, workers), tuple(residual_tests(best))
+    machine = IdentifiedMachine(config, plan, problem, before, best, around, after, residuals, known)
+    if machine.is_described:
+        return machine
+    sets = suspect_sets(
+        problem,
+        best,
+        workers,
+        tuned_gains(config),
+        lambda names: progress(f"other {names}", 0.97, 1.0),
+    )
+    return replace(machine, known=replace(known, sets=sets))
+
+
+def tuned_gains(config: Config) -> list[str]:
+    """The gains of the control that the file does not give: they are those of a new drive."""
+    motor = config.motor
+    if not isinstance(motor, OwnMotor) or not motor.kind.follows(motor.parameters):
+        return []
+    gains = (f"motor.{name}" for name in CONTROL)
+    return [name for name in gains if name not in config.file.given]
 
 
 def plan_of(plans: Mapping[str, Any]) -> IdentificationPlan:
@@ -361,10 +384,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
                 f"{run.recording.source} has no mark: the angle of the crank follows from the course of the other "
                 "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
-    has_motor = bool(columns & set(OF_TERMINALS))
-    if has_motor and isinstance(motor, OwnMotor) and motor.kind.follows(motor.parameters):
-        given = machine.config.file.given
-        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in given]
-        if tuned:
-            names = ", ".join(tuned)
-            yield f"{names}: not in the file, and tuned as for a new drive; give the values of the real converter"
+    tuned = tuned_gains(machine.config)
+    if tuned and columns & set(OF_TERMINALS):
+        names = ", ".join(tuned)
+        yield f"{names}: not in the file, and tuned as for a new drive; give the values of the real converter"

@@ -18,7 +18,6 @@ from ...study.study_file import toml_text
 from .identification import IdentifiedMachine, identify
 from .result import IdentificationSummary, identified_notes, identified_tables, sentences, summary_of
 
-WRONG = "The model does not describe the recordings: these are not the numbers of the machine."
 FILE = "identified.toml"
 """The study file with the identified values."""
 
@@ -56,14 +55,13 @@ def pictures(machine: IdentifiedMachine) -> tuple[str, ...]:
 def _writers(
     machine: IdentifiedMachine, report: b.Report, folder: Path, of_report: list[Writer]
 ) -> list[Writer]:
-    """With the study file of the identified values."""
+    """With the study file of the identified values; without it if they are not those of the machine."""
 
     def study_file() -> list[Path]:
-        head = "" if machine.is_described else WRONG
-        text = toml_text(identified_tables(machine, folder), identified_notes(machine), head)
+        text = toml_text(identified_tables(machine, folder), identified_notes(machine))
         return write_file(folder / FILE, text)
 
-    return [study_file, *of_report]
+    return [study_file, *of_report] if machine.is_described else of_report
 
 
 TASK: Task[Config, IdentifiedMachine] = Task(
@@ -78,20 +76,58 @@ TASK: Task[Config, IdentifiedMachine] = Task(
 
 
 def _opening(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
-    words = s.line("These recordings determine {=told} of {=sought} numbers.")
     if machine.is_described:
+        words = s.line("These recordings determine {=told} of {=sought} numbers.")
         yield b.Judgement(
             "good", line("The model describes the recordings: their residuals are noise. ", words)
         )
     else:
-        yield b.Judgement("bad", line("The model does not describe the recordings. ", words))
+        sentence = "The model does not describe the recordings. No number is determined, and"
+        yield b.Judgement("bad", f"{sentence} {FILE} is not written.")
     for sentence in sentences(machine):
         yield b.Judgement("warning", f"{sentence}.")
     for each in s.lines("remarks"):
         yield b.Judgement("remark", line(each, "."))
 
 
+def _suspects(s: b.Source) -> Iterator[b.Block]:
+    rows = []
+    for i, each in enumerate(s.result["suspects"]):
+        for k, suspect in enumerate(each["suspects"]):
+            path = f"suspects.{i}.suspects.{k}"
+            rows.append(
+                b.TableRow(
+                    (
+                        str(i + 1),
+                        Name(suspect["name"]),
+                        s.number(f"{path}.known", digits=4),
+                        s.number(f"{path}.preferred", digits=4),
+                        "yes" if suspect["stated"] else "no",
+                        {True: "yes", False: "no", None: ""}[each["describes"]],
+                    )
+                )
+            )
+    if not rows:
+        return
+    columns = (
+        b.Column("set"),
+        b.Column("number"),
+        b.Column("known"),
+        b.Column("would be"),
+        b.Column("stated in the study", "stated", form="long"),
+        b.Column("the model describes the recordings with it", "describes"),
+    )
+    yield b.Table(tuple(rows), columns, title="Suspects: known numbers that may be wrong, the best set first")
+    yield b.Text(
+        "Each set of one or two numbers, with the values of the table, explains the recordings about as well as the "
+        "first one. Measure them, or seek them.",
+        "note",
+    )
+
+
 def _numbers(s: b.Source) -> Iterator[b.Block]:
+    if not s.result["is_described"]:
+        yield from _suspects(s)
     rows = []
     for name, each in s.result["numbers"].items():
         path = f"numbers.{name}"

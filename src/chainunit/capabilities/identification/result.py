@@ -23,6 +23,7 @@ from ...study.study_file import changed_tables
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
 from .information import Combination, Information, Proposal, short_name
 from .reading import IdentificationPlan
+from .suspects import KnownNumbers, SuspectSet
 
 RESULT = "result.json"
 """Name of the file with the result."""
@@ -117,6 +118,7 @@ class FitCounts:
     """Counts of the fit."""
 
     rounds: int = quantity("1", "rounds of the best start")
+    is_ended: bool = part("whether a further round would not improve the fit")
     starts: int = quantity("1", "number of starts")
     agreeing: int = quantity("1", "number of starts that ended at the best fit")
 
@@ -139,6 +141,10 @@ class IdentificationSummary:
     told_at_start: int = quantity("1", "number of numbers that the recordings could determine before the fit")
     proposals: tuple[Proposal, ...] = part("further runs, the best first")
     residuals: tuple[ResidualTest, ...] = part("tests of the residuals")
+    suspects: tuple[SuspectSet, ...] = part(
+        "sets of known numbers that would explain the recordings if they were wrong, the best first; none if the "
+        "model describes the recordings"
+    )
     sensors: Mapping[str, FittedValue] = part("numbers of clocks and sensors")
     fit: FitCounts = part("counts of the fit")
     remarks: list[str] = part("sentences on data that are missing or assumed")
@@ -167,17 +173,20 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
             list(estimates), [each.unknown.unit for each in estimates.values()], machine.covariance.tolist()
         ),
         correlations=list(_correlations(machine)),
-        combinations=[_sum(machine, each) for each in machine.information_at_fit.combinations],
+        combinations=[
+            _sum(machine, each) for each in machine.information_at_fit.combinations if machine.is_described
+        ],
         blind=[_unseen_change(machine, each) for each in machine.information_at_fit.null_space],
         told_at_start=sum(each.is_determined for each in start.determinations),
-        proposals=start.proposals,
+        proposals=start.proposals if machine.is_described else (),
         residuals=machine.residual_tests,
+        suspects=machine.known.sets,
         sensors={
             unknown.name: each
             for unknown, each in fitted_values(machine.problem, best)
             if unknown.is_nuisance
         },
-        fit=FitCounts(best.rounds, best.starts, best.agreeing),
+        fit=FitCounts(best.rounds, best.is_ended, best.starts, best.agreeing),
         remarks=list(remarks(machine)),
         courses={run.name: _courses(machine, run.name) for run in machine.plan.runs},
     )
@@ -297,7 +306,15 @@ def sentence_before_fit(plan: IdentificationPlan, before: Information) -> str:
 def sentences(machine: IdentifiedMachine) -> list[str]:
     """Sentences that judge an identification."""
     active_bounds = machine.posterior.active_bounds
-    words = [
+    words = list[str]()
+    if not machine.best.is_ended:
+        worst, size = machine.best.worst
+        words.append(
+            f"The fit still improved in its last round, and is farthest from {worst.column} of the run {worst.run}, "
+            f"with residuals of {size:.2g} times its noise; check the unit and the sign of this column, crank_speed "
+            "and the gear ratio"
+        )
+    words += [
         f"{each}: the model does not describe the recordings; check the gear ratio, the units of the columns and the "
         "data of the sensors"
         for each in machine.prior_conflicts
@@ -309,10 +326,13 @@ def sentences(machine: IdentifiedMachine) -> list[str]:
         for name, each in machine.estimates.items()
         if each.at_bound
     ]
-    words += [str(each) for each in machine.score_tests if each.is_rejected]
+    words += _on_known_numbers(machine.known)
+    is_explained = any(each.describes for each in machine.known.sets)
     for check in machine.residual_tests:
         unit = MEASURANDS[check.column].unit
         place = f"{check.column} of the run {check.run}"
+        if is_explained and not check.is_noise:
+            continue  # by numbers that are named above
         if check.reason == "orders":
             order, size = check.orders[0]
             words.append(
@@ -331,6 +351,26 @@ def sentences(machine: IdentifiedMachine) -> list[str]:
                 "its own (identify.sensor.noise), as all deviations grow with it"
             )
     return words
+
+
+def _on_known_numbers(known: KnownNumbers) -> Iterator[str]:
+    """Sentences on the known numbers and the law of friction that the recordings contradict."""
+    explaining = [str(each) for each in known.sets if each.describes]
+    if explaining:
+        yield (
+            f"The model describes the recordings with {'; or with '.join(explaining)}: measure these numbers, or "
+            "seek them (identify.parameter)"
+        )
+    if not explaining and known.is_law_rejected:
+        yield (
+            "The recordings contradict the law of friction in the pins: friction that is the same at all speeds does "
+            "not describe them"
+        )
+    if not explaining and known.sets:
+        yield (
+            f"No one or two of the known numbers explain the recordings; nearest comes {known.sets[0]}: check these "
+            "first"
+        )
 
 
 def identified_tables(machine: IdentifiedMachine, folder: Path) -> dict[str, Any]:

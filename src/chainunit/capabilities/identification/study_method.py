@@ -36,7 +36,8 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
     @cached_property
     def answers(self) -> pd.DataFrame:
         """The sought numbers by name: unit, value, standard deviation, interval of 95 % (low, high), and whether the
-        recordings determine the number; the value of one that they do not determine is no number."""
+        recordings determine the number; the value of one that they do not determine is no number. If the model does
+        not describe the recordings, deviation and interval are those that were known before."""
         import pandas as pd
 
         rows = {
@@ -68,7 +69,7 @@ def identify(
     InputError
         for a study without the table [identify], and with a line for each fault of the recordings.
     RunError
-        where the fit does not end.
+        if the machine does not run with the start values.
     WriteError
         for a file that cannot be written; the others are written.
     """

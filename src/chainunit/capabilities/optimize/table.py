@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import Field
 
-from ...core import units
 from ...core.errors import Faults, InputError, near_name, refusal_prefix
 from ...core.messages import unit_behind
 from ...core.quantities import Quantity, Value, Variable, declaration, quantity
@@ -184,10 +183,6 @@ def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, 
         entry.quantity(end, variable, entry.given[end]) if end in entry.given else missing
         for end, missing in zip(_ENDS, (-math.inf, math.inf), strict=True)
     )
-    for end in entry.given if variable.unit == "rad" else ():
-        given = entry.given[end]
-        if not units.has_unit(given) and abs(low if end == "min" else high) > 2.0 * math.pi:
-            entry.fault(end, f'is more than a turn; {units.IN_RADIANS}; was "{given} deg" meant?')
     return low, high, unit_behind(variable.unit)
 
 

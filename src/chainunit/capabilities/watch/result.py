@@ -140,6 +140,7 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
         is_described=watched.is_described,
         residuals=watched.residual_tests,
         doubts=[
+            *(() if watched.learned.is_ended else ("the fit still improved in its last round",)),
             *(
                 f"order {each.orders[0][0]} of the crank remains in {each.column}"
                 if each.reason == "orders"

@@ -136,7 +136,8 @@ class WatchedRecording:
     @property
     def is_described(self) -> bool:
         """Whether the machine of the study describes the begin of the recording."""
-        return all(test.is_noise for test in self.residual_tests) and not self.prior_conflicts
+        is_noise = all(test.is_noise for test in self.residual_tests)
+        return self.learned.is_ended and is_noise and not self.prior_conflicts
 
     @property
     def prior_conflicts(self) -> list[PriorConflict]:
@@ -149,7 +150,8 @@ class WatchedRecording:
     def only_feed_differs(self) -> bool:
         """Whether nothing but a feed that is not as stated speaks against the machine of the study."""
         own = sensor_conflicts(self.problem, self.learned)
-        return not self.is_described and not own and all(test.is_noise for test in self.residual_tests)
+        are_noise = all(test.is_noise for test in self.residual_tests)
+        return not self.is_described and self.learned.is_ended and not own and are_noise
 
     @property
     def noises(self) -> tuple[float, float]:
