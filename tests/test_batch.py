@@ -17,9 +17,9 @@ from chainunit import ChainUnitMachine, InputError, SideLoads, batch
 from chainunit.batch import native
 from chainunit.batch.equations import arguments_of
 from chainunit.batch.reductions import REDUCTIONS
-from chainunit.batch.vector_code import c_file
 from chainunit.core.engines import MATH
 from chainunit.core.native.compilers import Compiler, compiler
+from chainunit.core.printing.vector_code import header
 from chainunit.core.quantities import quotient
 from chainunit.core.symbolic_trace import outputs_of
 from chainunit.machines.chain_unit import ChamberForces
@@ -165,7 +165,7 @@ def test_divisions_and_roots_of_vectors():
     infinite numbers that a machine can meet."""
     own = compiler()
     code = (
-        c_file("lanes.h")
+        header()
         + """
 void compute(const double *x, const double *z, double *out, long n) {
   for (long i = 0; i < n; i += W) {

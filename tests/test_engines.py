@@ -11,9 +11,9 @@ from machines import random_loads, random_machine, random_state
 from test_javascript import OFTEN, QUICK, REST, Points, compare
 
 from chainunit.core import engines
-from chainunit.core.native import python_math
-from chainunit.core.native.kernels import kernels
-from chainunit.core.native.python_code import python_text
+from chainunit.core.printing import python_math
+from chainunit.core.printing.kernels import kernels
+from chainunit.core.printing.python_code import python_text
 from chainunit.core.symbolic_trace import outputs_of, trace
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.native.operations import ARGUMENT, NUMBER, Operations
+from ..core.printing.operations import ARGUMENT, NUMBER, Operations
 
 Entry = tuple[int, int]
 BLOCK = 4096

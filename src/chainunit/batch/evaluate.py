@@ -15,7 +15,7 @@ import numpy as np
 from ..core.errors import InputError, RemarkWarning, RunError, shown
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
-from ..core.native.operations import ARGUMENT
+from ..core.printing.operations import ARGUMENT
 from ..core.quantities import Variable
 from ..core.symbolic_trace import outputs_of
 from ..core.units import convert, scale, split

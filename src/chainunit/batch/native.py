@@ -13,15 +13,16 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from ..core.native.compilers import Compiler, compile_code, compiler, flags_for_this_processor
+from ..core.printing.vector_code import VectorCode, header
 from ..core.temporary_folders import scratch
 from .equations import Equations
 from .reductions import REDUCTIONS
-from .vector_code import VectorCode, c_file
 
 Reductions = tuple[tuple[int, str], ...]
 """Places of results, each with the name of its reduction; empty where the results themselves are stored."""
@@ -32,6 +33,11 @@ _LANES = 8
 
 _BLOCK = 64
 """Number of states that are kept in the first cache before they are stored."""
+
+
+def c_file(name: str) -> str:
+    """The text of a C file of this package."""
+    return (resources.files(__package__) / name).read_text("utf-8")
 
 
 def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> str:
@@ -58,7 +64,7 @@ def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> s
     }
     return "\n".join(
         [
-            c_file("lanes.h"),
+            header(),
             *(f"#define {name} {value}" for name, value in defines.items()),
             code.uniform(),
             code.body("states", (0, 1)),

@@ -19,7 +19,7 @@ from ...batch.equations import Equations, Result
 from ...batch.native import Reductions, aligned, native_kernel
 from ...core.engines import casadi_
 from ...core.errors import RunError
-from ...core.native.operations import Operations
+from ...core.printing.operations import Operations
 from ...core.symbolic_trace import trace
 from ...machines.machine import Machine
 

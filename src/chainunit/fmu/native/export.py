@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ...core.files import atomic_file, folder
 from ...core.model import Model
-from ...core.native.elementary_code import HEADER, header
+from ...core.printing.c_elementary import HEADER, header
 from ..companion_files import companion_files
 from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes

@@ -10,17 +10,17 @@ from collections.abc import Sequence
 from functools import cached_property
 from importlib import resources
 
-from ..core.native.c_forms import forms, number
-from ..core.native.operations import ARGUMENT, NUMBER, Operation, Operations
+from .c_forms import forms, number
+from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _ARITHMETIC = {"ADD", "SUB", "MUL", "SQ", "TWICE", "NEG", "ASSIGN"}
 """Operations that C has for vectors, or for a vector and a number; all others are functions of vectors."""
 _NAMES = {"CONSTPOW": "pow"}
 
 
-def c_file(name: str) -> str:
-    """The text of a C file of this package."""
-    return (resources.files(__package__) / name).read_text("utf-8")
+def header() -> str:
+    """The vectors, and the operations of the code on them."""
+    return (resources.files(__package__) / "lanes.h").read_text("utf-8")
 
 
 class VectorCode:
