@@ -85,17 +85,6 @@ def test_broadcasting_over_states_and_parameters():
     assert tau[3, 2, 1] == pytest.approx(MODEL.evaluate(engines.MATH, p, one)[0].tau, rel=1e-12)
 
 
-@pytest.mark.second
-def test_jax():
-    jax = pytest.importorskip("jax", reason="needs the extra `jax`")
-    jax.config.update("jax_enable_x64", True)
-    p, u = case(9)
-    xp = engines.jax_()
-    f = jax.jit(lambda v: jax.numpy.stack(all_outputs(xp, p, MODEL.input_layout.instance(v))))
-    got = f([jax.numpy.asarray(v) for v in MODEL.input_layout.values(u)])
-    np.testing.assert_allclose(np.asarray(got), all_outputs(engines.MATH, p, u), rtol=1e-11, atol=1e-8)
-
-
 def test_every_engine_has_exactly_the_names():
     made = [engines.MATH, engines.numpy_(), engines.casadi_(), engines.dual(engines.MATH)]
     assert all(set(vars(xp)) == set(engines.NAMES) for xp in made)
