@@ -19,8 +19,8 @@ from .native import c_file, defines
 from .reductions import Reductions, first_rows
 
 _WARP, _BLOCK, _RESIDENT = 32, 64, 6
-"""Number of threads of a warp and of a block, and of blocks of a processor that store results: with more of them the values of a
-state do not fit into the registers of a thread."""
+"""Number of threads of a warp and of a block, and of the blocks on a processor of the device that stores results: with
+more blocks the values of a state do not fit into the registers of a thread."""
 _WARPS, _LEAST = 8192, 128
 """Number of warps that keep the device busy, and the least number of states of a piece of a row."""
 _MOST_COUNTERS = 6000
@@ -126,9 +126,8 @@ class CudaKernel:
         numbers: Any,
         workers: int,
     ) -> None:
-        """Compute all states; see `chainunit.batch.native.NativeKernel`. `uniform` and `columns` are arrays of numpy or
-        of CuPy, `out` and `reason` of CuPy; the device
-        has its own `workers`."""
+        """Compute all states; see `chainunit.batch.native.NativeKernel`. `uniform` and `columns` are arrays of numpy
+        or of CuPy, `out` and `reason` of CuPy; the device has its own `workers`."""
         cupy, (outer, inner) = self._cupy, size
         values, ends = self._packed([*uniform, numbers]), np.cumsum([0, *map(len, uniform)])
         varied = [cupy.asarray(x, float) for x in columns]

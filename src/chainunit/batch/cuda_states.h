@@ -25,7 +25,7 @@ PER_VECTOR int state(const double *restrict U, const double *const *restrict col
 
 #if REDUCED
 #define BINS(h, row, bins) \
-    int *const h = own_counts + row; \
+    int *const h = counters + row; \
     for (int b = lane; b < bins; b += WARP) h[b] = 0;
 #define COUNT(h, y, low, per, bins) atomicAdd(h + bin_of(y, low, per, bins), 1);
 #define PART(row, x) { const double s = x; if (!lane) part[(row)*warps + w] = s; }
@@ -37,11 +37,11 @@ extern "C" __global__ void __launch_bounds__(BLOCK) pieces(
     const long long warps = count * parts, w = NUMBER_OF_THREAD / WARP, o = w / parts, p = w - o * parts;
     const int lane = threadIdx.x % WARP;
     if (w >= warps) return;
-    int *const own_counts = counts[threadIdx.x / WARP];
+    int *const counters = counts[threadIdx.x / WARP];
     int worst = 0;
     const double one = 1.0;
     BEGIN
-    (void)own_counts, (void)one;
+    (void)counters, (void)one;
     __syncwarp();
     for (long long i = n * p / parts + lane; i < n * (p + 1) / parts; i += WARP) {
         v y[RESULTS + 1];

@@ -102,8 +102,8 @@ def evaluate(
     workers : number of threads of the native engine; by default that of the processors
     out : the result of an earlier call with the same outputs and dimensions. Its memory takes the new results, and
         its own values are gone; new memory takes as long as the computation.
-    on_host : whether results of "cuda" are copied to the host, as arrays of numpy. Without it they stay on the device,
-        as arrays of CuPy; `values` may be such arrays, too.
+    on_host : whether results of "cuda" are copied to the host, as arrays of numpy. Without it they stay on the
+        device, as arrays of CuPy; `values` may be such arrays, too.
 
     Returns
     -------

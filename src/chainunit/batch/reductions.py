@@ -20,10 +20,10 @@ MOST_BINS = 1024
 class Reduction:
     """A reduction of a column over the last dimension: in words, as a function of an array, and in C.
 
-    In C each lane starts with `begin` and takes up each value by `take`, where ``{a}`` is the lane, ``{y}`` the value,
-    ``{one}`` 1 for a lane that counts and 0 for one that does not, and ``{limit}`` the limit of a count. The lanes are
-    put together by `merge`: their "sum", the "least" or the "largest". The result is `end` of this, ``{a}``, and of
-    the number of values, ``{n}``.
+    In C each lane starts with `begin` and takes up each value by `take`, where ``{a}`` is the lane, ``{y}`` the
+    value, ``{one}`` 1 for a lane that counts and 0 for one that does not, and ``{limit}`` the limit of a count. The
+    lanes are put together by `merge`: their "sum", the "least" or the "largest". The result is `end` of this,
+    ``{a}``, and of the number of values, ``{n}``.
     """
 
     words: str

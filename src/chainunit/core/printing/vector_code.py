@@ -1,5 +1,5 @@
-"""Code of operations over vectors of lanes: C for the processor, and CUDA for a GPU, by the same text. What a vector is,
-and the operations on it, is in the header of the language.
+"""Code of operations over vectors of lanes: C for the processor, and CUDA for a GPU, by the same text. The header of
+each language defines the vector and the operations on it.
 
 The operations are divided by level: values that follow from uniform arguments alone are computed once, as numbers,
 and are kept in ``U``; the others are computed for each vector of lanes.
