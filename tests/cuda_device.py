@@ -1,5 +1,5 @@
-"""CuPy without a GPU: its arrays are those of numpy, and its kernels come from a C++ compiler, whose threads stand for
-those of a device (cuda_threads.h). As those of CuPy, an array becomes one of numpy by `get` alone."""
+"""CuPy without a GPU: its arrays are those of numpy, and its kernels come from a C++ compiler, with threads of
+a device as in cuda_threads.h. As those of CuPy, an array becomes one of numpy by `get` alone."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import shutil
 import subprocess
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 
@@ -124,7 +125,7 @@ class RawModule:
             subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
             self._library = ctypes.CDLL(str(folder / "kernels.so"))
 
-    sources: list[str] = []
+    sources: ClassVar[list[str]] = []
 
     def get_function(self, name):
         if name not in self._parameters:

@@ -1,4 +1,4 @@
-"""Batches on a GPU, with a device that a C++ compiler stands for: states, reductions and reasons are those of numpy."""
+"""Batches on a GPU, whose kernels a C++ compiler takes: states, reductions and reasons are those of numpy."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def evaluated(points, engine, toward=None):
 def test_reductions_are_those_of_numpy():
     """Of rows in one piece and in several, and where the machine of a row cannot be assembled."""
     machine = ChainUnitMachine()
-    requests = {name: REQUESTS for name in ("tau", "rocker.tau")}
+    requests = dict.fromkeys(("tau", "rocker.tau"), REQUESTS)
     long = {"phi": np.linspace(0.0, 6.0, 5000), "r": [0.15], "w": 4.0}
     for values in (TURN, long):
         device, native, wanted = (
@@ -165,7 +165,7 @@ def test_values_of_parameters_are_no_part_of_the_code(device):
 
 
 def test_quotients_and_roots_from_approximations(tmp_path):
-    """To a unit in the last place, with all that IEEE 754 says of 0 and of infinite numbers that a machine can meet."""
+    """To a unit in the last place, with all that IEEE 754 says of 0 and of infinite numbers."""
     text = f"""
 #include "{cuda_device.THREADS}"
 {header("cuda")}

@@ -18,9 +18,9 @@ from .equations import Equations
 from .native import c_file, defines
 from .reductions import Reductions, first_rows
 
-_WARP, _BLOCK, _RESIDENT = 32, 64, 6
-"""Number of threads of a warp and of a block, and of the blocks on a processor of the device that stores results: with
-more blocks the values of a state do not fit into the registers of a thread."""
+_WARP, _BLOCK, _RESIDENT = 32, 64, 4
+"""Number of threads of a warp and of a block, and of the blocks on a processor of the device. With more blocks the
+values of a state do not fit into the registers of a thread."""
 _WARPS, _LEAST = 8192, 128
 """Number of warps that keep the device busy, and the least number of states of a piece of a row."""
 _MOST_COUNTERS = 6000
@@ -144,14 +144,15 @@ class CudaKernel:
         count, length = np.int64(outer), np.int64(inner)
         self._launch("rows", outer, count, places, steps, of_rows)
         if not self._rows:
-            arguments = count, length, of_rows, column, column_step, results, reason
-            self._launch("stored", outer * inner, *arguments)
+            self._launch(
+                "stored", outer * inner, count, length, of_rows, column, column_step, results, reason
+            )
             return
         parts = max(1, min(-(-_WARPS // outer), inner // _LEAST))
         part, part_reason = cupy.empty(self._rows * outer * parts), cupy.empty(outer * parts, np.int16)
         limits, pieces = values[int(ends[-1]) :], np.int64(parts)
-        arguments = count, length, pieces, of_rows, column, column_step, limits, part, part_reason
-        self._launch("pieces", _WARP * outer * parts, *arguments)
+        in_order = count, length, pieces, of_rows, column, column_step, limits, part, part_reason
+        self._launch("pieces", _WARP * outer * parts, *in_order)
         self._launch("finish", outer, count, length, pieces, part, part_reason, results, reason)
 
     def _packed(self, arrays: Sequence[Any]) -> Any:

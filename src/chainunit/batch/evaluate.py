@@ -118,15 +118,12 @@ def evaluate(
     RunError
         for results that do not fit into the memory.
     """
-    if engine not in ENGINES:
-        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
+    check_engine(engine)
     reduced: Reduced = ()
     if reduce is not None:
         if over is None or outputs is not None or by:
             raise InputError("reduce: needs the dimension `over`, and takes the place of `outputs` and `by`")
         outputs, reduced = list(reduce), _reduced(reduce)
-    if engine == "cuda":
-        cupy_()
     names = tuple(outputs if outputs is not None else (v.name for v in outputs_of(model)))
     own = equations(model, names, tuple(by))
     grid = Grid(own, values, parameters, over, engine, reduced)
@@ -138,6 +135,20 @@ def evaluate(
         size = 8e-9 * math.prod(grid.sizes.values()) * len(own.results)
         words = f"{size:.3g} GB of results: more than there is memory; evaluate fewer states, or reduce them"
         raise RunError(words) from error
+
+
+def check_engine(engine: str) -> None:
+    """Refuse an engine that there is not, or not on this machine.
+
+    Raises
+    ------
+    InputError
+        see `evaluate`.
+    """
+    if engine not in ENGINES:
+        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
+    if engine == "cuda":
+        cupy_()
 
 
 def _reduced(reduce: Mapping[str, Sequence[Request]]) -> Reduced:
