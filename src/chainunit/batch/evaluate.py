@@ -162,7 +162,7 @@ def _reduced(reduce: Mapping[str, Sequence[Request]]) -> Reduced:
 
 
 @dataclass(frozen=True)
-class Column:
+class ResultRows:
     """A variable of the results. A histogram has its `bins`: a row of the results for each, at these middles, in a
     `unit`."""
 
@@ -413,11 +413,11 @@ class Grid:
         return self.dims[:-1] if self._reduced else self.dims
 
     @property
-    def _columns(self) -> list[Column]:
+    def _columns(self) -> list[ResultRows]:
         """The variables of the results."""
         results = self._equations.results
         if not self._reduced:
-            return [Column(result) for result in results]
+            return [ResultRows(result) for result in results]
         return [reduced_column(results[column.place], request) for column, request in self._reduced]
 
     def dataset(self, memory: Memory, on_host: bool) -> xr.Dataset:
@@ -447,16 +447,16 @@ class Grid:
         return xr.Dataset(variables, coords)
 
 
-def reduced_column(result: Result, request: Request) -> Column:
+def reduced_column(result: Result, request: Request) -> ResultRows:
     """The variable of a reduced result."""
     if isinstance(request, Histogram):
         counts = Result(f"histogram({result.name})", "1", f"number of states by value, {result.description}")
-        return Column(counts, request.middles, result.unit)
+        return ResultRows(counts, request.middles, result.unit)
     if isinstance(request, Beyond):
         size = f"{request.limit:.15g}"
         text = f"number of states with a size beyond {size} {result.unit}, {result.description}"
-        return Column(Result(f"beyond({result.name}, {size})", "1", text))
-    return Column(
+        return ResultRows(Result(f"beyond({result.name}, {size})", "1", text))
+    return ResultRows(
         Result(f"{request}({result.name})", result.unit, f"{REDUCTIONS[request].words}, {result.description}")
     )
 
