@@ -164,8 +164,8 @@ def _pieces(outer: int, inner: int, workers: int, divide: bool) -> list[tuple[in
     return [(o, o + 1, a, min(a + length, inner)) for o in range(outer) for a in range(0, inner, length)]
 
 
-def load(source: str, compiler: Compiler) -> ctypes.CDLL:
-    """The compiled library of a C source.
+def load(source: str, compiler: Compiler, files: Mapping[str, str] | None = None) -> ctypes.CDLL:
+    """The compiled library of a C source, which includes these `files`, texts by name.
 
     Raises
     ------
@@ -174,7 +174,8 @@ def load(source: str, compiler: Compiler) -> ctypes.CDLL:
     """
     native = flags_for_this_processor(compiler)
     arguments = (*native.flags, "batch.c", "-o", "batch.so", *native.libraries)
-    binary = compile_code(compiler, arguments, {"batch.c": source.encode(), **native.files}, "batch.so")
+    texts = {name: text.encode() for name, text in {"batch.c": source, **(files or {})}.items()}
+    binary = compile_code(compiler, arguments, {**texts, **native.files}, "batch.so")
     with scratch() as folder:  # a loaded library stays usable
         file = folder / "batch.so"
         file.write_bytes(binary)

@@ -28,7 +28,8 @@ from ..core.engines import MATH, casadi_
 from ..core.errors import InputError, RunError
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS, Compiler, compiler
-from ..core.printing.c_forms import constant
+from ..core.printing.c_forms import STEP, constant
+from ..core.printing.c_forms import c_file as c_text
 from ..core.printing.operations import Operations
 from ..core.printing.vector_code import VectorCode, header
 from ..core.symbolic_trace import outputs_of, trace
@@ -339,8 +340,10 @@ def _compiled(
     )
     names = [v.name for v in arguments_of(model)]
     starts = (0, sizes[0], sum(sizes))
-    digest = hashlib.sha256(source.encode()).hexdigest()
-    return _NativeLoop(digest, load(source, compiler), [names[starts[kind] + k] for kind, k in code.inputs])
+    files = {STEP: c_text(STEP)}
+    digest = hashlib.sha256((source + files[STEP]).encode()).hexdigest()
+    uniform = [names[starts[kind] + k] for kind, k in code.inputs]
+    return _NativeLoop(digest, load(source, compiler, files), uniform)
 
 
 def _method(model: type[Model]) -> str:

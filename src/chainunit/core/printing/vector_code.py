@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from importlib import resources
 
-from .c_forms import forms, number
+from .c_forms import c_file, forms, number
 from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _ARITHMETIC = {"ADD", "SUB", "MUL", "SQ", "TWICE", "NEG", "ASSIGN"}
@@ -21,8 +20,7 @@ _NAMES = {"CONSTPOW": "pow"}
 
 def header(language: str = "c") -> str:
     """The vectors of a language, "c" or "cuda", and the operations of the code on them."""
-    file = {"c": "lanes.h", "cuda": "cuda.h"}[language]
-    return (resources.files(__package__) / file).read_text("utf-8")
+    return c_file({"c": "lanes.h", "cuda": "cuda.h"}[language])
 
 
 class VectorCode:
