@@ -654,7 +654,7 @@ static int slope_at(const Course *u, double since, const double *x, double *dx) 
 typedef double Number;
 typedef int Truth;
 #define ALL_TRUE 1
-#define any(truth) (truth)
+#define GOES_ON(truth) (truth)
 #define finite_all all_finite
 #define NUMBER(x) (x)
 #define CHOOSE(truth, x, y) ((truth) ? (x) : (y))

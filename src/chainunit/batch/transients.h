@@ -44,6 +44,7 @@ typedef v Number;
 typedef bits Truth;
 typedef Block Course;
 #define ALL_TRUE (~(bits){0})
+#define GOES_ON(truth) 1
 #define NUMBER V
 #define CHOOSE choose_v
 #define SMALLER fmin_v

@@ -1,7 +1,8 @@
 /* One step of the integrators of chainunit.core.integrators, in numbers or in vectors of numbers, with the constants
  * generated from there: for FMUs and for the lanes of batches. The file that includes this one defines
  *
- * Number, Truth           a number, and what a comparison gives; ALL_TRUE, any(truth), finite_all(x, n)
+ * Number, Truth           a number, and what a comparison gives; ALL_TRUE, finite_all(x, n), and
+ *                         GOES_ON(truth): whether another stage is needed if the stages before it were `truth`
  * NUMBER(x)               a Number from a double
  * CHOOSE(truth, x, y)     x if the comparison holds, else y; SMALLER(x, y), LARGER(x, y), SIZE(x), POWER(x, exponent)
  * Course, slope_at(course, since, x, dx)
@@ -16,18 +17,16 @@ static Number step_size(Number pace, Number left) {
 /* The pair of Dormand and Prince of orders 5 and 4: the states `at` after a step of the size h from x, and the derivatives
  * k at its stages, one stage after the other; whether they are finite. The first of the stages may be `known`. */
 static Truth dormand_prince(Course *course, int n, int known, Number since, Number h, const Number *x, Number *k, Number *at) {
-    Truth usable = ALL_TRUE;
-    for (int s = known; s < 7 && any(usable); ++s) {
+    Truth usable = known ? ALL_TRUE : slope_at(course, since, x, k);
+    for (int s = 1; s < 7 && GOES_ON(usable); ++s) {
         for (int i = 0; i < n; ++i) {
-            at[i] = x[i];
-            if (!s) continue;
             Number sum = STAGES[s][0] * k[i];
             for (int j = 1; j < s; ++j) sum += STAGES[s][j] * k[j * n + i];
-            at[i] += h * sum;
+            at[i] = x[i] + h * sum;
         }
         usable = usable & slope_at(course, since + h * NODES[s], at, k + s * n);
     }
-    return any(usable) ? usable & finite_all(at, n) & finite_all(k + 6 * n, n) : usable;
+    return GOES_ON(usable) ? usable & finite_all(at, n) & finite_all(k + 6 * n, n) : usable;
 }
 
 /* its error over the permitted one */
@@ -58,9 +57,8 @@ static Number next_pace(Number pace, Number h, Number error, Truth usable, doubl
 static Truth rk4(Course *course, int n, double taken, Number h, const Number *x, Number *k, Number *at, Number *later) {
     Truth usable = ALL_TRUE;
     for (int i = 0; i < n; ++i) later[i] = x[i];
-    for (int s = 0; s < 4 && any(usable); ++s) {
-        for (int i = 0; i < n; ++i) at[i] = x[i];
-        if (s) for (int i = 0; i < n; ++i) at[i] += RK4_NODES[s] * h * k[i];
+    for (int s = 0; s < 4 && GOES_ON(usable); ++s) {
+        for (int i = 0; i < n; ++i) at[i] = s ? x[i] + RK4_NODES[s] * h * k[i] : x[i];
         usable = usable & slope_at(course, (taken + RK4_NODES[s]) * h, at, k);
         for (int i = 0; i < n; ++i) later[i] += RK4_WEIGHTS[s] * h * k[i];
     }
