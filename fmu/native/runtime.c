@@ -656,7 +656,7 @@ typedef int Truth;
 #define ALL_TRUE 1
 #define GOES_ON(truth) (truth)
 #define finite_all all_finite
-#define NUMBER(x) (x)
+#define OF_DOUBLE(x) (x)
 #define CHOOSE(truth, x, y) ((truth) ? (x) : (y))
 #define SMALLER(x, y) ((x) < (y) ? (x) : (y))
 #define LARGER(x, y) ((x) > (y) ? (x) : (y))

@@ -45,7 +45,7 @@ typedef bits Truth;
 typedef Block Course;
 #define ALL_TRUE (~(bits){0})
 #define GOES_ON(truth) 1
-#define NUMBER V
+#define OF_DOUBLE V
 #define CHOOSE choose_v
 #define SMALLER fmin_v
 #define LARGER fmax_v

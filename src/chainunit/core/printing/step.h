@@ -3,7 +3,7 @@
  *
  * Number, Truth           a number, and what a comparison gives; ALL_TRUE, finite_all(x, n), and
  *                         GOES_ON(truth): whether another stage is needed if the stages before it were `truth`
- * NUMBER(x)               a Number from a double
+ * OF_DOUBLE(x)               a Number from a double
  * CHOOSE(truth, x, y)     x if the comparison holds, else y; SMALLER(x, y), LARGER(x, y), SIZE(x), POWER(x, exponent)
  * Course, slope_at(course, since, x, dx)
  *                         the derivatives of the states x at a time since the begin of the step; whether they are finite
@@ -32,11 +32,11 @@ static Truth dormand_prince(Course *course, int n, int known, Number since, Numb
 /* its error over the permitted one */
 static Number error_of(int n, const Number *x, const Number *at, const Number *k, Number h, double tolerance,
                        const double *nominal) {
-    Number error = NUMBER(0.0);
+    Number error = OF_DOUBLE(0.0);
     for (int i = 0; i < n; ++i) {
         Number sum = ERRORS[0] * k[i];
         for (int s = 1; s < 7; ++s) sum += ERRORS[s] * k[s * n + i];
-        const Number size = LARGER(LARGER(SIZE(x[i]), SIZE(at[i])), NUMBER(nominal[i]));
+        const Number size = LARGER(LARGER(SIZE(x[i]), SIZE(at[i])), OF_DOUBLE(nominal[i]));
         error = LARGER(error, SIZE(h * sum) / (tolerance * size));
     }
     return error;
@@ -44,12 +44,12 @@ static Number error_of(int n, const Number *x, const Number *at, const Number *k
 
 /* the next step */
 static Number next_pace(Number pace, Number h, Number error, Truth usable, double longest) {
-    const Number wanted = CHOOSE(error < NO_ERROR, NUMBER(MOST_GROWTH), SAFETY * POWER(error, ERROR_POWER));
-    const Number growth = CHOOSE(usable, wanted, NUMBER(LEAST_GROWTH));
-    Number next = h * SMALLER(LARGER(growth, NUMBER(LEAST_GROWTH)), NUMBER(MOST_GROWTH));
+    const Number wanted = CHOOSE(error < NO_ERROR, OF_DOUBLE(MOST_GROWTH), SAFETY * POWER(error, ERROR_POWER));
+    const Number growth = CHOOSE(usable, wanted, OF_DOUBLE(LEAST_GROWTH));
+    Number next = h * SMALLER(LARGER(growth, OF_DOUBLE(LEAST_GROWTH)), OF_DOUBLE(MOST_GROWTH));
     /* a step that the end of the interval shortened does not shorten the next one */
     next = CHOOSE(usable & (error <= 1.0) & (h < pace), LARGER(next, pace), next);
-    return SMALLER(LARGER(next, NUMBER(SHORTEST * longest)), NUMBER(longest));
+    return SMALLER(LARGER(next, OF_DOUBLE(SHORTEST * longest)), OF_DOUBLE(longest));
 }
 
 /* The classical Runge-Kutta method: the states `later` after step number `taken` of the size h from x; whether the
