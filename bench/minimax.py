@@ -1,7 +1,7 @@
 # %% [markdown]
 # Polynomials of the own sine, arcsine, arctangent, exponential and logarithm
 #
-# Prints the coefficients in `chainunit.core.native.elementary`: minimax polynomials by the exchange of Remez in
+# Prints the coefficients in `chainunit.core.printing.elementary`: minimax polynomials by the exchange of Remez in
 # 50-digit arithmetic, rounded to doubles, each with its largest error relative to the function.
 
 # %%

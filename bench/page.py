@@ -105,7 +105,7 @@ def engines(f: Any) -> str:
     fastest = {}
     for row in s["rows"]:
         name = row["key"].split()[0]
-        engine = {"chosen": "native", "numpy": "numpy", "jax": f"jax ({row['key'].split()[-1]})"}.get(name)
+        engine = {"chosen": "native", "numpy": "numpy"}.get(name)
         if engine and (name != "numpy" or "chosen" in row["key"]):
             fastest[engine] = max(fastest.get(engine, row), row, key=lambda each: each["rate"])
     best = fastest["native"]["rate"]
@@ -136,7 +136,7 @@ def engines(f: Any) -> str:
     return table(head, rows) + "\nAn evaluation is\n\n" + "\n".join([WORK.format(**s), *works]) + "\n"
 
 
-WORK = "- native, numpy, jax: {chosen} outputs, the torques and all reactions, stored"
+WORK = "- native, numpy: {chosen} outputs, the torques and all reactions, stored"
 
 
 def missing(f: Any) -> str:

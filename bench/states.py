@@ -116,19 +116,6 @@ class Rates:
             lambda: self.machine.evaluate(plain), 4,
         )  # fmt: skip
 
-    def jax(self) -> None:
-        """The jax engine in double precision, on each kind of device that it has."""
-        import jax
-
-        values = motion(MANY)
-        for device in dict.fromkeys(("cpu", jax.devices()[0].platform)):
-            with jax.default_device(jax.devices(device)[0]):
-                self.add(
-                    f"jax {device}", f"jax engine on {device}, {len(CHOSEN)} outputs stored", MANY,
-                    CORES if device == "cpu" else device,
-                    lambda: self.machine.batch(values, list(CHOSEN), engine="jax"), 3,
-                )  # fmt: skip
-
 
 def reference_points() -> dict[str, Any]:
     """The worst deviation of the native engine from the reference points, relative, or absolute below 1."""
@@ -211,7 +198,7 @@ def main() -> None:
     if compiler() is None:
         raise SystemExit("no C compiler: there is no native engine to measure")
     points = reference_points()
-    rates, ours, missing = Rates(), ["native", "numpy"], {}
+    rates, missing = Rates(), {}
     for n, again in ((BLOCK, True), (MANY, True), (MANY, False)):
         rates.native("chosen", CHOSEN, n, again=again)
         rates.native("all", ALL, n, again=again)
@@ -219,12 +206,7 @@ def main() -> None:
     rates.cycle("cycle chosen", CHOSEN)
     rates.native("derivatives", ("tau",), BLOCK, BY, again=True)
     rates.arrays()
-    try:
-        rates.jax()
-        ours.append("jax")
-    except ImportError:
-        missing["jax"] = "is not installed"
-    errors = {engine: engine_errors(engine) for engine in ours}
+    errors = {engine: engine_errors(engine) for engine in ("native", "numpy")}
     others, absent = other_engines.measure()
     for row in others:
         print({name: x for name, x in row.items() if x is not None})

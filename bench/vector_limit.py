@@ -29,8 +29,8 @@ from figures import least
 
 from chainunit.batch.equations import arguments_of, equations
 from chainunit.batch.native import aligned, load
-from chainunit.batch.vector_code import VectorCode, c_file
 from chainunit.core.native.compilers import compiler
+from chainunit.core.printing.vector_code import VectorCode, header
 
 CHAINS, TURNS, ROUNDS = 12, 20_000, 30
 SUMS = {"ADD", "SUB", "TWICE"}
@@ -86,7 +86,7 @@ def library(functions: Sequence[str] = ()) -> Any:
     ]
     own = compiler()
     assert own is not None
-    made = load(c_file("lanes.h") + HEAD + "".join(loops), own)
+    made = load(header() + HEAD + "".join(loops), own)
     for name in forms:
         getattr(made, f"loop_{name}").restype = ctypes.c_double
     return made

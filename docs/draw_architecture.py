@@ -97,7 +97,7 @@ TEXTS = {
     "groups": "crank, dyad, triad, chain, bodies, friction",
     "work": "jobs, runner, store, progress",
     "reading": "tables, numbers and texts, as people write them",
-    "core": "quantities, model, engines, batches, vectors of the plane, load port, integrators, native code, files",
+    "core": "quantities, model, engines, batches, vectors of the plane, load port, integrators, printers, files",
     "fmu": "any model as an FMU",
 }
 WAYS = {

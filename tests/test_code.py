@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from chainunit.core.engines import casadi_
-from chainunit.core.native import code
 from chainunit.core.native.compilers import compile_code, compiler
-from chainunit.core.native.elementary_code import header
+from chainunit.core.printing import c_code
+from chainunit.core.printing.c_elementary import header
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native import generate
 from chainunit.models import MODELS
@@ -62,10 +62,10 @@ def expressions():
 
 @pytest.mark.parametrize("longest", [1, 3, 2500])
 def test_only_what_is_wanted_is_written_and_right(called, longest, monkeypatch):
-    monkeypatch.setattr(code, "_LONGEST", longest)
+    monkeypatch.setattr(c_code, "_LONGEST", longest)
     arguments, groups = expressions()
     offsets = [2, 10, 20]
-    program = code.Program("some", arguments, groups, offsets, "OFTEN")
+    program = c_code.Program("some", arguments, groups, offsets, "OFTEN")
     exact = casadi.Function("f", arguments, [casadi.vertcat(*groups)])
     rng = np.random.default_rng(1)
     for reference in (1, 2, 4, 5, 7):
@@ -80,7 +80,7 @@ def test_only_what_is_wanted_is_written_and_right(called, longest, monkeypatch):
 
 def test_each_operation_stands_once():
     arguments, groups = expressions()
-    program = code.Program("some", arguments, groups, [0, 4, 7], "OFTEN")
+    program = c_code.Program("some", arguments, groups, [0, 4, 7], "OFTEN")
     for operation in ("sine_and_cosine(", "sqrt(", "arctangent2(", "least_of(", "exponential("):
         assert program.text.count(operation) == 1, operation
 
@@ -95,7 +95,7 @@ def test_groups_of_a_model_share_their_operations(name):
     parts = re.split(r"static void values_", program.text)[1:]
     operations = sum(len(part) for part in program._parts)
     assert operations < 1.1 * single and len(parts) == len(program._parts)
-    assert max(len(part) for part in program._parts) <= code._LONGEST
+    assert max(len(part) for part in program._parts) <= c_code._LONGEST
 
 
 def test_every_operation_of_an_engine_is_known(called):
@@ -105,13 +105,13 @@ def test_every_operation_of_an_engine_is_known(called):
     rows += [xp.minimum(x, 0.3), xp.maximum(x, 0.3), x**3, 1.0 / x, -x, 2.0 - x, x * x]
     both = casadi.vertcat(*rows)
     both = casadi.vertcat(both, casadi.jtimes(both, x, casadi.SX(1.0)))
-    program = code.Program("all", [x], [both], [0], "OFTEN")
+    program = c_code.Program("all", [x], [both], [0], "OFTEN")
     for at in (0.2, 0.7):
         want = np.array(casadi.Function("f", [x], [both])(at)).ravel()
         np.testing.assert_allclose(called(program, [[at]], 1)[: len(want)], want, rtol=2e-15)
 
 
 def test_numbers_of_any_kind():
-    assert [code.number(x) for x in (1.5, -2.0, 0.0, -0.0, float("inf"), -float("inf"), float("nan"))] == [
+    assert [c_code.number(x) for x in (1.5, -2.0, 0.0, -0.0, float("inf"), -float("inf"), float("nan"))] == [
         "1.5", "(-2.0)", "0.0", "(-0.0)", "INFINITY", "(-INFINITY)", "NAN",
     ]  # fmt: skip

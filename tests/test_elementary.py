@@ -9,9 +9,9 @@ import math
 import numpy as np
 import pytest
 
-from chainunit.core.native import elementary
 from chainunit.core.native.compilers import compile_code, compiler
-from chainunit.core.native.elementary_code import HEADER, header
+from chainunit.core.printing import elementary
+from chainunit.core.printing.c_elementary import HEADER, header
 
 XP = elementary.numpy_basic()
 LONG = np.longdouble

@@ -11,9 +11,9 @@ from machines import random_loads, random_machine, random_state
 from test_javascript import OFTEN, QUICK, REST, Points, compare
 
 from chainunit.core import engines
-from chainunit.core.native import python_math
-from chainunit.core.native.kernels import kernels
-from chainunit.core.native.python_code import python_text
+from chainunit.core.printing import python_math
+from chainunit.core.printing.kernels import kernels
+from chainunit.core.printing.python_code import python_text
 from chainunit.core.symbolic_trace import outputs_of, trace
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
@@ -83,17 +83,6 @@ def test_broadcasting_over_states_and_parameters():
         {"phi": float(phi[2, 0]), "w": float(w[1]), "left.material_mass": float(masses[3, 0, 0])}, u
     )
     assert tau[3, 2, 1] == pytest.approx(MODEL.evaluate(engines.MATH, p, one)[0].tau, rel=1e-12)
-
-
-@pytest.mark.second
-def test_jax():
-    jax = pytest.importorskip("jax", reason="needs the extra `jax`")
-    jax.config.update("jax_enable_x64", True)
-    p, u = case(9)
-    xp = engines.jax_()
-    f = jax.jit(lambda v: jax.numpy.stack(all_outputs(xp, p, MODEL.input_layout.instance(v))))
-    got = f([jax.numpy.asarray(v) for v in MODEL.input_layout.values(u)])
-    np.testing.assert_allclose(np.asarray(got), all_outputs(engines.MATH, p, u), rtol=1e-11, atol=1e-8)
 
 
 def test_every_engine_has_exactly_the_names():

@@ -19,10 +19,10 @@ from chainunit import InputError
 from chainunit.core import integrators
 from chainunit.core.engines import MATH, casadi_, numpy_
 from chainunit.core.model import Model, Part
-from chainunit.core.native import elementary
-from chainunit.core.native.kernels import kernels
-from chainunit.core.native.operations import ARGUMENT, NUMBER, Operations
+from chainunit.core.printing import elementary
 from chainunit.core.printing.javascript import model_text, program
+from chainunit.core.printing.kernels import kernels
+from chainunit.core.printing.operations import ARGUMENT, NUMBER, Operations
 from chainunit.core.quantities import Value, declaration, quantity
 from chainunit.core.symbolic_trace import outputs_of, trace
 from chainunit.machines.flexible import flexible

@@ -10,7 +10,7 @@ import pytest
 
 from chainunit.core.engines import MATH, NAMES, Dual, casadi_, dual, numpy_, slope
 from chainunit.core.errors import InputError
-from chainunit.core.native.operations import Operations
+from chainunit.core.printing.operations import Operations
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine

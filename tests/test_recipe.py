@@ -12,8 +12,8 @@ import pytest
 
 import chainunit
 from chainunit.core.model import Model, Part, Terminal
-from chainunit.core.native.kernels import frequent_outputs
 from chainunit.core.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flanges, load_terminal
+from chainunit.core.printing.kernels import frequent_outputs
 from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.fmu import backends, recipe
 from chainunit.fmu.description import Interface

@@ -633,22 +633,37 @@ static Status output_derivatives(Instance *c, const unsigned *reference, size_t 
 
 /* -- co-simulation; inputs follow their derivatives to the end of the step */
 
-/* The course of the inputs in a step: `at` are their values at the present moment. */
+/* The course of the inputs of an instance in a step: `at` are their values at the present moment. */
 typedef struct {
+    Instance *c;
     double *at;
     const double *rate, *half; /* first derivative, and half of the second */
 } Course;
 
-static void run_to(const Instance *c, const Course *u, double since) {
-    for (int i = 0; i < model.n_u; ++i) u->at[i] = c->u[i] + since * (u->rate[i] + since * u->half[i]);
+static void run_to(const Course *u, double since) {
+    for (int i = 0; i < model.n_u; ++i) u->at[i] = u->c->u[i] + since * (u->rate[i] + since * u->half[i]);
 }
 
-static int slope(Instance *c, const Course *u, double since, const double *x, double *dx) {
-    run_to(c, u, since);
-    const double *arg[4] = {c->p, u->at, x, c->k};
-    kernels.derivatives(arg, dx, c->w, 1u);
+static int slope_at(const Course *u, double since, const double *x, double *dx) {
+    run_to(u, since);
+    const double *arg[4] = {u->c->p, u->at, x, u->c->k};
+    kernels.derivatives(arg, dx, u->c->w, 1u);
     return all_finite(dx, model.n_x);
 }
+
+typedef double Number;
+typedef int Truth;
+#define ALL_TRUE 1
+#define GOES_ON(truth) (truth)
+#define finite_all all_finite
+#define OF_DOUBLE(x) (x)
+#define CHOOSE(truth, x, y) ((truth) ? (x) : (y))
+#define SMALLER(x, y) ((x) < (y) ? (x) : (y))
+#define LARGER(x, y) ((x) > (y) ? (x) : (y))
+#define SIZE fabs
+/* the same bits as in JavaScript */
+#define POWER(x, exponent) exponential((exponent) * logarithm(x))
+#include "step.h"
 
 static double number(Kernel kernel, const Instance *c) {
     double value = 0.0;
@@ -669,7 +684,8 @@ static Status over_budget(Instance *c, double time, double size) {
 }
 
 /* The classical Runge-Kutta method with equal steps, whose number is known in advance. */
-static Status even_steps(Instance *c, double time, double size, const Course *u, double *work) {
+static Status even_steps(Course *u, double time, double size, double *work) {
+    Instance *const c = u->c;
     const int n_x = model.n_x;
     double *x = work, *k = x + n_x, *later = k + n_x, *at = later + n_x;
     const double longest = number(kernels.internal_step, c);
@@ -679,77 +695,47 @@ static Status even_steps(Instance *c, double time, double size, const Course *u,
     const double h = size / (double)n;
     memcpy(x, c->x, (size_t)n_x * sizeof(double));
     for (long s = 0; s < n; ++s) {
-        for (int i = 0; i < n_x; ++i) later[i] = x[i];
-        for (int stage = 0; stage < 4; ++stage) {
-            for (int i = 0; i < n_x; ++i) at[i] = stage ? x[i] + RK4_NODES[stage] * h * k[i] : x[i];
-            if (!slope(c, u, ((double)s + RK4_NODES[stage]) * h, at, k)) return astray(c, time);
-            for (int i = 0; i < n_x; ++i) later[i] += RK4_WEIGHTS[stage] * h * k[i];
-        }
-        for (int i = 0; i < n_x; ++i) x[i] = later[i];
+        if (!rk4(u, n_x, (double)s, h, x, k, at, later)) return astray(c, time);
+        memcpy(x, later, (size_t)n_x * sizeof(double));
     }
     memcpy(c->x, x, (size_t)n_x * sizeof(double));
     return OK;
 }
 
 /* Change the states `x` so that they meet the constraints at the time `since`. */
-static int close_states(Instance *c, const Course *u, double since, double *x, double *spare) {
-    run_to(c, u, since);
-    const double *arg[4] = {c->p, u->at, x, c->k};
-    kernels.closed(arg, spare, c->w, 1u);
+static int close_states(const Course *u, double since, double *x, double *spare) {
+    run_to(u, since);
+    const double *arg[4] = {u->c->p, u->at, x, u->c->k};
+    kernels.closed(arg, spare, u->c->w, 1u);
     if (!all_finite(spare, model.n_x)) return 0;
     memcpy(x, spare, (size_t)model.n_x * sizeof(double));
     return 1;
 }
 
-/* The pair of Dormand and Prince of orders 5 and 4, with error control to the model's tolerance; the constraints are
- * closed after each step. */
-static Status controlled_steps(Instance *c, double time, double size, const Course *u, double *work) {
+/* Steps with error control to the model's tolerance; the constraints are closed after each step. */
+static Status controlled_steps(Course *u, double time, double size, double *work) {
+    Instance *const c = u->c;
     const int n_x = model.n_x;
     double *x = work, *at = x + n_x, *k = at + n_x;
     const double longest = number(kernels.internal_step, c), tolerance = number(kernels.tolerance, c);
     memcpy(x, c->x, (size_t)n_x * sizeof(double));
     for (int round = 0; !c->closed && round < 2; ++round)
-        if (!close_states(c, u, 0.0, x, at)) return astray(c, time);
+        if (!close_states(u, 0.0, x, at)) return astray(c, time);
     long taken = 0;
     double since = 0.0, pace = c->pace > 0.0 ? c->pace : FIRST * longest;
     while (since < size) {
         if ((double)++taken > most_steps(c)) return over_budget(c, time, size);
-        const double left = size - since;
-        /* the rest of the interval takes one step or two equal ones, so that no tiny step remains */
-        const double h = pace >= left ? left : pace > 0.5 * left ? 0.5 * left : pace;
-        int usable = 1;
-        for (int s = 0; s < 7 && usable; ++s) {
-            if (!s) memcpy(at, x, (size_t)n_x * sizeof(double));
-            for (int i = 0; s && i < n_x; ++i) {
-                double sum = STAGES[s][0] * k[i];
-                for (int j = 1; j < s; ++j) sum += STAGES[s][j] * k[j * n_x + i];
-                at[i] = x[i] + h * sum;
-            }
-            usable = slope(c, u, since + h * NODES[s], at, k + s * n_x);
-        }
-        usable = usable && all_finite(at, n_x);
-        double error = 0.0;
-        for (int i = 0; i < n_x && usable; ++i) {
-            double sum = ERRORS[0] * k[i];
-            for (int s = 1; s < 7; ++s) sum += ERRORS[s] * k[s * n_x + i];
-            const double big = fabs(x[i]) > fabs(at[i]) ? fabs(x[i]) : fabs(at[i]);
-            const double scale = tolerance * (big > model.nominal[i] ? big : model.nominal[i]);
-            const double share = fabs(h * sum) / scale;
-            if (share > error) error = share;
-        }
+        const double left = size - since, h = step_size(pace, left);
+        const int usable = dormand_prince(u, n_x, 0, since, h, x, k, at);
+        const double error = usable ? error_of(n_x, x, at, k, h, tolerance, model.nominal) : 0.0;
         const int last_resort = h <= SHORTEST * longest;
         if (!usable && last_resort) return astray(c, time);
         if (usable && (error <= 1.0 || last_resort)) {
             since = h >= left ? size : since + h;
             memcpy(x, at, (size_t)n_x * sizeof(double));
-            if (!close_states(c, u, since, x, at)) return astray(c, time);
+            if (!close_states(u, since, x, at)) return astray(c, time);
         }
-        const double growth = !usable ? LEAST_GROWTH : error < NO_ERROR ? MOST_GROWTH
-                              : SAFETY * exponential(ERROR_POWER * logarithm(error));
-        double next = h * (growth < LEAST_GROWTH ? LEAST_GROWTH : growth > MOST_GROWTH ? MOST_GROWTH : growth);
-        /* a step that the end of the interval shortened does not shorten the next one */
-        if (usable && error <= 1.0 && h < pace && next < pace) next = pace;
-        pace = next > longest ? longest : next < SHORTEST * longest ? SHORTEST * longest : next;
+        pace = next_pace(pace, h, error, usable, longest);
     }
     memcpy(c->x, x, (size_t)n_x * sizeof(double));
     c->pace = pace;
@@ -783,8 +769,8 @@ static Status step(Instance *c, double time, double size) {
         }
     }
     if (n_x && size > 0.0) {
-        const Course course = {u, rate, half};
-        Status status = (kernels.closed ? controlled_steps : even_steps)(c, time, size, &course, half + n_u);
+        Course course = {c, u, rate, half};
+        Status status = (kernels.closed ? controlled_steps : even_steps)(&course, time, size, half + n_u);
         if (status) return status;
         c->fresh = 0;
     }

@@ -10,7 +10,7 @@ from typing import Any
 from ..core.engines import casadi_
 from ..core.errors import InputError, near_name
 from ..core.model import Model
-from ..core.native.operations import Operations
+from ..core.printing.operations import Operations
 from ..core.quantities import Variable, quotient
 from ..core.symbolic_trace import trace
 

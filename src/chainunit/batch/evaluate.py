@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,19 +17,23 @@ from ..core.declared_numbers import in_declared_unit, magnitude_and_unit
 from ..core.errors import InputError, RemarkWarning, RunError, check_kind
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
-from ..core.native.operations import ARGUMENT
+from ..core.printing.operations import ARGUMENT
 from ..core.quantities import Variable
 from ..core.symbolic_trace import outputs_of
 from ..core.units import scale
 from . import arrays
+from .cuda import cuda_kernel, cupy_, host, namespace, on_device
 from .equations import Equations, Result, equations, find, names_of
-from .native import Reductions, aligned, native_kernel
-from .reductions import REDUCTIONS
+from .native import aligned, native_kernel
+from .reductions import REDUCTIONS, Beyond, Histogram, ReducedColumn, by_array, column_of, flat_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
 
-ENGINES = ("native", "numpy", "jax")
+ENGINES = ("native", "numpy", "cuda")
+Request = str | Beyond | Histogram
+Reduced = tuple[tuple[ReducedColumn, Request], ...]
+"""Reductions with their requests."""
 _LEAST_INNER = 64
 """A last dimension that is shorter is no loop of its own: all dimensions are one loop then."""
 
@@ -70,11 +75,12 @@ def evaluate(
     *,
     by: Sequence[str] = (),
     over: str | None = None,
-    reduce: Mapping[str, Sequence[str]] | None = None,
+    reduce: Mapping[str, Sequence[Request]] | None = None,
     parameters: Any = None,
     engine: str = "native",
     workers: int | None = None,
     out: xr.Dataset | None = None,
+    on_host: bool = False,
 ) -> xr.Dataset:
     """Outputs of a model over arrays of parameters, inputs and states.
 
@@ -89,14 +95,17 @@ def evaluate(
         ``force(pivot)``); by default all outputs
     by : names of parameters, inputs and states by which each output is differentiated; the derivatives are exact,
         with the names ``d(tau)/d(r)``
-    over, reduce : the dimension over which outputs are reduced, and by output the names of `REDUCTIONS`; the results
-        have the names ``peak(tau)``. With them, `outputs` and `by` are not given.
+    over, reduce : the dimension over which outputs are reduced, and by output the names of `REDUCTIONS`, `Beyond` and
+        `Histogram`; the results have the names ``peak(tau)``, ``beyond(tau, 500)`` and ``histogram(tau)``, the latter
+        with a further dimension ``bin(tau)``. With them, `outputs` and `by` are not given.
     parameters : an instance of `model.Parameters` with the values of all other parameters
-    engine : "native" (compiled C, SIMD, threads), "numpy" or "jax"; without a C compiler "native" is numpy, with a
-        warning
+    engine : "native" (compiled C, SIMD, threads), "numpy", or "cuda" (a GPU of NVIDIA, by CuPy); without a C compiler
+        "native" is numpy, with a warning
     workers : number of threads of the native engine; by default that of the processors
     out : the result of an earlier call with the same outputs and dimensions. Its memory takes the new results, and
         its own values are gone; new memory takes as long as the computation.
+    on_host : whether results of "cuda" are copied to the host, as arrays of numpy. Without it they stay on the
+        device, as arrays of CuPy; `values` may be such arrays, too.
 
     Returns
     -------
@@ -106,50 +115,99 @@ def evaluate(
     Raises
     ------
     InputError
-        for an unknown name, a value that is missing or of a wrong unit, and sizes that do not fit.
+        for an unknown name, a value that is missing or of a wrong unit, sizes that do not fit, and the engine "cuda"
+        without CuPy or a GPU.
+    RunError
+        for results that do not fit into the memory.
     """
     check_kind("values", values, Mapping, "a mapping of names to values")
-    if engine not in ENGINES:
-        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
-    reductions: Reductions = ()
+    check_engine(engine)
+    reduced: Reduced = ()
     if reduce is not None:
         if over is None or outputs is not None or by:
             raise InputError("reduce: needs the dimension `over`, and takes the place of `outputs` and `by`")
-        outputs, reductions = list(reduce), _reductions(reduce)
+        outputs, reduced = list(reduce), _reduced(reduce)
     names = tuple(outputs if outputs is not None else (v.name for v in outputs_of(model)))
     own = equations(model, names, tuple(by))
-    grid = Grid(own, values, parameters, over)
-    memory = grid.memory(reductions, out)
-    grid.compute(memory, engine, reductions, workers or os.cpu_count() or 1)
-    return grid.dataset(memory, reductions)
+    grid = Grid(own, values, parameters, over, engine, reduced)
+    try:
+        memory = grid.memory(out)
+        grid.compute(memory, workers or os.cpu_count() or 1)
+        return grid.dataset(memory, on_host)
+    except MemoryError as error:
+        size = 8e-9 * math.prod(grid.sizes.values()) * len(own.results)
+        words = f"{size:.3g} GB of results: more than there is memory; evaluate fewer states, or reduce them"
+        raise RunError(words) from error
 
 
-def _reductions(reduce: Mapping[str, Sequence[str]]) -> Reductions:
-    pairs = []
-    for place, (output, names) in enumerate(reduce.items()):
-        for name in names:
-            if name not in REDUCTIONS:
-                raise InputError(f"{output}: no reduction {name!r}; there are {', '.join(REDUCTIONS)}")
-            pairs.append((place, name))
-    return tuple(pairs)
+def check_engine(engine: str) -> None:
+    """Refuse an engine that there is not, or not on this machine.
+
+    Raises
+    ------
+    InputError
+        see `evaluate`.
+    """
+    if engine not in ENGINES:
+        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
+    if engine == "cuda":
+        cupy_()
+
+
+def _reduced(reduce: Mapping[str, Sequence[Request]]) -> Reduced:
+    """The requests with the places of their outputs, checked."""
+    requests = [(place, output, each) for place, (output, of) in enumerate(reduce.items()) for each in of]
+    histograms = [output for _, output, request in requests if isinstance(request, Histogram)]
+    for output in histograms:
+        if histograms.count(output) > 1:
+            raise InputError(f"{output}: has {histograms.count(output)} histograms; give one, with more bins")
+    return tuple((column_of(place, request, output), request) for place, output, request in requests)
+
+
+@dataclass(frozen=True)
+class ResultRows:
+    """A variable of the results. A histogram has its `bins`: a row of the results for each, at these middles, in a
+    `unit`."""
+
+    result: Result
+    bins: Any = None
+    unit: str = ""
+
+    @property
+    def rows(self) -> int:
+        """Its number of rows."""
+        return 1 if self.bins is None else len(self.bins)
+
+    @property
+    def dims(self) -> list[str]:
+        """Its dimensions before those of the states."""
+        return [] if self.bins is None else [self.result.name.replace("histogram(", "bin(", 1)]
 
 
 @dataclass(frozen=True)
 class Memory:
-    """Where the results go: an array of each, shape (outer, inner) or, reduced, (outer,), and their reasons."""
+    """Where the results go: an array of each row, shape (outer, inner) or, reduced, (outer,), and their reasons;
+    `parts` are the rows by variable, each of shape (rows, outer, inner) or (rows, outer)."""
 
     results: Any
     reason: Any
+    parts: Sequence[Any] = ()
 
 
 class Grid:
     """The states of a batch: arguments over named dimensions."""
 
     def __init__(
-        self, equations: Equations, values: Mapping[str, Any], parameters: Any, over: str | None
+        self,
+        equations: Equations,
+        values: Mapping[str, Any],
+        parameters: Any,
+        over: str | None,
+        engine: str,
+        reduced: Reduced,
     ) -> None:
         model = equations.model
-        self._equations = equations
+        self._equations, self._engine, self._reduced = equations, engine, reduced
         places = find(values, names_of(equations.arguments), "parameter, input or state")
         given = {
             name: _array(equations.arguments[k], x)
@@ -158,6 +216,8 @@ class Grid:
         self.sizes: dict[str, int] = {}
         self._coords: dict[str, Any] = {}
         for name, x in given.items():
+            if engine != "cuda" and on_device(x.data):
+                raise InputError(f"{name}: is on the GPU; take engine 'cuda', or give its values of numpy")
             for dim, size in x.sizes.items():
                 if self.sizes.setdefault(str(dim), size) != size:
                     raise InputError(
@@ -209,7 +269,7 @@ class Grid:
                 raise InputError(f"{variable.name}: has no value; a state has no start value of its own")
             return np.full((1, 1), np.nan if start is None else start)
         q = variable.quantity
-        values = np.asarray(x.values, float)
+        values = x.data.astype(float, copy=False)
         with np.errstate(invalid="ignore"):
             # two passes over many values in place of seven; an extreme of values with a NaN is NaN
             if values.size and q.low < values.min() and values.max() < q.high:
@@ -227,9 +287,9 @@ class Grid:
         order = [d for side in sides for d in side]
         full = x.expand_dims({d: self.sizes[d] for d in order if d not in dims}).transpose(*order)
         shape = [math.prod(self.sizes[d] for d in side) for side in sides]
-        return np.ascontiguousarray(np.broadcast_to(full.values, full.shape), float).reshape(shape)
+        return namespace(full.data).ascontiguousarray(full.data, float).reshape(shape)
 
-    def memory(self, reductions: Reductions, earlier: xr.Dataset | None) -> Memory:
+    def memory(self, earlier: xr.Dataset | None) -> Memory:
         """New memory for the results, or that of an `earlier` result.
 
         Raises
@@ -237,68 +297,93 @@ class Grid:
         InputError
             where the earlier result has no memory for these results.
         """
-        shape = self.size[:1] if reductions else self.size
-        columns = self._columns(reductions)
+        shape = self.size[:1] if self._reduced else self.size
+        columns = self._columns
         if earlier is None:
-            return Memory(aligned((len(columns), *shape)), np.zeros(shape, np.int16))
-        dims = self._dims(reductions)
-        results = []
-        for name in (*(each.name for each in columns), "reason"):
-            x = earlier.variables.get(name)
-            kind = np.int16 if name == "reason" else np.float64
-            if x is None or x.dims != tuple(dims) or x.shape != tuple(self.sizes[d] for d in dims):
-                over = ", ".join(f"{d}: {self.sizes[d]}" for d in dims) or "one state"
-                raise InputError(
-                    f"out: has no {name} over ({over}); give the result of a call like this one, or none"
-                )
-            values = x.values
-            if values.dtype != kind or not (values.flags.c_contiguous and values.flags.writeable):
-                raise InputError(
-                    f"out: {name} is no array that can be filled; give the result of a call, unchanged"
-                )
-            results.append(values.reshape(shape))
-        reason = results.pop()
+            ends = np.cumsum([0, *(column.rows for column in columns)])
+            whole = (int(ends[-1]), *shape)
+            on_gpu = self._engine == "cuda"
+            block = cupy_().empty(whole) if on_gpu else aligned(whole)
+            reason = (cupy_() if on_gpu else np).zeros(shape, np.int16)
+            return Memory(block, reason, [block[begin:end] for begin, end in pairwise(ends.tolist())])
+        parts = [
+            self._earlier(earlier, column.result.name, column.dims, column.rows, np.float64)
+            for column in columns
+        ]
+        parts = [x.reshape(column.rows, *shape) for x, column in zip(parts, columns, strict=True)]
+        reason = self._earlier(earlier, "reason", [], 1, np.int16).reshape(shape)
         reason[...] = 0
-        return Memory(results, reason)
+        return Memory([row for part in parts for row in part], reason, parts)
 
-    def compute(self, memory: Memory, engine: str, reductions: Reductions, workers: int) -> None:
+    def _earlier(self, earlier: xr.Dataset, name: str, first: list[str], rows: int, kind: Any) -> Any:
+        """The array of a variable of an earlier result, with these `first` dimensions."""
+        x, dims = earlier.variables.get(name), (*first, *self._dims)
+        sizes = (*([rows] * len(first)), *(self.sizes[d] for d in self._dims))
+        if x is None or x.dims != dims or x.shape != sizes:
+            over = ", ".join(f"{d}: {size}" for d, size in zip(dims, sizes, strict=True)) or "one state"
+            raise InputError(
+                f"out: has no {name} over ({over}); give the result of a call like this one, or none"
+            )
+        values = x.data
+        of_engine = on_device(values) == (self._engine == "cuda")
+        if not (of_engine and values.dtype == kind and values.flags.c_contiguous) or not getattr(
+            values.flags, "writeable", True
+        ):
+            raise InputError(
+                f"out: {name} is no array that can be filled; give the result of a call, unchanged"
+            )
+        return values
+
+    def compute(self, memory: Memory, workers: int) -> None:
         """Fill the memory with results and reasons."""
-        own, (outer, inner) = self._equations, self.size
+        own, (outer, inner), reduced = self._equations, self.size, self._reduced
         if not outer:
             return
         entries = self._entries()
-        if engine == "native" and (call := self._native(entries, reductions)) is not None:
-            columns = [np.broadcast_to(entries[e], (len(entries[e]), inner)) for e in call.columns]
-            call(
-                [entries[e][:, 0].copy() for e in call.inputs],
-                [np.ascontiguousarray(c) for c in columns],
+        if (kernel := self._kernel(entries)) is not None:
+            kernel(
+                [entries[e][:, 0].copy() for e in kernel.inputs],
+                [entries[e] for e in kernel.columns],
                 memory.results,
                 memory.reason,
                 self.size,
+                flat_numbers([request for _, request in reduced]),
                 workers,
             )
         else:
             states = memory
-            if reductions:
+            if reduced:
                 states = Memory(
                     np.empty((len(own.results), outer, inner)), np.zeros((outer, inner), np.int16)
                 )
-            fill = arrays.by_jax if engine == "jax" else arrays.by_numpy
-            fill(own.operations, entries, states.results, states.reason, own.not_finite)
-            if reductions:
-                with np.errstate(invalid="ignore"):
-                    for to, (place, name) in zip(memory.results, reductions, strict=True):
-                        to[...] = REDUCTIONS[name].of_array(states.results[place])
-                memory.reason[...] = np.max(states.reason, axis=1)
+            arrays.by_numpy(own.operations, entries, states.results, states.reason, own.not_finite)
+            if reduced:
+                self._reduce(states, memory)
         self._refuse(memory)
+
+    def _reduce(self, states: Memory, memory: Memory) -> None:
+        """Reduce stored states."""
+        memory.reason[...] = np.max(states.reason, axis=1)
+        rows = iter(memory.results)
+        for column, request in self._reduced:
+            with np.errstate(invalid="ignore"):
+                parts = by_array(request, states.results[column.place])
+            for part in parts:
+                next(rows)[...] = np.where(memory.reason == 0, part, np.nan)
 
     def _entries(self) -> dict[tuple[int, int], Any]:
         sizes = self._equations.sizes
         entries = [(kind, k) for kind, size in enumerate(sizes) for k in range(size)]
         return dict(zip(entries, self._arguments, strict=True))
 
-    def _native(self, entries: Mapping[tuple[int, int], Any], reductions: Reductions) -> Any:
+    def _kernel(self, entries: Mapping[tuple[int, int], Any]) -> Any:
+        """The compiled loop of the engine; None where numpy computes."""
+        if self._engine == "numpy":
+            return None
         varying = tuple(entry for entry, x in entries.items() if x.shape[1] > 1)
+        reductions = tuple(column for column, _ in self._reduced)
+        if self._engine == "cuda":
+            return cuda_kernel(self._equations, varying, reductions)
         try:
             kernel = native_kernel(self._equations, varying, reductions)
         except RunError as error:
@@ -317,8 +402,12 @@ class Grid:
     def _refuse(self, memory: Memory) -> None:
         """Values outside their bounds come before all other reasons."""
         for k, (_, outside) in enumerate(self._bounds):
-            bad: Any = np.broadcast_to(self._shaped(outside).astype(bool), self.size)
-            bad = bad.any(axis=1) if memory.reason.ndim == 1 else bad
+            bad = self._shaped(outside) != 0.0
+            if memory.reason.ndim == 1:
+                bad = bad.any(axis=1)
+            if self._engine == "cuda":
+                bad = cupy_().asarray(bad)
+            bad = np.broadcast_to(bad, memory.reason.shape)
             memory.reason[bad] = self._equations.not_finite + 1 + k
             for x in memory.results:
                 x[bad] = np.nan
@@ -330,47 +419,62 @@ class Grid:
         outside = (StateReason(ReasonKind.BOUNDS, name, bounds[name]) for name, _ in self._bounds)
         return [*reasons_of(self._equations.model), *outside]
 
-    def _dims(self, reductions: Reductions) -> list[str]:
-        """The dimensions of the results."""
-        return self.dims[:-1] if reductions else self.dims
+    @property
+    def _dims(self) -> list[str]:
+        """The dimensions of the states that the results have."""
+        return self.dims[:-1] if self._reduced else self.dims
 
-    def _columns(self, reductions: Reductions) -> Sequence[Result]:
-        """Name, unit and description of each column."""
+    @property
+    def _columns(self) -> list[ResultRows]:
+        """The variables of the results."""
         results = self._equations.results
-        if not reductions:
-            return results
-        return [
-            Result(
-                f"{name}({results[k].name})",
-                results[k].unit,
-                f"{REDUCTIONS[name].words}, {results[k].description}",
-            )
-            for k, name in reductions
-        ]
+        if not self._reduced:
+            return [ResultRows(result) for result in results]
+        return [reduced_column(results[column.place], request) for column, request in self._reduced]
 
-    def dataset(self, memory: Memory, reductions: Reductions) -> xr.Dataset:
-        """The results with names, units and coordinates."""
+    def dataset(self, memory: Memory, on_host: bool) -> xr.Dataset:
+        """The results with names, units and coordinates; those of a GPU as arrays of the device, or `on_host`."""
         import xarray as xr
 
-        dims = self._dims(reductions)
+        dims, take = self._dims, host if on_host else (lambda x: x)
         shape = [self.sizes[d] for d in dims]
-        variables = {
-            each.name: (dims, x.reshape(shape), {"units": each.unit, "long_name": each.description})
-            for each, x in zip(self._columns(reductions), memory.results, strict=True)
-        }
+        variables, coords = {}, {}
+        for column, x in zip(self._columns, memory.parts, strict=True):
+            result = column.result
+            attributes = {"units": result.unit, "long_name": result.description}
+            if column.bins is not None:
+                (name,) = column.dims
+                of_bins = {"units": column.unit, "long_name": f"middle of a bin, {result.description}"}
+                coords[name] = (name, column.bins, of_bins)
+            sizes = [len(x)] * len(column.dims) + shape
+            variables[result.name] = ([*column.dims, *dims], take(x.reshape(sizes)), attributes)
         flags: dict[str, Any] = {
             "flag_values": list(range(len(self.reasons))),
             "reasons": [str(reason) for reason in self.reasons],
             "subjects": [reason.subject for reason in self.reasons],
             "long_name": "reason for which there is no result",
         }
-        variables["reason"] = (dims, memory.reason.reshape(shape), flags)
-        coords = {
+        variables["reason"] = (dims, take(memory.reason.reshape(shape)), flags)
+        coords |= {
             name: c
             for name, c in self._coords.items()
             if set(map(str, c.dims)) <= set(dims) and name not in variables
         }
         return xr.Dataset(variables, coords)
+
+
+def reduced_column(result: Result, request: Request) -> ResultRows:
+    """The variable of a reduced result."""
+    if isinstance(request, Histogram):
+        counts = Result(f"histogram({result.name})", "1", f"number of states by value, {result.description}")
+        return ResultRows(counts, request.middles, result.unit)
+    if isinstance(request, Beyond):
+        size = f"{request.limit:.15g}"
+        text = f"number of states with a size beyond {size} {result.unit}, {result.description}"
+        return ResultRows(Result(f"beyond({result.name}, {size})", "1", text))
+    return ResultRows(
+        Result(f"{request}({result.name})", result.unit, f"{REDUCTIONS[request].words}, {result.description}")
+    )
 
 
 def _array(variable: Variable, x: Any) -> xr.DataArray:
@@ -382,7 +486,7 @@ def _array(variable: Variable, x: Any) -> xr.DataArray:
     if isinstance(x, xr.DataArray):
         parts = magnitude_and_unit(x.data)
         unit = x.attrs.get("units") if parts is None else parts[1]
-        values = x.values if parts is None else parts[0]
+        values = (x.data if on_device(x.data) else x.values) if parts is None else parts[0]
         if unit is not None and unit != variable.unit:
             try:
                 factor, offset = scale(str(unit), variable.unit, variable.kind)
@@ -391,13 +495,13 @@ def _array(variable: Variable, x: Any) -> xr.DataArray:
             values = values * factor + offset
         x = x.copy(data=values).assign_attrs(attributes)
         if x.dims == (variable.name,):
-            return _array(variable, x.values)
+            return _array(variable, values)
         # one dimension of another name has these values, too
-        return x.assign_coords({variable.name: (x.dims, values, attributes)}) if x.ndim == 1 else x
-    values = in_declared_unit(variable, x)
+        return x.assign_coords({variable.name: (x.dims, host(values), attributes)}) if x.ndim == 1 else x
+    values = namespace(x).asarray(x, float) if on_device(x) else in_declared_unit(variable, x)
     if np.ndim(values) > 1:
         raise InputError(
             f"{variable.name}: has {np.ndim(values)} dimensions; give them names, in a DataArray"
         )
     dims = [variable.name] if np.ndim(values) else []
-    return xr.DataArray(values, {name: (name, values, attributes) for name in dims}, dims)
+    return xr.DataArray(values, {name: (name, host(values), attributes) for name in dims}, dims)

@@ -10,21 +10,20 @@ import ctypes
 import itertools
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from ..core.native.compilers import Compiler, compile_code, compiler, flags_for_this_processor
+from ..core.printing.vector_code import VectorCode, header
 from ..core.temporary_folders import scratch
 from .equations import Equations
-from .reductions import REDUCTIONS
-from .vector_code import VectorCode, c_file
+from .reductions import Reductions, loop_text
 
-Reductions = tuple[tuple[int, str], ...]
-"""Places of results, each with the name of its reduction; empty where the results themselves are stored."""
 _PIECES = 4
 """Number of pieces of the work for each thread."""
 _LANES = 8
@@ -34,32 +33,31 @@ _BLOCK = 64
 """Number of states that are kept in the first cache before they are stored."""
 
 
-def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> str:
-    """The C source of the loop."""
-    begin, take, end = [], [], []
-    for k, (place, name) in enumerate(reductions):
-        each, words = REDUCTIONS[name], {"a": f"A{k}", "y": f"y[{place}]", "one": "one", "n": "i1-i0"}
-        begin.append(f"v A{k} = {each.begin};")
-        take.append(f"A{k} = {each.take.format(**words)};")
-        end.append(f"out[{k}][o] = worst ? NAN : {each.end.format(**words)};")
-    if reductions:
-        end.append("reason[o] = worst;")
-    defines = {
+def c_file(name: str) -> str:
+    """The text of a C file of this package."""
+    return (resources.files(__package__) / name).read_text("utf-8")
+
+
+def defines(equations: Equations, code: VectorCode, reductions: Reductions, more: Mapping[str, int]) -> str:
+    """The sizes and statements that the generated code defines for its loop, see states.h, and `more` sizes."""
+    sizes = {
         "INPUTS": len(code.inputs),
         "COLUMNS": len(code.columns),
         "RESULTS": len(equations.results),
         "ROOM": code.room,
         "REDUCED": int(bool(reductions)),
-        "BLOCK": _BLOCK,
         "NOT_FINITE": equations.not_finite,
-        "BEGIN": " ".join(begin),
-        "TAKE": " ".join(take),
-        "END": " ".join(end),
     }
+    values = {**sizes, **more, **loop_text(reductions)}
+    return "\n".join(f"#define {name} {value}" for name, value in values.items())
+
+
+def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> str:
+    """The C source of the loop."""
     return "\n".join(
         [
-            c_file("lanes.h"),
-            *(f"#define {name} {value}" for name, value in defines.items()),
+            header(),
+            defines(equations, code, reductions, {"BLOCK": _BLOCK}),
             code.uniform(),
             code.body("states", (0, 1)),
             c_file("states.h"),
@@ -88,6 +86,7 @@ class NativeKernel:
         out: Any,
         reason: Any,
         size: tuple[int, int],
+        numbers: Any,
         workers: int,
     ) -> None:
         """Compute all states.
@@ -100,6 +99,7 @@ class NativeKernel:
             the parts
         reason : array to be filled, of the same shape
         size : (outer, inner)
+        numbers : those of the reductions, see `flat_numbers`
         workers : number of threads
         """
         outer, inner = size
@@ -117,7 +117,7 @@ class NativeKernel:
                 pointers[1],
                 steps[1],
                 pointers[2],
-                reason.ctypes.data_as(ctypes.c_void_p),
+                *(x.ctypes.data_as(ctypes.c_void_p) for x in (reason, numbers)),
             )
 
         pieces = _pieces(outer, inner, workers, divide=reason.ndim > 1)
@@ -164,8 +164,8 @@ def _pieces(outer: int, inner: int, workers: int, divide: bool) -> list[tuple[in
     return [(o, o + 1, a, min(a + length, inner)) for o in range(outer) for a in range(0, inner, length)]
 
 
-def load(source: str, compiler: Compiler) -> ctypes.CDLL:
-    """The compiled library of a C source.
+def load(source: str, compiler: Compiler, files: Mapping[str, str] | None = None) -> ctypes.CDLL:
+    """The compiled library of a C source, which includes these `files`, texts by name.
 
     Raises
     ------
@@ -174,7 +174,8 @@ def load(source: str, compiler: Compiler) -> ctypes.CDLL:
     """
     native = flags_for_this_processor(compiler)
     arguments = (*native.flags, "batch.c", "-o", "batch.so", *native.libraries)
-    binary = compile_code(compiler, arguments, {"batch.c": source.encode(), **native.files}, "batch.so")
+    texts = {name: text.encode() for name, text in {"batch.c": source, **(files or {})}.items()}
+    binary = compile_code(compiler, arguments, {**texts, **native.files}, "batch.so")
     with scratch() as folder:  # a loaded library stays usable
         file = folder / "batch.so"
         file.write_bytes(binary)

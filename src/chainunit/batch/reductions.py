@@ -2,51 +2,210 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
+
+from ..core.errors import InputError
+
+MOST_BINS = 1024
+"""Largest number of bins of a histogram."""
 
 
 @dataclass(frozen=True)
 class Reduction:
     """A reduction of a column over the last dimension: in words, as a function of an array, and in C.
 
-    In C a vector starts with `begin`, takes up each vector of values by `take` and ends as `end`, where ``{a}`` is
-    the vector, ``{y}`` the values, ``{one}`` 1 for a lane that counts and 0 for one that does not, and ``{n}`` the
-    number of values.
+    In C each lane starts with `begin` and takes up each value by `take`, where ``{a}`` is the lane, ``{y}`` the
+    value, ``{one}`` 1 for a lane that counts and 0 for one that does not, and ``{limit}`` the limit of a count. The
+    lanes are put together by `merge`: their "sum", the "least" or the "largest". The result is `end` of this,
+    ``{a}``, and of the number of values, ``{n}``.
     """
 
     words: str
-    of_array: Any
+    of_array: Callable[..., Any]
     begin: str
     take: str
-    end: str
+    merge: str
+    end: str = "{a}"
 
 
 REDUCTIONS = {
-    "min": Reduction(
-        "least", lambda x: np.min(x, axis=-1), "V(INFINITY)", "fmin_v({a},{y})", "lane_least({a})"
-    ),
-    "max": Reduction(
-        "largest", lambda x: np.max(x, axis=-1), "V(-INFINITY)", "fmax_v({a},{y})", "lane_largest({a})"
-    ),
+    "min": Reduction("least", lambda x: np.min(x, axis=-1), "V(INFINITY)", "fmin_v({a},{y})", "least"),
+    "max": Reduction("largest", lambda x: np.max(x, axis=-1), "V(-INFINITY)", "fmax_v({a},{y})", "largest"),
     "peak": Reduction(
         "largest absolute value",
         lambda x: np.max(np.abs(x), axis=-1),
         "V(0.0)",
         "fmax_v({a},fabs_v({y}))",
-        "lane_largest({a})",
+        "largest",
     ),
     "mean": Reduction(
-        "mean", lambda x: np.mean(x, axis=-1), "V(0.0)", "{a}+{one}*{y}", "lane_sum({a})/(double)({n})"
+        "mean", lambda x: np.mean(x, axis=-1), "V(0.0)", "{a}+{one}*{y}", "sum", "{a}/(double)({n})"
     ),
     "rms": Reduction(
         "root of the mean square",
         lambda x: np.sqrt(np.mean(x * x, axis=-1)),
         "V(0.0)",
         "{a}+{one}*{y}*{y}",
-        "sqrt(lane_sum({a})/(double)({n}))",
+        "sum",
+        "sqrt({a}/(double)({n}))",
     ),
 }
 """By name."""
+_COUNT = Reduction(
+    "number of states beyond a limit",
+    lambda x, limit: np.sum(np.abs(x) > limit, axis=-1),
+    "V(0.0)",
+    "{a}+{one}*ONES(fabs_v({y})>V({limit}))",
+    "sum",
+)
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """The number of states in which a column is larger in size than a `limit`, in the unit of the column.
+
+    Raises
+    ------
+    InputError
+        for a limit that is no finite number of at least 0.
+    """
+
+    limit: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.limit) and self.limit >= 0.0):
+            raise InputError(f"Beyond: limit = {self.limit}: must be a finite number >= 0, a size")
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """The numbers of states by the value of a column: `bins` of equal width from `low` to `high`, in the unit of the
+    column. The first bin has all states below it, too, and the last one all above it.
+
+    Raises
+    ------
+    InputError
+        for ends that are not finite or not in this order, and for fewer than 2 or more than `MOST_BINS` bins.
+    """
+
+    low: float
+    high: float
+    bins: int
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise InputError(f"Histogram: low = {self.low}, high = {self.high}: must be finite, low < high")
+        if not (isinstance(self.bins, int) and 2 <= self.bins <= MOST_BINS):
+            raise InputError(f"Histogram: bins = {self.bins}: must be a whole number from 2 to {MOST_BINS}")
+
+    @property
+    def middles(self) -> Any:
+        """The middle of each bin, shape (bins,)."""
+        return self.low + (np.arange(self.bins) + 0.5) * (self.high - self.low) / self.bins
+
+    def of_array(self, x: Any) -> Any:
+        """The numbers over the last of two dimensions: shape (bins, outer)."""
+        place = np.floor((np.nan_to_num(x) - self.low) * (self.bins / (self.high - self.low)))
+        place = np.clip(place, 0, self.bins - 1).astype(np.int64)
+        rows = np.arange(len(x))[:, None] * self.bins
+        counts = np.bincount((rows + place).ravel(), minlength=len(x) * self.bins)
+        return counts.reshape(len(x), self.bins).T
+
+
+@dataclass(frozen=True)
+class ReducedColumn:
+    """A reduction of the column at a `place` for which code is made: its `name`, one of `REDUCTIONS`, "beyond", or
+    "histogram" with `bins`. The numbers of the latter two, see `numbers_of`, are no part of the code."""
+
+    place: int
+    name: str
+    bins: int = 1
+
+    @property
+    def reduction(self) -> Reduction:
+        """The reduction of a column that is no histogram."""
+        return REDUCTIONS.get(self.name, _COUNT)
+
+
+Reductions = tuple[ReducedColumn, ...]
+"""Empty where the results themselves are stored."""
+
+
+def column_of(place: int, request: str | Beyond | Histogram, output: str) -> ReducedColumn:
+    """The column for the `request` of a reduction of the `output` at this place.
+
+    Raises
+    ------
+    InputError
+        for a name that is not in `REDUCTIONS`.
+    """
+    if isinstance(request, Histogram):
+        return ReducedColumn(place, "histogram", request.bins)
+    if isinstance(request, Beyond):
+        return ReducedColumn(place, "beyond")
+    if request not in REDUCTIONS:
+        raise InputError(
+            f"{output}: no reduction {request!r}; there are {', '.join(REDUCTIONS)}, Beyond(limit) and "
+            "Histogram(low, high, bins)"
+        )
+    return ReducedColumn(place, request)
+
+
+def numbers_of(request: str | Beyond | Histogram) -> tuple[float, float]:
+    """The numbers of a request that its code takes: a limit, or the begin of a histogram and its bins per unit."""
+    if isinstance(request, Histogram):
+        return request.low, request.bins / (request.high - request.low)
+    return (request.limit if isinstance(request, Beyond) else 0.0), 0.0
+
+
+def by_array(request: str | Beyond | Histogram, x: Any) -> Any:
+    """The reduction of a column, shape (outer, inner): shape (rows, outer), a row for each bin of a histogram."""
+    if isinstance(request, Histogram):
+        return request.of_array(x)
+    if isinstance(request, Beyond):
+        return _COUNT.of_array(x, request.limit)[None]
+    return REDUCTIONS[request].of_array(x)[None]
+
+
+def first_rows(reductions: Reductions) -> list[int]:
+    """The row of the first result of each reduction, and the number of all rows."""
+    return list(accumulate((column.bins for column in reductions), initial=0))
+
+
+def loop_text(reductions: Reductions) -> Mapping[str, str]:
+    """The statements of a loop, by name: BEGIN before it, TAKE for each vector, PARTS after it, where it is a part of
+    a loop whose parts are put together later, and END at last.
+
+    The loop has the vectors ``y`` of results, the vector ``one``, the numbers ``L``, two for each reduction, and the
+    number of all states ``n``. It defines BINS (memory for the counts of a histogram), COUNT (of a vector, into
+    them), SUM, LEAST and LARGEST (of all states, by the vector and the row), RESULT (of a row), and COUNTS (of the
+    rows of a histogram); a loop in parts PART and PART_COUNTS.
+    """
+    begin, take, parts, end = [], [], [], []
+    for k, (column, row) in enumerate(zip(reductions, first_rows(reductions), strict=False)):
+        y = f"y[{column.place}]"
+        if column.name == "histogram":
+            begin.append(f"BINS(H{k},{row},{column.bins})")
+            take.append(f"COUNT(H{k},{y},L[{2 * k}],L[{2 * k + 1}],{column.bins})")
+            parts.append(f"PART_COUNTS({row},H{k},{column.bins})")
+            end.append(f"COUNTS({row},H{k},{column.bins})")
+            continue
+        form, limit = column.reduction, f"L[{2 * k}]"
+        begin.append(f"v A{k} = {form.begin};")
+        take.append(f"A{k} = {form.take.format(a=f'A{k}', y=y, one='one', limit=limit)};")
+        parts.append(f"PART({row},lane_{form.merge}(A{k}))")
+        merged = f"{form.merge.upper()}(A{k},{row})"
+        end.append(f"RESULT({row},{form.end.format(a=merged, n='n')})")
+    statements = {"BEGIN": begin, "TAKE": take, "PARTS": parts, "END": end}
+    return {name: " ".join(lines) for name, lines in statements.items()}
+
+
+def flat_numbers(requests: Sequence[str | Beyond | Histogram]) -> Any:
+    """The numbers of all requests, shape (2*requests,), and not empty."""
+    return np.array([x for request in requests for x in numbers_of(request)] or [0.0])

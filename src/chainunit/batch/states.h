@@ -1,8 +1,16 @@
 /* The loop of a batch over states. The generated code before it defines the sizes, the functions `uniform` and `states`,
- * and, for results that are reduced over the inner dimension, the statements BEGIN, TAKE (of each vector) and END. */
+ * and, for results that are reduced over the inner dimension, the statements BEGIN, TAKE (of each vector) and END: see
+ * `chainunit.batch.reductions.loop_text`. */
+#define BINS(h, row, bins) long h[bins] = {0};
+#define COUNT(h, y, low, per, bins) for (int l = 0; l < m; ++l) ++h[bin_of((y)[l], low, per, bins)];
+#define SUM(a, row) lane_sum(a)
+#define LEAST(a, row) lane_least(a)
+#define LARGEST(a, row) lane_largest(a)
+#define RESULT(row, x) out[row][o] = worst ? NAN : (x);
+#define COUNTS(row, h, bins) for (int b = 0; b < bins; ++b) RESULT(row + b, (double)h[b])
 
 void batch(long o0, long o1, long i0, long i1, long n, const double *const *in, const long *in_step,
-           const double *const *column, const long *column_step, double *const *out, short *reason) {
+           const double *const *column, const long *column_step, double *const *out, short *reason, const double *L) {
   for (long o = o0; o < o1; ++o) {
     double given[INPUTS + 1], U[ROOM];
     for (int k = 0; k < INPUTS; ++k) given[k] = in[k][o * in_step[k]];
@@ -42,6 +50,9 @@ void batch(long o0, long o1, long i0, long i1, long n, const double *const *in, 
       }
 #endif
     }
+#if REDUCED
     END
+    reason[o] = worst;
+#endif
   }
 }

@@ -6,7 +6,7 @@
  * PUT      statements that set a[], the arguments that differ between runs, from b->given[], signals at t, and x[]
  * GUARDED  statements that set `ends` where a result y[][l] of run r + l is beyond its limit
  *
- * Steps and error control are those of chainunit.integrate. */
+ * step.h has the steps and their error control. */
 
 #define EVEN 0
 #define TO_ROWS 1
@@ -25,8 +25,8 @@ static v signal_at(const double *s, long runs, v t) {
   return y;
 }
 
-/* the arguments of the equations that differ between runs */
-typedef struct { const double *U, *signal; long runs; double step; v given[PARAMS + 1], a[COLUMNS + 1]; } Block;
+/* the arguments of the equations that differ between runs, and the time from which a step counts */
+typedef struct { const double *U, *signal; long runs; double step; v origin, given[PARAMS + 1], a[COLUMNS + 1]; } Block;
 
 static void put(Block *b, const v *x, v t) {
   v *const a = b->a;
@@ -40,42 +40,35 @@ static bits finite_all(const v *x, int n) {
   return sum == sum;
 }
 
+typedef v Number;
+typedef bits Truth;
+typedef Block Course;
+#define ALL_TRUE (~(bits){0})
+#define GOES_ON(truth) 1
+#define OF_DOUBLE V
+#define CHOOSE choose_v
+#define SMALLER fmin_v
+#define LARGER fmax_v
+#define SIZE fabs_v
+#define POWER(x, exponent) pow_v(x, V(exponent))
+static inline bits slope_at(Block *b, v since, const v *x, v *k) {
+  put(b, x, b->origin + since);
+  rates(b->U, b->a, k);
+  return ALL_TRUE; /* what is not finite shows in the states at last */
+}
+#include "step.h"
+
 typedef struct {
   v t, h, pace;
   v x[STATES];
 #if METHOD == INTERPOLATED
-  v from[STATES], slope[STATES], k[7][STATES];
+  v from[STATES], slope[STATES], k[7 * STATES];
   int begun;
 #endif
 } Path;
 
-#if METHOD != EVEN
-/* error of a step over the permitted one, see chainunit.integrate.controlled */
-static v error_of(const v *x, const v *at, const v *k, v h, double tolerance) {
-  v error = V(0.0);
-  for (int i = 0; i < STATES; ++i) {
-    v sum = V(0.0);
-    for (int s = 0; s < 7; ++s) sum += ERRORS[s] * k[s * STATES + i];
-    const v big = fmax_v(fmax_v(fabs_v(x[i]), fabs_v(at[i])), V(NOMINAL[i]));
-    error = fmax_v(error, fabs_v(h * sum) / (tolerance * big));
-  }
-  return error;
-}
-
-/* the next step */
-static v paced(v pace, v h, v error, bits usable, double longest) {
-  v growth = choose_v(error < NO_ERROR, V(MOST_GROWTH), SAFETY * pow_v(error, V(ERROR_POWER)));
-  growth = choose_v(usable, growth, V(LEAST_GROWTH));
-  v following = h * fmin_v(fmax_v(growth, V(LEAST_GROWTH)), V(MOST_GROWTH));
-  /* a step that the end of the interval shortened does not shorten the next one */
-  following = choose_v(usable & (error <= 1.0) & (h < pace), fmax_v(following, pace), following);
-  return fmin_v(fmax_v(following, V(SHORTEST * longest)), V(longest));
-}
-#endif
-
 #if METHOD == INTERPOLATED
-/* error control, in each lane for itself, with steps that end where a signal bends, and not at every row; the state at
- * a row is that of the interpolation of fourth order. The last stage of a step is the first of the next one. */
+/* the first time after a time at which a signal bends */
 static v next_bend(const Block *b, v t) {
   v bend = V(INFINITY);
   for (int i = 0; i < SIGNALS; ++i)
@@ -86,132 +79,94 @@ static v next_bend(const Block *b, v t) {
     }
   return bend;
 }
+#endif
 
+#if METHOD != EVEN
+/* Error control, in each lane for itself. Steps end at rows, and the constraints are closed after each; or they end where
+ * a signal bends, and not at every row. Then the state at a row is that of the interpolation of fourth order, and the
+ * last stage of a step is the first one of the next. */
 static bits advance(Block *b, Path *q, v next, v end, bits going, double longest, double tolerance, double most) {
-  bits sound = ~(bits){0};
-  going &= q->t < next;
+  bits sound = ALL_TRUE;
+  const int between = METHOD == INTERPOLATED;
+  b->origin = between ? V(0.0) : q->t;
+  const v until = next - b->origin;
+  v since = q->t - b->origin;
+  going &= since < until;
   for (double taken = 0.0; any(going); taken += 1.0) {
     if (taken >= most) return sound & ~going;
-    if (!q->begun) {
-      put(b, q->x, q->t);
-      rates(b->U, b->a, q->slope);
-      q->begun = 1;
-    }
-    const v to = fmin_v(end, next_bend(b, q->t)), left = to - q->t;
-    const v piece = choose_v(q->pace >= left, left, choose_v(q->pace > 0.5 * left, 0.5 * left, q->pace));
-    const v h = choose_v(going, piece, V(0.0));
-    v at[STATES], k[7][STATES];
-    for (int i = 0; i < STATES; ++i) k[0][i] = q->slope[i];
-    for (int s = 1; s < 7; ++s) {
-      for (int i = 0; i < STATES; ++i) {
-        v sum = V(0.0);
-        for (int j = 0; j < s; ++j) sum += STAGES[s][j] * k[j][i];
-        at[i] = q->x[i] + h * sum;
-      }
-      put(b, at, q->t + NODES[s] * h);
-      rates(b->U, b->a, k[s]);
-    }
-    const v error = error_of(q->x, at, (const v *)k, h, tolerance);
-    const bits usable = finite_all(at, STATES) & finite_all(k[6], STATES), last = h <= SHORTEST * longest;
-    const bits accepted = going & usable & ((error <= 1.0) | last);
-    q->pace = choose_v(going, paced(q->pace, h, error, usable, longest), q->pace);
-    q->t = choose_v(accepted, choose_v(h >= left, to, q->t + h), q->t);
+    v at[STATES], k[7 * STATES], limit = until;
+#if METHOD == INTERPOLATED
+    if (!q->begun) slope_at(b, since, q->x, q->slope);
+    q->begun = 1;
+    limit = fmin_v(end, next_bend(b, since));
+    for (int i = 0; i < STATES; ++i) k[i] = q->slope[i];
+#endif
+    const v left = limit - since, h = choose_v(going, step_size(q->pace, left), V(0.0));
+    const bits usable = dormand_prince(b, STATES, between, since, h, q->x, k, at);
+    const v error = error_of(STATES, q->x, at, k, h, tolerance, NOMINAL);
+    const bits last = h <= SHORTEST * longest, accepted = going & usable & ((error <= 1.0) | last);
+    q->pace = choose_v(going, next_pace(q->pace, h, error, usable, longest), q->pace);
+    since = choose_v(accepted, choose_v(h >= left, limit, since + h), since);
+#if METHOD == INTERPOLATED
+    q->t = since;
     q->h = choose_v(accepted, h, q->h);
     for (int i = 0; i < STATES; ++i) {
       q->from[i] = choose_v(accepted, q->x[i], q->from[i]);
+      q->slope[i] = choose_v(accepted, k[6 * STATES + i], q->slope[i]);
       q->x[i] = choose_v(accepted, at[i], q->x[i]);
-      q->slope[i] = choose_v(accepted, k[6][i], q->slope[i]);
-      for (int s = 0; s < 7; ++s) q->k[s][i] = choose_v(accepted, k[s][i], q->k[s][i]);
     }
+    for (int i = 0; i < 7 * STATES; ++i) q->k[i] = choose_v(accepted, k[i], q->k[i]);
+#else
+    if (any(accepted)) {
+      put(b, at, b->origin + since);
+      closed(b->U, b->a, k);
+      for (int i = 0; i < STATES; ++i) q->x[i] = choose_v(accepted, k[i], q->x[i]);
+    }
+#endif
     sound &= ~(going & last & ~usable);
-    going &= sound & (q->t < next);
+    going &= sound & (since < until);
   }
+  (void)end;
+  if (!between) q->t = next;
   return sound;
 }
+#else
+/* equal steps */
+static bits advance(Block *b, Path *q, v next, v end, bits going, double longest, double tolerance, double most) {
+  (void)tolerance, (void)end;
+  /* as many as in a whole step: a shorter last step of one run must not depend on the others */
+  double count = ceil(b->step / longest - 1e-9);
+  if (count < 1.0) count = 1.0;
+  if (count > most) return ~going;
+  b->origin = q->t;
+  const v h = (next - q->t) / count;
+  for (double s = 0.0; s < count; s += 1.0) {
+    v later[STATES], at[STATES], k[STATES];
+    rk4(b, STATES, s, h, q->x, k, at, later);
+    for (int i = 0; i < STATES; ++i) q->x[i] = choose_v(going, later[i], q->x[i]);
+  }
+  q->t = next;
+  return ALL_TRUE;
+}
+#endif
 
+/* the states at the time of a row */
 static void state_at(const Path *q, v t, v *x) {
+#if METHOD == INTERPOLATED
   const v z = choose_v(q->h > 0.0, (t - q->t) / q->h + 1.0, V(1.0));
   v weight[7];
   for (int s = 0; s < 7; ++s)
     weight[s] = q->h * z * (DENSE[s][0] + z * (DENSE[s][1] + z * (DENSE[s][2] + z * DENSE[s][3])));
   for (int i = 0; i < STATES; ++i) {
     v sum = V(0.0);
-    for (int s = 0; s < 7; ++s) sum += weight[s] * q->k[s][i];
+    for (int s = 0; s < 7; ++s) sum += weight[s] * q->k[s * STATES + i];
     x[i] = choose_v(t < q->t, q->from[i] + sum, q->x[i]);
   }
-}
 #else
-#if METHOD == TO_ROWS
-/* error control, in each lane for itself, see chainunit.integrate.controlled */
-static bits advance(Block *b, Path *q, v next, v end, bits going, double longest, double tolerance, double most) {
-  (void)end;
-  const v t = q->t, size = next - t;
-  v since = V(0.0), *const x = q->x, *const pace = &q->pace;
-  bits sound = ~(bits){0};
-  for (double taken = 0.0; any(going); taken += 1.0) {
-    if (taken >= most) return sound & ~going;
-    const v left = size - since;
-    const v piece = choose_v(*pace >= left, left, choose_v(*pace > 0.5 * left, 0.5 * left, *pace));
-    const v h = choose_v(going, piece, V(0.0));
-    v at[STATES], k[7][STATES];
-    for (int s = 0; s < 7; ++s) {
-      for (int i = 0; i < STATES; ++i) {
-        v sum = V(0.0);
-        for (int j = 0; j < s; ++j) sum += STAGES[s][j] * k[j][i];
-        at[i] = x[i] + h * sum;
-      }
-      put(b, at, t + since + NODES[s] * h);
-      rates(b->U, b->a, k[s]);
-    }
-    const v error = error_of(x, at, (const v *)k, h, tolerance);
-    const bits usable = finite_all(at, STATES) & finite_all(k[6], STATES), last = h <= SHORTEST * longest;
-    const bits accepted = going & usable & ((error <= 1.0) | last);
-    *pace = choose_v(going, paced(*pace, h, error, usable, longest), *pace);
-    since = choose_v(accepted, choose_v(h >= left, size, since + h), since);
-    if (any(accepted)) {
-      v met[STATES];
-      put(b, at, t + since);
-      closed(b->U, b->a, met);
-      for (int i = 0; i < STATES; ++i) x[i] = choose_v(accepted, met[i], x[i]);
-    }
-    sound &= ~(going & last & ~usable);
-    going &= sound & (since < size);
-  }
-  q->t = next;
-  return sound;
-}
-#else
-/* equal steps, see chainunit.integrate.rk4 */
-static bits advance(Block *b, Path *q, v next, v end, bits going, double longest, double tolerance, double most) {
-  (void)tolerance, (void)end;
-  const v t = q->t;
-  v *const x = q->x;
-  /* as many as in a whole step: a shorter last step of one run must not depend on the others */
-  double count = ceil(b->step / longest - 1e-9);
-  if (count < 1.0) count = 1.0;
-  if (count > most) return ~going;
-  const v h = (next - t) / count;
-  for (double s = 0.0; s < count; s += 1.0) {
-    v later[STATES], stage[STATES], k[STATES];
-    for (int i = 0; i < STATES; ++i) later[i] = x[i], k[i] = V(0.0);
-    for (int j = 0; j < (int)(sizeof(RK4_NODES) / sizeof(double)); ++j) {
-      for (int i = 0; i < STATES; ++i) stage[i] = x[i] + RK4_NODES[j] * h * k[i];
-      put(b, stage, t + (s + RK4_NODES[j]) * h);
-      rates(b->U, b->a, k);
-      for (int i = 0; i < STATES; ++i) later[i] += RK4_WEIGHTS[j] * h * k[i];
-    }
-    for (int i = 0; i < STATES; ++i) x[i] = choose_v(going, later[i], x[i]);
-  }
-  q->t = next;
-  return ~(bits){0};
-}
-#endif
-
-static void state_at(const Path *q, v t, v *x) {
   (void)t;
   for (int i = 0; i < STATES; ++i) x[i] = q->x[i];
-}
 #endif
+}
 
 void transients(long r0, long r1, long runs, long rows, double step, double longest, double tolerance,
                 double most, const double *in, const double *param, const double *signal, const double *begin,

@@ -27,14 +27,15 @@ from ..core import integrators
 from ..core.engines import MATH, casadi_
 from ..core.errors import InputError, RunError
 from ..core.model import Model
-from ..core.native.c_forms import constant
 from ..core.native.compilers import COMPILERS, Compiler, compiler
-from ..core.native.operations import Operations
+from ..core.printing.c_forms import STEP, constant
+from ..core.printing.c_forms import c_file as c_text
+from ..core.printing.operations import Operations
+from ..core.printing.vector_code import VectorCode, header
 from ..core.symbolic_trace import outputs_of, trace
 from .equations import arguments_of, find, names_of
-from .native import load, threads
+from .native import c_file, load, threads
 from .python_loop import PythonLoop
-from .vector_code import VectorCode, c_file
 
 _NUMBERS = (
     "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR "
@@ -327,7 +328,7 @@ def _compiled(
     constants["NOMINAL"] = tuple(v.quantity.nominal or 1.0 for v in states)
     source = "\n".join(
         [
-            c_file("lanes.h"),
+            header(),
             *(f"#define {name} {value}" for name, value in defines.items()),
             *(constant(name, value) for name, value in constants.items()),
             code.uniform(),
@@ -339,8 +340,10 @@ def _compiled(
     )
     names = [v.name for v in arguments_of(model)]
     starts = (0, sizes[0], sum(sizes))
-    digest = hashlib.sha256(source.encode()).hexdigest()
-    return _NativeLoop(digest, load(source, compiler), [names[starts[kind] + k] for kind, k in code.inputs])
+    files = {STEP: c_text(STEP)}
+    digest = hashlib.sha256((source + files[STEP]).encode()).hexdigest()
+    uniform = [names[starts[kind] + k] for kind, k in code.inputs]
+    return _NativeLoop(digest, load(source, compiler, files), uniform)
 
 
 def _method(model: type[Model]) -> str:

@@ -1,2 +1,2 @@
-"""What all layers stand on: quantities, models, engines, vectors of the plane, load port, integrators, native code,
+"""What all layers stand on: quantities, models, engines, vectors of the plane, load port, integrators, printers,
 units, files and errors."""

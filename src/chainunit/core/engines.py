@@ -8,7 +8,6 @@ name that one engine lacks cannot slip into a kernel.
           error, and `minimum` and `maximum` may ignore a NaN
 `numpy_`  arrays of any broadcastable shape
 `casadi_` symbols, from which C code, exact derivatives and sparsity come
-`jax_`    arrays under ``jit``/``grad`` (needs the extra ``jax``)
 `dual`    first-order dual numbers on top of any of the others: exact slopes
 ========  ==============================================================================
 """
@@ -41,13 +40,6 @@ def numpy_() -> SimpleNamespace:
     import numpy
 
     return SimpleNamespace(**{name: getattr(numpy, name) for name in NAMES})
-
-
-def jax_() -> SimpleNamespace:
-    """The engine on jax arrays; switch on ``jax_enable_x64`` before use."""
-    import jax.numpy
-
-    return SimpleNamespace(**{name: getattr(jax.numpy, name) for name in NAMES})
 
 
 def casadi_() -> SimpleNamespace:

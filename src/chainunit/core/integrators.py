@@ -1,5 +1,6 @@
-"""The internal integrators of models with states in a co-simulation FMU, and the tolerances of times there. Native
-code has the same methods; its numbers are generated from these (`chainunit.fmu.native.generate.rules`).
+"""The internal integrators of models with states in a co-simulation FMU, and the tolerances of times there. C and
+JavaScript have the same methods (``core/printing/step.h`` for FMUs and lanes, ``steps.js``); their numbers are
+generated from these. ``tests/test_steps.py`` compares the accepted steps.
 
 `rk4`, the classical Runge-Kutta method with equal steps: its cost is known beforehand, it needs no error control
 that could give up in the middle of a step, and with steps well below the model's shortest time constant its

@@ -8,8 +8,8 @@ from typing import Any
 
 from ..core.integrators import MAX_STEPS
 from ..core.model import Model, Requirement
-from ..core.native.kernels import ModelFunction, kernels, output_groups
-from ..core.native.python_code import python_text
+from ..core.printing.kernels import ModelFunction, kernels, output_groups
+from ..core.printing.python_code import python_text
 from .description import Interface, shared_interface
 
 _HEAD = '''\
@@ -17,7 +17,7 @@ _HEAD = '''\
 
 from math import *
 
-from .core.native.python_math import *
+from .core.printing.python_math import *
 
 '''
 

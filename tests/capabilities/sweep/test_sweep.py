@@ -16,6 +16,7 @@ import time
 from pathlib import Path
 
 import batches
+import cuda_device
 import numpy as np
 import pytest
 import sweeps
@@ -249,6 +250,32 @@ def unbroken(tmp_path_factory):
 def test_threads_make_the_same_store(unbroken, in_small_batches, tmp_path):
     made = sweep.run_sweep(parse(SPREAD), tmp_path, lambda *said: None, workers=3).outcome
     assert made.file.name == unbroken.name and made.file.read_bytes() == unbroken.read_bytes()
+
+
+@pytest.mark.skipif(cuda_device.COMPILER is None, reason="no C++ compiler")
+def test_a_gpu_makes_the_same_points(spread, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "cupy", cuda_device.cupy())
+    cuda_device.RawModule.sources.clear()
+    device = Study.from_text(SPREAD).sweep(tmp_path, engine="cuda")
+    assert len(cuda_device.RawModule.sources) == 1
+    for name, wanted in spread.dataset.data_vars.items():
+        np.testing.assert_allclose(device.dataset[name], wanted, rtol=1e-12, err_msg=name)
+
+
+def test_a_gpu_that_is_not_there_is_refused_before_there_is_a_store(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "cupy", None)
+    (tmp_path / "file.toml").write_text(SPREAD, "utf-8")
+    for engine, words in {
+        "cuda": r"engine 'cuda': needs CuPy: pip install 'chainunit\[cuda\]'; or take engine 'native'",
+        "gpu": "engine 'gpu': must be one of native, numpy, cuda",
+    }.items():
+        with pytest.raises(InputError, match=words):
+            Study.from_text(SPREAD).sweep(tmp_path / "out", engine=engine)
+        run = chainunit(
+            "sweep", tmp_path / "file.toml", "-o", tmp_path / "out", "--engine", engine, cwd=tmp_path
+        )
+        assert run.returncode == 2 and f"engine '{engine}'" in run.stderr
+    assert not list(tmp_path.glob("out/*.nc"))
 
 
 @pytest.mark.second

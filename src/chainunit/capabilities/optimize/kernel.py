@@ -16,10 +16,11 @@ import numpy as np
 
 from ...batch.arrays import by_numpy
 from ...batch.equations import Equations, Result
-from ...batch.native import Reductions, aligned, native_kernel
+from ...batch.native import aligned, native_kernel
+from ...batch.reductions import ReducedColumn, Reductions, flat_numbers
 from ...core.engines import casadi_
 from ...core.errors import RunError
-from ...core.native.operations import Operations
+from ...core.printing.operations import Operations
 from ...core.symbolic_trace import trace
 from ...machines.machine import Machine
 
@@ -151,7 +152,7 @@ class Kernel:
         columns = np.empty((len(kernel.columns), 1, size[1]))
         for part, (kind, place) in zip(columns, kernel.columns, strict=True):
             part[0] = lanes[kind][place]
-        kernel(uniform, columns, out, reason, size, 1)
+        kernel(uniform, columns, out, reason, size, flat_numbers(()), 1)
         return out
 
     def _by_numpy(
@@ -209,7 +210,7 @@ class Kernel:
             return np.zeros((n + 1, n + 1))
         lanes = {_LANE: np.array([q[used], w[used]]), _WEIGHT: weights[:, used]}
         results = len(self._bends.results)
-        means = tuple((place, "mean") for place in range(results))
+        means = tuple(ReducedColumn(place, "mean") for place in range(results))
         out = len(used) * self._run(self._bends, outer, lanes, (n + 1, len(used)), means)
         matrix = out[: n + 1].copy()
         if len(slopes):

@@ -28,6 +28,12 @@ def sweep(
             help="Address of a Dask scheduler whose workers make the points: tcp://10.0.0.5:8786.",
         ),
     ] = None,
+    engine: Annotated[
+        str,
+        typer.Option(
+            "--engine", help="Engine of the quantities of a turn: native, numpy, or cuda (a GPU of NVIDIA)."
+        ),
+    ] = "native",
     whole: AllOption = False,
     png: PicturesOption = False,
 ) -> None:
@@ -39,7 +45,16 @@ def sweep(
     question = study_file(config)
     from .page import TASK
 
-    carry_out(TASK, question, output, workers=workers, scheduler=scheduler, whole=whole, png=png)
+    carry_out(
+        TASK,
+        question,
+        output,
+        workers=workers,
+        scheduler=scheduler,
+        engine=engine,
+        whole=whole,
+        png=png,
+    )
 
 
 COMMANDS = (sweep,)

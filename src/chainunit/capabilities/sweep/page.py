@@ -55,6 +55,7 @@ def _compute(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    engine: str = "native",
 ) -> SweptStudy:
     """Run the sweep of a study; a store in the folder that fits is continued. Errors are those of `run_sweep`, and an
     InputError for a number of workers that is none."""
@@ -62,7 +63,7 @@ def _compute(
         isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
     ):
         raise InputError(f"workers = {shown(workers)}: must be a whole number >= 1")
-    return SweptStudy(run_sweep(config, folder, progress, workers, scheduler))
+    return SweptStudy(run_sweep(config, folder, progress, workers, scheduler, engine))
 
 
 def _store_in(swept: SweptStudy, folder: Path) -> Path:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import __version__
-from ...batch.evaluate import ReasonKind, StateReason, reasons_of
+from ...batch.evaluate import ReasonKind, StateReason, check_engine, reasons_of
 from ...core.brief import briefly_shown
 from ...core.errors import InputError
 from ...core.quantities import Layout, Quantity, Variable
@@ -68,6 +68,8 @@ class SweepTask:
     """the event of the measures"""
     threads: int = 1
     """number of threads of the native loop; the results do not depend on it"""
+    engine: str = "native"
+    """engine of the quantities of a turn, see `chainunit.batch.evaluate`"""
 
     @cached_property
     def quantities(self) -> list[CycleQuantity]:
@@ -116,6 +118,8 @@ class SweepTask:
             self.plan.basis,
             self.plan.angles,
             workers=self.threads,
+            engine=self.engine,
+            on_host=True,
         )
 
     def codes_of_turns(self, table: xr.Dataset) -> Any:
@@ -365,10 +369,12 @@ def run_sweep(
     progress: TaskProgress,
     workers: int | None = None,
     scheduler: str | None = None,
+    engine: str = "native",
 ) -> SweepFindings:
     """Make the points of the sweep of a study that its store in `folder` does not have; the other arguments and the
-    errors are those of `task_of` and `chainunit.work.runner.run`."""
-    task = task_of(config)
+    errors are those of `task_of`, of `chainunit.batch.evaluate`, and of `chainunit.work.runner.run`."""
+    check_engine(engine)
+    task = replace(task_of(config), engine=engine)
     if scheduler is not None:
         # before there is a store, which a refusal would leave behind
         check_scheduler(scheduler)

@@ -66,6 +66,7 @@ def sweep(
     folder: str | Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    engine: str = "native",
     progress: TaskProgress | None = None,
 ) -> SweepResult:
     """Run the sweep of the study, its table ``sweep``, as ``chainunit sweep`` does.
@@ -76,6 +77,7 @@ def sweep(
         the store is in a temporary folder, which lasts as long as the result
     workers : number of threads, or with measures of processes; by default one for each processor
     scheduler : address of a Dask scheduler whose workers make the points, such as ``tcp://10.0.0.5:8786``
+    engine : engine of the quantities of a turn: "native", "numpy", or "cuda" (a GPU of NVIDIA)
     progress : as of `run`
 
     Raises
@@ -87,7 +89,9 @@ def sweep(
     WriteError
         for a file that cannot be written.
     """
-    return SweepResult.made(study.config, folder, progress, workers=workers, scheduler=scheduler)
+    return SweepResult.made(
+        study.config, folder, progress, workers=workers, scheduler=scheduler, engine=engine
+    )
 
 
 METHOD, RESULT = sweep, SweepResult

@@ -1,1 +1,1 @@
-"""Native code from traced equations: operations, C functions, compilers and the cache of compiled code."""
+"""C compilers, and the cache of compiled code."""

@@ -1,1 +1,1 @@
-"""Printers of traced equations: one for each language, from the same list of operations."""
+"""The operations of traced equations, and their printers: one for each language, from the same list."""

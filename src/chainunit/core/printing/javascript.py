@@ -1,4 +1,4 @@
-"""JavaScript of models, printed from the operations of their functions (`chainunit.core.native.kernels`).
+"""JavaScript of models, printed from the operations of their functions (`chainunit.core.printing.kernels`).
 
 `program` is an expression, whose value has an object for each model: its numbers as arrays, and functions that
 compute from some of these arrays to others. They call no function of the host but a root, a size, a sign, a rounding
@@ -37,12 +37,12 @@ from .. import integrators
 from ..engines import casadi_
 from ..errors import InputError
 from ..model import Model
-from ..native.division import Division
-from ..native.elementary import OWN, recording
-from ..native.kernels import ModelFunction, kernels
-from ..native.operations import ARGUMENT, NUMBER, Operation, Operations
-from ..native.recorder import CHOOSE, EXPONENT, MANTISSA, POWER2
 from ..symbolic_trace import chosen_columns, outputs_of, trace
+from .division import Division
+from .elementary import OWN, recording
+from .kernels import ModelFunction, kernels
+from .operations import ARGUMENT, NUMBER, Operation, Operations
+from .recorder import CHOOSE, EXPONENT, MANTISSA, POWER2
 
 _LONGEST = {"OFTEN": 1000, "ONCE": 4000}
 """Largest number of operations in a function, by the frequency of its calls: browsers do not optimize longer ones."""
@@ -311,7 +311,7 @@ def _is_pair(kind: str) -> bool:
 
 
 def _elementary() -> str:
-    """Sine, arctangent and the like (`chainunit.core.native.elementary`)."""
+    """Sine, arctangent and the like (`chainunit.core.printing.elementary`)."""
     texts = {}
     for kind, (function, arguments, _) in OWN.items():
         traced = recording(kind)

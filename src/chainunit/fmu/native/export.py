@@ -15,7 +15,8 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ...core.files import atomic_file, folder
 from ...core.model import Model
-from ...core.native.elementary_code import HEADER, header
+from ...core.printing.c_elementary import HEADER, header
+from ...core.printing.c_forms import STEP, c_file
 from ..companion_files import companion_files
 from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes
@@ -112,7 +113,7 @@ def export(
     functions, room = kernels(interface)
     sources = {name: (recipes() / "native" / name).read_bytes() for name in layer}
     sources |= {"kernels.c": functions.encode(), "rules.h": interface.text(rules()).encode()}
-    sources[HEADER] = header().encode()
+    sources |= {HEADER: header().encode(), STEP: c_file(STEP).encode()}
     digest = hashlib.sha256(xml_bytes(description))
     for text in (*sources.values(), interface.text(tables(interface, "", room)).encode()):
         digest.update(text + b"\0")

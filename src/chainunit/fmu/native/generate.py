@@ -15,10 +15,10 @@ from typing import Any
 from ...core import integrators, messages
 from ...core.integrators import MAX_STEPS
 from ...core.model import Model
-from ...core.native.c_forms import constant, number
-from ...core.native.code import Program
-from ...core.native.kernels import difference_groups, output_groups
-from ...core.native.kernels import kernels as kernels_of
+from ...core.printing.c_code import Program
+from ...core.printing.c_forms import constant, number
+from ...core.printing.kernels import difference_groups, output_groups
+from ...core.printing.kernels import kernels as kernels_of
 from ...core.quantities import Variable
 from ..description import Interface, shared_interface
 

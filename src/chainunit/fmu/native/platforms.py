@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from ...core.errors import InputError, RunError
 from ...core.native.compilers import COMPILERS, Compiler, compile_code, compiler, host, zig_compiler
-from ...core.native.elementary_code import HEADER
+from ...core.printing.c_elementary import HEADER
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")

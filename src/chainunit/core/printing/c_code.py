@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from .c_elementary import is_pair, own_forms
 from .c_forms import forms, number
 from .division import Division
-from .elementary_code import is_pair, own_forms
 from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _LONGEST = 2500

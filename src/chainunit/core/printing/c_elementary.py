@@ -1,4 +1,4 @@
-"""C of the functions of `chainunit.core.native.elementary`, and of the smaller and the larger of two numbers.
+"""C of the functions of `chainunit.core.printing.elementary`, and of the smaller and the larger of two numbers.
 
 It has the bits that JavaScript has: both are printed from the same operations, and none of the functions calls the C
 library for more than a root, a size or a sign, which IEEE 754 rounds in one way. A product and a sum must not be

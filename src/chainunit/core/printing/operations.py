@@ -1,7 +1,7 @@
 """Symbolic expressions as a list of operations, each after its operands.
 
 CasADi traces a model's equations. Everything that computes them outside CasADi is made from this list: the C code of
-FMUs and of batches, and the array code of numpy and jax.
+FMUs and of batches, CUDA, JavaScript, Python, and the array code of numpy.
 """
 
 from __future__ import annotations

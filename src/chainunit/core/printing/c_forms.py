@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import resources
 from typing import Any
 
 
@@ -30,6 +31,15 @@ def number(x: float) -> str:
         return "NAN"
     text = "INFINITY" if math.isinf(x) else repr(abs(float(x)))
     return f"(-{text})" if math.copysign(1.0, x) < 0.0 else text
+
+
+STEP = "step.h"
+"""The file with the steps of the integrators in C."""
+
+
+def c_file(name: str) -> str:
+    """The text of a C file of this package."""
+    return (resources.files(__package__) / name).read_text("utf-8")
 
 
 def constant(name: str, value: Any) -> str:

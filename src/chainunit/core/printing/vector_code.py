@@ -1,4 +1,5 @@
-"""C code of operations over vectors of lanes.
+"""Code of operations over vectors of lanes: C for the processor, and CUDA for a GPU, by the same text. The header of
+each language defines the vector and the operations on it.
 
 The operations are divided by level: values that follow from uniform arguments alone are computed once, as numbers,
 and are kept in ``U``; the others are computed for each vector of lanes.
@@ -8,19 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from importlib import resources
 
-from ..core.native.c_forms import forms, number
-from ..core.native.operations import ARGUMENT, NUMBER, Operation, Operations
+from .c_forms import c_file, forms, number
+from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _ARITHMETIC = {"ADD", "SUB", "MUL", "SQ", "TWICE", "NEG", "ASSIGN"}
 """Operations that C has for vectors, or for a vector and a number; all others are functions of vectors."""
 _NAMES = {"CONSTPOW": "pow"}
 
 
-def c_file(name: str) -> str:
-    """The text of a C file of this package."""
-    return (resources.files(__package__) / name).read_text("utf-8")
+def header(language: str = "c") -> str:
+    """The vectors of a language, "c" or "cuda", and the operations of the code on them."""
+    return c_file({"c": "lanes.h", "cuda": "cuda.h"}[language])
 
 
 class VectorCode:
@@ -64,7 +64,7 @@ class VectorCode:
 
     def uniform(self) -> str:
         """The function ``uniform(in, U)`` from the uniform arguments, in the order of `inputs`."""
-        lines = ["static void uniform(const double *in, double *U) {"]
+        lines = ["PER_ROW void uniform(const double *in, double *U) {"]
         places = {entry: k for k, entry in enumerate(self.inputs)}
         for k in self._needed(set(self._slots)):
             each = self._items[k]
@@ -80,9 +80,7 @@ class VectorCode:
         ``y`` are the results of these groups one after the other."""
         results = [place for group in groups for place in self._results[group]]
         columns = {entry: k for k, entry in enumerate(self.columns)}
-        lines = [
-            f"static inline void {name}(const double *restrict U, const v *restrict a, v *restrict y) {{"
-        ]
+        lines = [f"PER_VECTOR void {name}(const double *restrict U, const v *restrict a, v *restrict y) {{"]
         for k in self._needed({place for place in results if self._varies[place]}):
             each = self._items[k]
             if not self._varies[k]:

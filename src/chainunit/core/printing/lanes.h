@@ -23,6 +23,9 @@ typedef double v __attribute__((vector_size(8 * W)));
 typedef double v_free __attribute__((vector_size(8 * W), aligned(8), may_alias));
 typedef long long bits __attribute__((vector_size(8 * W)));
 
+#define PER_ROW static
+#define PER_VECTOR static inline
+
 #define V(x) ((v){0} + (x))
 #define ONES(mask) ((v)((mask) & (bits)V(1.0)))
 #define LOAD(p) (*(const v_free *)(p))
@@ -158,6 +161,11 @@ static inline int any(bits mask) {
         for (int k = 1; k < W; ++k) s = take; \
         return s; \
     }
+/* the bin of a value, the first or the last one for a value beyond them */
+static inline int bin_of(double y, double low, double per, int bins) {
+    const double place = floor((y - low) * per);
+    return place > 0.0 ? (place < bins - 1 ? (int)place : bins - 1) : 0;
+}
 OVER_LANES(lane_sum, s + x[k])
 OVER_LANES(lane_least, x[k] < s ? x[k] : s)
 OVER_LANES(lane_largest, x[k] > s ? x[k] : s)
