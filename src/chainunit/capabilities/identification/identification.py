@@ -231,19 +231,18 @@ def identify(
         problem,
         best,
         workers,
-        tuned_gains(config),
+        tuned_gains(config.motor, config.file.given),
         lambda names: progress(f"other {names}", 0.97, 1.0),
     )
     return replace(machine, known=replace(known, sets=sets))
 
 
-def tuned_gains(config: Config) -> list[str]:
-    """The gains of the control that the file does not give: they are those of a new drive."""
-    motor = config.motor
+def tuned_gains(motor: Any, keys: Set[str]) -> list[str]:
+    """The gains of the control of a `motor` that are none of the `keys` in the file: a new drive has them."""
     if not isinstance(motor, OwnMotor) or not motor.kind.follows(motor.parameters):
         return []
     gains = (f"motor.{name}" for name in CONTROL)
-    return [name for name in gains if name not in config.file.given]
+    return [name for name in gains if name not in keys]
 
 
 def plan_of(plans: Mapping[str, Any]) -> IdentificationPlan:
@@ -384,7 +383,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
                 f"{run.recording.source} has no mark: the angle of the crank follows from the course of the other "
                 "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
-    tuned = tuned_gains(machine.config)
+    tuned = tuned_gains(machine.config.motor, machine.config.file.given)
     if tuned and columns & set(OF_TERMINALS):
         names = ", ".join(tuned)
         yield f"{names}: not in the file, and tuned as for a new drive; give the values of the real converter"
