@@ -79,7 +79,19 @@ def sections(study):
     return set(names)
 
 
-COMMON = {"answer", "question", "runs", "constant_speed", "blade", "plots", "motion", "basis", "given"}
+COMMON = {
+    "answer",
+    "question",
+    "runs",
+    "constant_speed",
+    "blade",
+    "plots",
+    "motion",
+    "live",
+    "basis",
+    "given",
+    "not_checked",
+}
 
 
 def cut_work(study):
@@ -141,7 +153,7 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     other = solve_ivp(rate, span, start, "Radau", t_eval=time[:11], rtol=1e-8, atol=1e-9)
     way = coasting["machine.phi"].values[:11] - start[0]
     assert way == pytest.approx(other.y[0] - start[0], abs=1e-4 * np.max(way))
-    assert sections(study) == COMMON | {"flywheels", "starts"}
+    assert sections(study) == COMMON | {"flywheels", "starts", "checks", "relay_classes"}
 
 
 @pytest.mark.slow

@@ -66,7 +66,7 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     assert warnings["no reserve"].quantities["over"][0] == -steady.torque_reserve > 0.1
     # steady running comes in each turn, a dip for a moment: one sentence, of the verdict as of the warning
     for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict.text)):
-        assert re.search(rf"overloaded {when}: .* above its pull-out torque", where)
+        assert re.search(rf"{when} its torque exceeds the pull-out torque by \d", where)
         assert "a moment the motor gives" not in where
     assert "; a heavier load or a dip of the voltage stalls it; " in warnings["no reserve"].text
 
@@ -88,8 +88,8 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     steady, motor = study.answers["steady"], study.drive.parameters
     missed = warnings["speed missed"].text
     below = breakdown_speed(study.drive, study.steady)
-    assert steady.speed_mean < 0.5 * below and "the motor stalls below its pull-out speed" in missed
-    assert f"below {below:.2f} rad/s, the speed of its pull-out torque" in missed
+    assert steady.speed_mean < 0.5 * below
+    assert f"the motor stalls below its pull-out speed, {below:.2f} rad/s; " in missed
     assert "slip" not in missed and "verload" not in missed
     # there the torque is the largest of all speeds
     T, w = float(study.steady["motor.stator.T"].mean()), below * study.drive.ratio
@@ -144,7 +144,7 @@ def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     mean = study.answers["steady"].speed_mean
     assert mean == pytest.approx(3.0 * (1.0 + check.value), rel=2e-3)
     assert verdict.holds == "true" and verdict.text.startswith(
-        "The motor keeps the crank at 3.08 rad/s, +2.82 % of 3 rad/s; "
+        f"The motor keeps the crank at {mean:.2f} rad/s, {100.0 * (mean / 3.0 - 1.0):+.2f} % of 3 rad/s; "
     )
     assert "speed missed" not in warnings
 

@@ -167,7 +167,7 @@ def _on_limits(study: StudyRecord) -> None:
         stalls = "; a heavier load or a dip of the voltage stalls it" if turns else ""
         warn(
             "no reserve",
-            "steady running: the motor is {passes}{stalls}; take a larger motor or a heavier flywheel.",
+            "steady running of the motor: {passes}{stalls}; take a larger motor or a heavier flywheel.",
             STEADY,
             stalls=stalls,
             passes=no_reserve(STEADY, steady.torque_reserve),

@@ -18,7 +18,7 @@ DUTIES = Path(__file__).parents[2] / "data" / "duties"
 @pytest.mark.parametrize(
     ("name", "motor", "ratio", "flywheel", "gear", "relay"),
     [
-        ("d1", "IE3 4-pole 0.12 kW, 63M", 53.0, 0.0, 74.7, 0.445),
+        ("d1", "IE3 4-pole 0.12 kW, 63M", 53.0, 0.0, 67.6, 0.445),
         ("d2", "IE3 4-pole 0.55 kW, 80M", 100.0, 0.0, 697.0, 1.33),
         ("d5", "IE3 4-pole 4 kW, 112M", 10.0, 0.0, 413.0, 4.64),
         ("d6", "IE3 4-pole 4 kW, 112M", 37.5, 0.0, 1630.0, 8.04),
