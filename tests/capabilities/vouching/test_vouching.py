@@ -124,7 +124,7 @@ def test_a_certified_fmu_holds(made):
         )
     ]  # fmt: skip
     assert lines[-1] == "it.fmu: holds"
-    assert "by the expected key" in lines[0] and "30 members" in lines[1]
+    assert "by the expected key" in lines[0] and "31 members" in lines[1]
 
 
 NEEDED = {"cryptography", "fmpy", "numpy", "pydantic", "rich", "scipy", "typer"}
