@@ -278,6 +278,7 @@ def uneven():
     return Rig(values.operation, catalogue_drive(values.drive, values.machine, bars, values.plate), None)
 
 
+@pytest.mark.second
 def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
     """An induction motor without a flywheel: at the mean speed the crank would be elsewhere."""
     rig = uneven()

@@ -752,6 +752,7 @@ def test_random_machines_run(files):
 # -- integrators
 
 
+@pytest.mark.second
 @native
 def test_native_and_python_fmus_agree_where_it_snatches(files, tmp_path):
     """A turn of four rods without much damping: the same steps to rounding, which a snatch makes no larger than
@@ -766,6 +767,7 @@ def test_native_and_python_fmus_agree_where_it_snatches(files, tmp_path):
     assert np.max(np.abs(got - reference) / size) < 1e-9
 
 
+@pytest.mark.second
 @native
 def test_the_tolerance_controls_the_error(files):
     """Error of the angles over two snatching turns against a run with 1e-12: it falls with the tolerance, and lies

@@ -103,6 +103,7 @@ def test_a_signal_before_the_command_begins_has_its_line(tmp_path, monkeypatch):
     assert done.returncode == 130 and done.stderr == "chainunit: interrupted; nothing was written\n"
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("happens", [_bare, _swallowed, _other_error])
 def test_an_interrupt_while_files_are_written_names_those_that_are_there(happens, tmp_path, monkeypatch):
     from chainunit.report import files

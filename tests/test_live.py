@@ -415,6 +415,7 @@ def test_the_copied_file_without_a_change_is_the_study(packaged, tmp_path):
     assert copied.feed == config.feed and copied.run == config.run and copied.events == config.events
 
 
+@pytest.mark.second
 def test_a_heavy_feed_slows_the_crank_as_in_a_sweep(packaged):
     """With a heavier feed on both sides the crank loses more speed, as in the runs of a sweep, which await a motor
     that comes to its speed late; a crank that creeps has no steady running in either."""
@@ -506,6 +507,7 @@ def test_a_date_in_the_study_file_is_a_text_in_the_page(tmp_path):
     assert json.loads(json.dumps(live.data["file"]))["report"] == {"date": "2026-03-01"}
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", ["chain-unit", "knife"])
 def test_a_live_page_alone_is_small(name, tmp_path):
     file = tmp_path / "study.toml"

@@ -125,6 +125,7 @@ def test_it_computes_what_the_co_simulation_records(kind):
 # -- events
 
 
+@pytest.mark.second
 def test_chains_that_drift_are_put_back(tmp_path):
     """At constant crank speed with a loose solver, a strict FMU asks for events, in which the chains are closed."""
     model, w = flexible(3, 1), 6.0

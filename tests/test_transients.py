@@ -242,6 +242,7 @@ def test_directions_need_a_compiler(monkeypatch):
         Rig(by=["machine.left.web_mass"])
 
 
+@pytest.mark.second
 def test_a_direction_gives_the_derivative_of_the_run(rig):
     """By a parameter, an input and a state at the start, each against differences of runs, through a lump that the
     loop of the control follows. The values themselves are those of a run without directions."""

@@ -374,6 +374,7 @@ def test_another_motor_is_one_for_the_same_mains():
         other_motor(motors[fifty], sixty, ())
 
 
+@pytest.mark.second
 def test_another_motor_that_changes_the_speed_is_no_comparison(tmp_path):
     """A motor of two poles on the line turns the same gear and crank twice as fast."""
     made = run_study(parse(short_study(table='other = "IE3 2-pole 1.5 kW, 90S"\n')), tmp_path)

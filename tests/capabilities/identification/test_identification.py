@@ -234,6 +234,7 @@ def test_a_fit_that_still_improves_says_so(loaded, monkeypatch):
     assert np.sqrt(np.mean(worst.residuals**2)) == pytest.approx(size)
 
 
+@pytest.mark.second
 def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):
     """The crank that is 2 % longer is told from the right one, with its right length; the residuals of the right
     machine agree with its numbers. No speed by which a law is smooth is among them."""

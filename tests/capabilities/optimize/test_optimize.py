@@ -204,6 +204,7 @@ def least_mean(machine, feed, speeds, points=720):
     return np.min(machine.mean_pulls(speeds, feed.left, feed.right, points)[:webs])
 
 
+@pytest.mark.second
 def test_the_slack_free_speed_counts_in_what_is_shown(best):
     """The pulls beside the machines' own route, and among the neighbours only machines that keep them."""
     feed = best.wishes.feed

@@ -519,6 +519,7 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
             assert x == b[name] or abs(x - b[name]) < 1e-3 * max(abs(b[name]), 0.1), (name, x, b[name])
 
 
+@pytest.mark.second
 @needs_compiler
 @pytest.mark.parametrize(
     "text, fed_from",

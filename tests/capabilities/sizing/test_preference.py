@@ -907,6 +907,7 @@ def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypa
     assert [c.motor.designation for c in result.trade] == [motors[0], motors[2]]
 
 
+@pytest.mark.second
 def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch):
     """Its flywheels stay below the permitted ratio of inertias: none carries it through. It never ran hot."""
     result = pressed(tmp_path, monkeypatch, "inertia_ratio = 2\n", "IE3 4-pole 0.55 kW, 80M")

@@ -450,6 +450,7 @@ def test_machines_without_an_inertia_of_their_angle_say_so():
     assert obstacle(chains) == "the inertia of the machine does not belong to its angle alone"
 
 
+@pytest.mark.second
 @pytest.mark.compiler
 def test_runs_that_fail_are_told_and_leave_the_study(monkeypatch, tmp_path):
     def fails(*_):

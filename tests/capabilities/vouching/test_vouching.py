@@ -1397,6 +1397,7 @@ def test_the_sources_hash_changes_with_a_source(monkeypatch, tmp_path):
     assert len({first, second, certify.sources_hash()}) == 3 and (root / "capabilities").is_dir()
 
 
+@pytest.mark.second
 def test_a_certificate_made_without_the_model_holds_for_whoever_has_it(own, tmp_path):
     """It has no conditions of the model, and none are looked for; the file of another model is refused."""
     from chainunit.machines.linkages.file import read_linkage

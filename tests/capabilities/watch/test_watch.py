@@ -106,6 +106,7 @@ def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
     assert result["learned"]["mark.angle"]["value"]["value"] == pytest.approx(-0.13, abs=0.01)
 
 
+@pytest.mark.second
 def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     """A shift of 12 kg that comes in 10 s is seen as soon as the part that has come is beyond the threshold."""
     config, speed = parse(study_text(TRUTH["machine"])), TRUTH["crank_speed"]
@@ -130,6 +131,7 @@ def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     assert found.alarms[0].begin < 30.0 + 4.2 * TURN  # as the page has it
 
 
+@pytest.mark.second
 def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     """One whose left wall is heavier by a third is named, with the column and the feed that tell."""
     wrong = TRUTH["machine"] | {"left.wall_mass": 81.0}
