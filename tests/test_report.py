@@ -357,6 +357,10 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
             "Warning: The speed does not return to its steady band within the time followed: the rocker is blocked.",
             "Warning: The speed does not return to its steady band within the time followed.",
         ),
+        (
+            "Warning: Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %.",
+            "Warning: Crank speed too high for the rocker torque of two bars.",
+        ),
         ("Warning: " + "word " * 20, "Warning: " + "word " * 13 + "..."),
     ],
 )
