@@ -8,8 +8,10 @@ over zeta, mu and psi.
 import sys
 from pathlib import Path
 
+from rich.console import Console
+
 from chainunit.report import files
-from chainunit.report.terminal import plain
+from chainunit.report.terminal import show
 
 from . import output, reproduce, two_bar
 
@@ -25,7 +27,7 @@ def main(arguments: list[str]) -> None:
     report = report or output.report(reproduce())
     for write in files.writers(report, folder, name, png=True):
         write()
-    print(plain(report))
+    show(report, Console(width=120, markup=False, highlight=False))
 
 
 if __name__ == "__main__":

@@ -109,13 +109,15 @@ def screen(report: Report, console: Console, rest: str) -> None:
 
 
 def line_of(text: str, width: int) -> str:
-    """A sentence in one line: if it is too long, without what stands in brackets, then with its first clauses."""
-    if len(text) > width:
-        text = _BRACKETS.sub("", text)
-    if len(text) <= width:
-        return text
-    ends = [place.start() for place in _CLAUSE_END.finditer(text) if place.start() < width]
-    return f"{text[: ends[-1]]}." if ends else shorten(text, width, placeholder=" ...")
+    """A sentence in one line: if it is too long, its first clauses; a bracket is whole or left out."""
+    for trial in (text, _BRACKETS.sub("", text)):
+        if len(trial) <= width:
+            return trial
+        brackets = [bracket.span() for bracket in _BRACKETS.finditer(trial)]
+        ends = [place.start() for place in _CLAUSE_END.finditer(trial) if place.start() < width]
+        if outside := [end for end in ends if not any(low <= end < high for low, high in brackets)]:
+            return f"{trial[: outside[-1]]}."
+    return shorten(text, width, placeholder=" ...")
 
 
 def _printed(console: Console, show: Callable[[], None]) -> str:

@@ -378,7 +378,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     ordered = as_dict(own)["sizing"]["gear"]
     assert ordered["overload"]["value"] < 0.6 * block
     assert f"{plate.torque:.2f} N m" in said and "no torque limiter (a start loads it with 1" in said
-    assert "running (all feed on the right) puts" in said
+    assert "times running (all feed on the right), " in said
 
 
 @pytest.mark.second
