@@ -222,6 +222,15 @@ def test_the_stated_speed_is_that_of_the_recording(loaded, left_out, column):
         inspect_runs(run_at(float(remedy) * np.pi / 30.0), 1)
 
 
+@pytest.mark.parametrize("times", [2.0, 3.0])
+def test_a_stated_speed_that_the_motor_cannot_reach_is_refused_with_that_of_the_recording(loaded, times):
+    problem = problem_of(loaded)
+    values = problem.runs[0].values | {"motor.w_ref": 50.0 * times * SPEED}
+    run = RecordedRun("run", loaded, times * SPEED, values)
+    with pytest.raises(InputError, match=rf"the crank turns at {SPEED:.3f}\d* rad/s"):
+        inspect_runs(Problem(problem.plant, [run], SOUGHT, SENSORS), 1)
+
+
 def test_a_fit_that_still_improves_says_so(loaded, monkeypatch):
     """It stops after the most rounds, and names the column that it does not describe."""
     problem = problem_of(without(loaded, "motor.count"))

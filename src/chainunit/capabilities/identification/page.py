@@ -119,8 +119,9 @@ def _suspects(s: b.Source) -> Iterator[b.Block]:
     )
     yield b.Table(tuple(rows), columns, title="Suspects: known numbers that may be wrong, the best set first")
     yield b.Text(
-        "Each set of one or two numbers, with the values of the table, explains the recordings about as well as the "
-        "first one. Measure them, or seek them.",
+        "Measure these numbers, or seek them: a set with the values of the table explains the recordings."
+        if any(suspects["describes"] for suspects in s.result["suspects"])
+        else "No set explains the recordings; the nearest one stands first.",
         "note",
     )
 
