@@ -145,6 +145,7 @@ def test_a_system_takes_them_too():
         (lambda: Study().live("mine"), 'file = "mine": must end in .html'),
         (lambda: Study().run(3), "folder = 3: must be the path of a folder"),
         (lambda: Study().run(progress=3), "progress = 3: must be a function"),
+        (lambda: Study().export("x.fmu", progress=3), "progress = 3: must be a function"),
     ],
 )
 def test_a_wrong_type_is_refused_in_one_line(call, line):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.declared_numbers import as_text
 from ..core.errors import InputError, RemarkWarning, check_kind, near_name, shown
-from ..core.files import write_file
+from ..core.files import named_file, write_file
 from ..core.named import Named
 from ..core.quantities import Layout
 from ..core.temporary_folders import scratch
@@ -252,7 +252,7 @@ class Study(StudyMethods):
         UserWarning
             on the parts of the study that the FMU does not have, and on the limits of its model.
         """
-        path = _named(file, ".fmu")
+        path = named_file(file, ".fmu")
         with shown_progress(progress) as shown, self.config.file.refusals():
             say = _as_words(shown)
             drive = drive_to_export(self.config, backend, say)
@@ -292,7 +292,7 @@ class Study(StudyMethods):
         UserWarning
             as of `export`.
         """
-        path = _named(file, ".ssp")
+        path = named_file(file, ".ssp")
         with shown_progress(progress) as shown, self.config.file.refusals():
             export_study(
                 self.config,
@@ -319,7 +319,7 @@ class Study(StudyMethods):
         WriteError
             for a file that cannot be written.
         """
-        path = _named(file, ".html")
+        path = named_file(file, ".html")
         with scratch() as folder:
             page = html.render(live_page_of_config(self.config, self._source, folder))
         write_file(path, page)
@@ -408,24 +408,6 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         verdicts = self._numbers["verdict"].values()
         lines = [verdict["text"] for verdict in verdicts if verdict is not None]
         return "\n".join([*lines, self.record.insufficient]).rstrip()
-
-    @property
-    def warnings(self) -> list[str]:
-        """The warnings, a text each."""
-        return [warning["text"] for warning in self._numbers["warnings"]]
-
-    @property
-    def notes(self) -> list[str]:
-        """The assumptions behind the numbers, a text each."""
-        return [note["text"] for note in self._numbers["notes"]]
-
-
-def _named(file: Any, ending: str) -> Path:
-    """The path of a file that must have this ending."""
-    check_kind("file", file, str | Path, "the path of a file")
-    if Path(file).suffix.lower() != ending:
-        raise InputError(f"file = {shown(str(file))}: must end in {ending}")
-    return Path(file)
 
 
 def _as_words(progress: TaskProgress) -> Callable[[str], None]:

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError, RunError
+from ..core.printing.c_forms import c_file
 from ..core.printing.vector_code import VectorCode, header
 from .equations import Equations
-from .native import c_file, defines
+from .native import defines
 from .reductions import Reductions, first_rows
 
 _WARP, _BLOCK, _RESIDENT = 32, 64, 4
@@ -82,7 +83,7 @@ def source(equations: Equations, code: VectorCode, reductions: Reductions) -> st
             defines(equations, code, reductions, sizes),
             code.uniform(),
             code.body("states", (0, 1)),
-            c_file("cuda_states.h"),
+            c_file("cuda_states.h", __package__),
         ]
     )
 

@@ -13,12 +13,12 @@ import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from ..core.native.compilers import Compiler, compile_code, compiler, flags_for_this_processor
+from ..core.printing.c_forms import c_file
 from ..core.printing.vector_code import VectorCode, header
 from ..core.temporary_folders import scratch
 from .equations import Equations
@@ -31,11 +31,6 @@ _LANES = 8
 
 _BLOCK = 64
 """Number of states that are kept in the first cache before they are stored."""
-
-
-def c_file(name: str) -> str:
-    """The text of a C file of this package."""
-    return (resources.files(__package__) / name).read_text("utf-8")
 
 
 def defines(equations: Equations, code: VectorCode, reductions: Reductions, more: Mapping[str, int]) -> str:
@@ -60,7 +55,7 @@ def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> s
             defines(equations, code, reductions, {"BLOCK": _BLOCK}),
             code.uniform(),
             code.body("states", (0, 1)),
-            c_file("states.h"),
+            c_file("states.h", __package__),
         ]
     )
 

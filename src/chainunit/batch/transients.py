@@ -28,13 +28,12 @@ from ..core.engines import MATH, casadi_
 from ..core.errors import InputError, RunError
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS, Compiler, compiler
-from ..core.printing.c_forms import STEP, constant
-from ..core.printing.c_forms import c_file as c_text
+from ..core.printing.c_forms import STEP, c_file, constant
 from ..core.printing.operations import Operations
 from ..core.printing.vector_code import VectorCode, header
 from ..core.symbolic_trace import outputs_of, trace
 from .equations import arguments_of, find, names_of
-from .native import c_file, load, threads
+from .native import load, threads
 from .python_loop import PythonLoop
 
 _NUMBERS = (
@@ -335,12 +334,12 @@ def _compiled(
             code.body("rates", (0,)),
             code.body("results", (1,)),
             code.body("closed", (2,)) if model.controlled else "",
-            c_file("transients.h"),
+            c_file("transients.h", __package__),
         ]
     )
     names = [v.name for v in arguments_of(model)]
     starts = (0, sizes[0], sum(sizes))
-    files = {STEP: c_text(STEP)}
+    files = {STEP: c_file(STEP)}
     digest = hashlib.sha256((source + files[STEP]).encode()).hexdigest()
     uniform = [names[starts[kind] + k] for kind, k in code.inputs]
     return _NativeLoop(digest, load(source, compiler, files), uniform)

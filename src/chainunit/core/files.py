@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from .errors import Faults, InputError, WriteError
+from .errors import Faults, InputError, WriteError, check_kind, shown
 from .inputs import JSON, file_bytes, json_of
 from .ledger import Ledger
 
@@ -80,6 +80,20 @@ def atomic_file(file: Path, *, is_result: bool = True) -> Iterator[Path]:
                 written.append(file)
     finally:
         part.unlink(missing_ok=True)
+
+
+def named_file(file: str | Path, *endings: str) -> Path:
+    """The path of a file that a script names, with one of these endings, such as ".fmu".
+
+    Raises
+    ------
+    InputError
+        for another ending, and for a value that is no path.
+    """
+    check_kind("file", file, str | Path, "the path of a file")
+    if Path(file).suffix.lower() not in endings:
+        raise InputError(f"file = {shown(str(file))}: must end in {', '.join(endings)}")
+    return Path(file)
 
 
 def write_file(file: Path, content: str | bytes) -> list[Path]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from html import escape
 from time import monotonic
 from typing import Any
 
-from ..core.errors import printable
+from ..core.errors import check_kind, printable
 from ..work.progress import TaskProgress, quiet
 
 _EVERY = 0.2
@@ -19,7 +19,14 @@ _EVERY = 0.2
 @contextmanager
 def shown_progress(progress: TaskProgress | None) -> Iterator[TaskProgress]:
     """The function for the progress of a task: the `progress` of the caller; without one a bar in a notebook, and
-    nothing elsewhere. The bar is removed at the end."""
+    nothing elsewhere. The bar is removed at the end.
+
+    Raises
+    ------
+    InputError
+        for a `progress` that is no function.
+    """
+    check_kind("progress", progress, Callable | None, "a function of task, work done and total work")
     shell = _notebook()
     if progress is not None or shell is None:
         yield progress or quiet

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
@@ -48,8 +48,6 @@ class ReportedResult(Generic[Question, Outcome]):
             for a file that cannot be written; the others are written.
         """
         check_kind("folder", folder, str | Path | None, "the path of a folder")
-        kind = "a function of task, work done and total work"
-        check_kind("progress", progress, Callable | None, kind)
         with shown_progress(progress) as shown:
             return cls._made(question, folder, shown, **options)
 

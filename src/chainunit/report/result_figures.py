@@ -6,8 +6,7 @@ import io
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import InputError, check_kind, shown
-from ..core.files import atomic_file
+from ..core.files import atomic_file, named_file
 from ..reading.text import Units
 from . import print_figures
 from .figure import Figure
@@ -49,13 +48,9 @@ class ResultFigure:
         WriteError
             for a file that cannot be written.
         """
-        check_kind("file", file, str | Path, "the path of a file")
-        path = Path(file)
-        kind = path.suffix.lower().removeprefix(".")
-        if kind not in FORMATS:
-            raise InputError(f"file = {shown(str(file))}: must end in {', '.join(f'.{x}' for x in FORMATS)}")
+        path = named_file(file, *(f".{kind}" for kind in FORMATS))
         with atomic_file(path) as part:
-            part.write_bytes(self._bytes(kind))
+            part.write_bytes(self._bytes(path.suffix.lower().removeprefix(".")))
         return path
 
     def _bytes(self, kind: str) -> bytes:

@@ -37,9 +37,9 @@ STEP = "step.h"
 """The file with the steps of the integrators in C."""
 
 
-def c_file(name: str) -> str:
-    """The text of a C file of this package."""
-    return (resources.files(__package__) / name).read_text("utf-8")
+def c_file(name: str, package: str = __package__) -> str:
+    """The text of a C file of a package, by default of this one."""
+    return (resources.files(package) / name).read_text("utf-8")
 
 
 def constant(name: str, value: Any) -> str:
