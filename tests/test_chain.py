@@ -15,10 +15,13 @@ from scipy.integrate import solve_ivp
 from chainunit import ChainUnitMachine, GeometryError, SideLoads
 from chainunit.core.engines import MATH
 from chainunit.core.planar import ZERO, Motion, Vec2
+from chainunit.groups.body import Bar
 from chainunit.groups.chain import Chain, Rods, close, end_motion
-from chainunit.groups.driver import crank
-from chainunit.groups.dyad import SolvedDyad
+from chainunit.groups.driver import Crank
+from chainunit.groups.dyad import Dyad
 from chainunit.machines import hanging
+from chainunit.mechanism.linkage import Linkage
+from chainunit.mechanism.machine import Mechanism
 
 DATA = json.loads((Path(__file__).parent / "data" / "chain_organ.json").read_text())
 M = DATA["machine"]
@@ -204,8 +207,10 @@ def test_projection_closes_and_is_nearest():
 
 def rocker(phi, w):
     """Angle, speed and acceleration of the rocker at a crank that turns evenly."""
-    link = crank(MATH, Vec2(-M["c_frame"], -M["hy"]), phi)
-    driven = SolvedDyad.between(MATH, link.at(M["r"]), Motion(ZERO), M["l"], M["h"], -1.0).links[1]
+    ground = {"O1": Vec2(-M["c_frame"], -M["hy"]), "O2": ZERO}
+    dyad = Dyad("B", Bar("coupler", "A", M["l"]), Bar("rocker", "O2", M["h"]), -1.0)
+    bars = Linkage(ground, Crank(Bar("crank", "O1", M["r"]), "A"), (dyad,), {})
+    driven = Mechanism(MATH, bars, phi).links["rocker"]
     return math.asin(driven.u.x), driven.t1 * w, driven.t2 * w * w
 
 

@@ -12,13 +12,11 @@ from chainunit.core.engines import MATH, Dual, dual, slope
 from chainunit.core.planar import Vec2
 from chainunit.groups.body import Bar, Mass
 from chainunit.groups.driver import Crank, Ram
-from chainunit.groups.dyad import Dyad
-from chainunit.groups.group import Rail
+from chainunit.groups.dyad import PRP, RPP, RPR, RRP, Dyad
+from chainunit.groups.joints import Rail
 from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
 from chainunit.groups.loads import GuideLosses, PinLosses, Push, Weight, _ends
-from chainunit.groups.sliding import RPR, RRP
 from chainunit.groups.triad import Pose, Triad
-from chainunit.groups.yokes import PRP, RPP
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.machine import MachineState, Mechanism, derived_numbers
 

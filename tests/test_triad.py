@@ -109,7 +109,7 @@ def searched(pins, lengths, arms, tries=600):
         try:
             start = Pose(*rng.uniform(-2.0, 3.0, 2), rng.uniform(-math.pi, math.pi))
             pose = correct_pose(MATH, still(pins, lengths, arms), start, 40)
-            triad = SolvedTriad.at(MATH, still(pins, lengths, arms), pose)
+            triad = SolvedTriad(MATH, still(pins, lengths, arms), pose)
         except (ArithmeticError, ValueError):
             continue
         gaps = [math.sqrt((k.p - p).squared()) - l for k, p, l in zip(triad.pins, pins, lengths, strict=True)]
@@ -161,7 +161,7 @@ def test_motion_is_that_of_the_followed_pose(collinear):
     while checked < 40:
         pins, lengths, arms, pose = random_triad(rng, collinear)
         outer, at = moved(rng, pins)
-        triad = SolvedTriad.at(MATH, rods_at(outer, lengths, arms), pose)
+        triad = SolvedTriad(MATH, rods_at(outer, lengths, arms), pose)
         if abs(triad.margin) < 0.1:
             continue
         checked += 1
@@ -194,12 +194,12 @@ def test_forces_keep_every_link_in_balance(collinear):
     rng = np.random.default_rng(5)
     for _ in range(60):
         pins, lengths, arms, pose = random_triad(rng, collinear)
-        triad = SolvedTriad.at(MATH, still(pins, lengths, arms), pose)
+        triad = SolvedTriad(MATH, still(pins, lengths, arms), pose)
         if abs(triad.margin) < 1e-2:
             continue
         legs = tuple((Vec2(*rng.uniform(-9, 9, 2)), rng.uniform(-9, 9)) for _ in range(LEGS))
         knife = (Vec2(*rng.uniform(-9, 9, 2)), rng.uniform(-9, 9))
-        forces = triad.reactions((*legs, knife))
+        forces, _ = triad.reactions((*legs, knife))
         outer, inner = forces[:LEGS], forces[LEGS:]
         # unknowns: forces at the inner pins on the legs, six; of each leg the moment, of the knife three equations
         matrix, right = np.zeros((6, 6)), np.zeros(6)
@@ -222,12 +222,13 @@ def test_three_moments_are_singular_on_a_line_and_this_is_not():
     """docs/papers.md, paper 003, item 6: the paper's three moment equations about C, D, E against ours."""
     rng = np.random.default_rng(6)
     pins, lengths, arms, pose = random_triad(rng, collinear=True)
-    triad = SolvedTriad.at(MATH, still(pins, lengths, arms), pose)
+    triad = SolvedTriad(MATH, still(pins, lengths, arms), pose)
     at = [pin.p for pin in triad.pins]
     pull = [leg.u for leg in triad.links[:LEGS]]
     moments = np.array([[(at[k] - at[i]).cross(pull[k]) for k in range(3)] for i in range(3)])
     assert np.linalg.cond(moments) > 1e12 and abs(triad.margin) > 1e-2
-    inner = triad.reactions((*((Vec2(0.0, 0.0), 0.0),) * LEGS, (Vec2(3.0, -40.0), 2.0)))[LEGS:]
+    forces, _ = triad.reactions((*((Vec2(0.0, 0.0), 0.0),) * LEGS, (Vec2(3.0, -40.0), 2.0)))
+    inner = forces[LEGS:]
     assert all(math.isfinite(f.x) and math.isfinite(f.y) for f in inner)
 
 
@@ -238,5 +239,5 @@ def test_the_margin_vanishes_where_the_legs_meet():
     pins = tuple(a + (meet - a) * 0.5 for a in arms)
     lengths = tuple(math.sqrt((p - a).squared()) for p, a in zip(pins, arms, strict=True))
     nearly = pins[0], pins[1], pins[2] + Vec2(1e-9, 0.0)
-    triad = SolvedTriad.at(MATH, still(nearly, lengths, arms), Pose(0.0, 0.0, 0.0))
+    triad = SolvedTriad(MATH, still(nearly, lengths, arms), Pose(0.0, 0.0, 0.0))
     assert abs(triad.margin) < 1e-8

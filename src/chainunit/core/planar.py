@@ -144,20 +144,3 @@ class Link:
             Dual(self.t1, self.t2),
             Dual(self.t2, t3),
         )
-
-
-def coriolis(frame: Link, carried: Motion, slid: Vec2) -> Vec2:
-    """Second derivative of a point that the frame carries and that slides by `slid` per q at a constant rate."""
-    return carried.p2 + slid.turned() * (2.0 * frame.t1)
-
-
-def coriolis_third(frame: Link, third: Vec2, slid: Vec2, slid2: Vec2) -> Vec2:
-    """Third derivative of a point that slides by `slid` per q, which itself changes by `slid2` in the frame, from
-    `third` of the point that the frame carries; the third derivative of the way is left out."""
-    t1 = frame.t1
-    return third + slid.turned() * (3.0 * frame.t2) - slid * (3.0 * (t1 * t1)) + slid2.turned() * (3.0 * t1)
-
-
-def rod_rates(r: Vec2, k1: Vec2, k2: Vec2, per_square: Any) -> tuple[Any, Any]:
-    """Derivatives of the angle of a rod of constant length along `r`, from those of its end against its start."""
-    return r.cross(k1) * per_square, r.cross(k2) * per_square

@@ -1,18 +1,22 @@
-"""The drivers, which move in a given way: a crank on a fixed bearing, and a ram on a fixed rail.
+"""The drivers, which move in a given way: a crank on a fixed bearing, a ram on a fixed rail, and a cylinder that is
+pinned at both ends, with the lever that it swings.
 
 Each has the coordinate q of the linkage. In the packaged machines q is the crank angle, which counts from the upward
-vertical, positive clockwise, so that the derivative of the crank's counter-clockwise angle by q is -1.
+vertical, positive clockwise, so that the derivative of the crank's counter-clockwise angle by q is -1. The rows of a
+driver have one more, which says how q moves it; its multiplier is the torque, or the force, along q.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.planar import ZERO, Link, Motion, Vec2
-from .body import Bar, Load, Mass
-from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, SolvedGroup, Third
+from ..core.planar import ZERO, Vec2
+from .body import Bar, Mass
+from .dyad import meeting
+from .group import Group, PlacedLinkage, SolvedGroup
+from .joints import Guide, GuideData, Hinge, HingeData, Rail
 
 UPWARD = Vec2(0.0, 1.0)
 
@@ -24,14 +28,9 @@ class Driver(Group):
     end: str
 
     @property
-    def bars(self) -> tuple[Bar, ...]:
-        """Its link."""
-        return (self.bar,)
-
-    @property
     def inertia(self) -> Any:
-        """The least inertia that it reflects by itself: of a crank about its bearing [kg m2], of a ram its mass
-        [kg]."""
+        """The least inertia that it reflects by itself: of a crank about its bearing [kg m2], of a ram or of the rod
+        of a cylinder, which moves at the speed of the way at least, its mass [kg]."""
         raise NotImplementedError
 
 
@@ -49,16 +48,12 @@ class Crank(Driver):
     @property
     def pins(self) -> dict[str, str]:
         """The pin at its end."""
-        return {self.end: self.bar.name} if self._ends else {}
+        return {} if self.bar.length is None else {self.end: self.bar.name}
 
     @property
-    def _ends(self) -> bool:
-        return self.bar.length is not None
-
-    @property
-    def joints(self) -> tuple[tuple[str, str], ...]:
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
         """Its bearing."""
-        return ((self.bar.pin, self.bar.name),)
+        return (HingeData(self.bar.pin, self.bar.name),)
 
     @property
     def inertia(self) -> Any:
@@ -70,10 +65,14 @@ class Crank(Driver):
         arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
         return mass.I + mass.m * arm2
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedDriver:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
         """The crank at the angle `q` [rad]."""
-        link = crank(xp, at.pins[self.bar.pin].p, q, self.start, self.sense)
-        return TurnedCrank((link,), (link.at(self.bar.length),) if self._ends else ())
+        bearing, start = at.pins[self.bar.pin], self.start
+        c, s = xp.cos(q), xp.sin(q) * self.sense
+        u = Vec2(start.x * c - start.y * s, start.y * c + start.x * s)
+        hinge = Hinge(0, base=bearing, driven=int(self.sense))
+        ends = [] if self.bar.length is None else [(0, u * self.bar.length)]
+        return SolvedGroup([(bearing, u)], [hinge], ends=ends)
 
 
 @dataclass
@@ -88,85 +87,76 @@ class Ram(Driver):
     end: str = ""
 
     @property
-    def pins(self) -> dict[str, str]:
-        """None: what hangs on it hangs on its points."""
-        return {}
-
-    @property
-    def joints(self) -> tuple[tuple[str, str], ...]:
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
         """Its rail."""
-        return ((self.guide, self.bar.name),)
-
-    @property
-    def guides(self) -> dict[tuple[str, str], str | None]:
-        """Its rail."""
-        return {(self.guide, self.bar.name): None}
+        return (GuideData(self.guide, self.bar.name, self.rail),)
 
     @property
     def inertia(self) -> Any:
         """Its mass [kg]."""
         return 0.0 if self.bar.mass is None else self.bar.mass.m
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedDriver:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
         """The ram at the way `q` [m]."""
         rail = self.rail.at_position(at.links)
-        start = Motion(rail.pin.p + rail.u * q, rail.u)
-        return PushedRam((Link(start, rail.u, 0.0, 0.0),), (), 1.0, (Slide(rail.u, q, 1.0, 0.0),))
+        way = rail.u * q
+        return SolvedGroup([(rail.pin.p + way, rail.u)], [Guide(0, rail.u, q, way, rail, line=0.0)])
 
 
-class SolvedDriver(SolvedGroup):
-    """A driver at one place: its link, and the pin at its end."""
+@dataclass
+class Cylinder(Driver):
+    """A cylinder with its lever, as data.
 
-    __slots__ = ()
+    The barrel P-.. on a ground pin and the rod ..-C slide along each other; the lever Q-C stands on another ground
+    pin. q is the way in the sliding joint. With e = C - P = L d + offset n, where d is the direction of the cylinder
+    and L = q + shift, barrel and rod together are one side of a triangle whose length |e| is known. The margin is the
+    sine of the angle between cylinder and lever.
 
-    def third_derivatives(
-        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
-    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
-        (link,) = self.links
-        return [(ZERO, 0.0)], [link.third_derivative(end.p - link.pin.p, ZERO, 0.0) for end in self.pins]
+    The frames of barrel (`bar`) and `rod` start at their pins and have the direction of the cylinder. `end` is the
+    pin between rod and lever, which the lever carries. `shift` and `offset` place this pin from that of the barrel,
+    along and across, at q = 0 [m]; `rod_offset` is how far the line of the force lies to the left of the rod's pin
+    [m]. `side` is +1 where the pin lies to the left of the ray from the barrel's pin to that of the lever, -1 where
+    to the right. `guide` is the pin at which the reaction of the sliding joint acts on the rod.
+    """
 
-    def effort(self, loads: Sequence[Load]) -> Any:
-        """The torque, or of a ram the force, along the coordinate that holds against the loads of the links [N m,
-        N]."""
-        raise NotImplementedError
+    bar: Bar
+    end: str
+    rod: Bar
+    lever: Bar
+    shift: Any
+    offset: Any
+    rod_offset: Any
+    guide: str
+    side: float
 
-    def force_turn(self, effort: Any) -> Iterator[tuple[int, Vec2]]:
-        """The derivative of the driver's own forces on its links, by their places, as their lines turn with q."""
-        return iter(())
+    @property
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints."""
+        barrel, rod, lever = self.bar, self.rod.name, self.lever
+        return (
+            HingeData(barrel.pin, barrel.name),
+            GuideData(self.guide, rod, barrel.name),
+            HingeData(self.end, rod, lever.name),
+            HingeData(lever.pin, lever.name),
+        )
 
+    @property
+    def inertia(self) -> Any:
+        """The mass of the rod [kg]."""
+        return 0.0 if self.rod.mass is None else self.rod.mass.m
 
-class TurnedCrank(SolvedDriver):
-    """The crank at one angle."""
-
-    __slots__ = ()
-
-    def effort(self, loads: Sequence[Load]) -> Any:
-        """The torque [N m], or of a ram the force [N], that holds against the loads of the links."""
-        return loads[0][1] * -self.links[0].t1
-
-    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
-        """The force on the crank at its bearing [N]."""
-        return (-loads[0][0],)
-
-
-class PushedRam(SolvedDriver):
-    """The ram at one place."""
-
-    __slots__ = ()
-
-    def effort(self, loads: Sequence[Load]) -> Any:
-        """The torque [N m], or of a ram the force [N], that holds against the loads of the links."""
-        return -loads[0][0].dot(self.links[0].u)
-
-    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
-        """The force and the moment of the rail on the ram."""
-        ((force, moment),) = loads
-        n = self.links[0].u.turned()
-        return (GuideForce.along(n, -force.dot(n), -moment),)
-
-
-def crank(xp: Any, bearing: Vec2, angle: Any, start: Vec2 = UPWARD, sense: float = -1.0) -> Link:
-    """The crank as a link from its bearing at `angle` [rad], see `Crank`."""
-    c, s = xp.cos(angle), xp.sin(angle) * sense
-    return Link(Motion(bearing), Vec2(start.x * c - start.y * s, start.y * c + start.x * s), sense, 0.0)
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+        """The cylinder at the way `q` [m]."""
+        p, o = at.pins[self.bar.pin], at.pins[self.lever.pin]
+        way, h, b = q + self.shift, self.offset, self.lever.length
+        square = way * way + h * h
+        e, r = meeting(xp, p.p, o.p, square, b * b, self.side)
+        d = (e * way - e.turned() * h) * (1.0 / square)
+        poses = (p, d), (o.p + r, d), (o, r * (1.0 / b))
+        joints = (
+            Hinge(0, base=p),
+            Guide(1, d, q, e, 0, line=self.rod_offset),
+            Hinge(1, ZERO, 2, r),
+            Hinge(2, base=o),
+        )
+        return SolvedGroup(poses, joints, size=b * xp.sqrt(square))

@@ -1,10 +1,11 @@
-"""The dyad (class II Assur group, three revolute joints): two links P-B and Q-B.
+"""The dyads (class II Assur groups): two links with three joints, hinges (R) or guides (P), each kind in closed form.
 
-The motion of P and Q is known; B is an intersection of the circles about them. This intersection
-gives the position, one 2x2 system (solved twice) the motion, one 2x2 system the forces.
-
-r1 = B - P, r2 = B - Q, and ``det = r1 x r2``; ``det/(a b)`` is the sine of the transmission
-angle and vanishes in a dead position.
+The outer joints lie on pins and lines that move in a known way. A guide keeps two links at a fixed angle to each
+other and a point of one on a line of the other. `d` is the direction of that line, `n` the direction that is turned
+from it by +90 degrees. A line that belongs to a link before the group is a `Rail`. Where it is placed, it is a `Link`
+of its own: it starts from a point of the line, and its unit vector is `d`. The base points are chosen so that the
+group's pin itself lies on the rail: a constant offset between the block and the pin turns with the rail, as the block
+does.
 """
 
 from __future__ import annotations
@@ -13,16 +14,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.planar import Link, Motion, Vec2
-from .body import Bar, Load
-from .group import Group, PlacedLinkage, SolvedGroup, Third
+from ..core.planar import ZERO, Vec2
+from .body import Bar
+from .group import Group, PlacedLinkage, SolvedGroup
+from .joints import Guide, GuideData, Hinge, HingeData, Rail
 
 
 @dataclass
 class Dyad(Group):
-    """A dyad as data: two bars, which start from pins of known motion, and the inner pin at the ends of both. `side`
-    is +1 where the inner pin lies to the left of the ray from the first bar's pin to the second bar's pin, -1 where
-    it lies to the right. Further groups on the inner pin hang on the second link."""
+    """A dyad with three hinges: two bars, which start from pins of known motion, and the inner pin at the ends of
+    both. `side` is +1 where the inner pin lies to the left of the ray from the first bar's pin to the second bar's
+    pin, -1 where it lies to the right. Further groups on the inner pin hang on the second link. Its margin is the
+    sine of the angle between the bars."""
 
     inner: str
     first: Bar
@@ -30,93 +33,196 @@ class Dyad(Group):
     side: float
 
     @property
-    def bars(self) -> tuple[Bar, ...]:
-        """Its links."""
-        return self.first, self.second
-
-    @property
-    def pins(self) -> dict[str, str]:
-        """The pins that the dyad adds, each with the link that carries it."""
-        return {self.inner: self.second.name}
-
-    @property
-    def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of each reaction, in the order of `SolvedDyad.reactions`."""
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints."""
         first, second = self.first, self.second
-        return (first.pin, first.name), (self.inner, first.name), (second.pin, second.name)
+        return (
+            HingeData(first.pin, first.name),
+            HingeData(self.inner, first.name, second.name),
+            HingeData(second.pin, second.name),
+        )
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedDyad:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
         """The dyad where its outer pins are."""
-        first, second, pins = self.first, self.second, at.pins
-        return SolvedDyad.between(
-            xp, pins[first.pin], pins[second.pin], first.length, second.length, self.side
+        a, b, start, end = (
+            self.first.length,
+            self.second.length,
+            at.pins[self.first.pin],
+            at.pins[self.second.pin],
+        )
+        r1, r2 = meeting(xp, start.p, end.p, a * a, b * b, self.side)
+        # casadi turns each use of 1/x into a division by x, but keeps -1/x
+        per_a, per_b = -1.0 / a, -1.0 / b
+        poses = (start, Vec2(-(r1.x * per_a), -(r1.y * per_a))), (end, Vec2(-(r2.x * per_b), -(r2.y * per_b)))
+        return SolvedGroup(poses, (Hinge(0, base=start), Hinge(0, r1, 1, r2), Hinge(1, base=end)), size=a * b)
+
+
+def meeting(xp: Any, p: Vec2, q: Vec2, a2: Any, b2: Any, side: float) -> tuple[Vec2, Vec2]:
+    """The vectors from two points to the point at the squared distances `a2` and `b2` from them, on the left of the
+    ray from p to q if `side` is +1, on its right if -1."""
+    # in components, as in `Body`
+    dx, dy = q.x - p.x, q.y - p.y
+    minus_per = -1.0 / (dx * dx + dy * dy)
+    along = 0.5 * (1.0 + (b2 - a2) * minus_per)
+    across = side * xp.sqrt(-(a2 * minus_per) - along * along)
+    x, y = dx * along - dy * across, dy * along + dx * across
+    return Vec2(x, y), Vec2(x - dx, y - dy)
+
+
+@dataclass
+class RRP(Group):
+    """Coupler and slider: the rod `first` from a pin that moves in a known way to the `inner` pin, which the `slider`
+    carries along a `rail`. Its margin is the cosine of the angle between rod and rail.
+
+    The slider's frame starts at the inner pin and has the direction of the rail. `side` is +1 where the inner pin
+    lies beyond the foot of the perpendicular from the outer pin to the rail, in the rail's direction, -1 where
+    before it. `guide` is the pin at which the force of the sliding joint acts on the slider.
+    """
+
+    inner: str
+    first: Bar
+    slider: Bar
+    rail: Rail
+    guide: str
+    side: float
+
+    @property
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints."""
+        first, slider = self.first, self.slider.name
+        return (
+            HingeData(first.pin, first.name),
+            HingeData(self.inner, first.name, slider),
+            GuideData(self.guide, slider, self.rail),
+        )
+
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+        """The group at the coordinate `q` of the driver [rad, m]."""
+        start, rail, a = at.pins[self.first.pin], self.rail.at_position(at.links), self.first.length
+        d, w = rail.u, rail.pin.p - start.p
+        across = w.cross(d)
+        along = self.side * xp.sqrt(a * a - across * across)
+        s = along - w.dot(d)
+        r = w + d * s
+        way = d * s
+        return SolvedGroup(
+            ((start, r * (1.0 / a)), (rail.pin.p + way, d)),
+            (Hinge(0, base=start), Hinge(0, r, 1), Guide(1, d, s, way, rail)),
+            along / a,
         )
 
 
-class SolvedDyad(SolvedGroup):
-    """A solved dyad: its links from P and from Q, the inner pin B, and the arms `r1`, `r2`. Its margin is the sine of
-    the angle between the arms."""
+@dataclass
+class RPR(Group):
+    """Oscillating slide: the links `first` and `second` on pins that move in a known way, with a sliding joint
+    between them. Its margin is the sine of the angle between the line of the pins and the normal of the slide: 0
+    where the first pin lies beside the second one.
 
-    __slots__ = ("_minus_per_det", "r1", "r2")
+    The frames of both links start at these pins and have the direction of the line. The first pin lies on the line,
+    or `offset` [m] to the left of the parallel to it through the second pin. `side` is +1 where the first pin lies
+    beyond the second one, in the direction of the line, -1 where before it. `guide` is the pin at which the force of
+    the sliding joint acts on the first link, from the second.
+    """
 
-    def __init__(
-        self,
-        arms: tuple[Vec2, Vec2],
-        minus_per_det: Any,
-        links: tuple[Link, Link],
-        pin: Motion,
-        margin: Any = 1.0,
-    ) -> None:
-        super().__init__(links, (pin,), margin)
-        self.r1, self.r2 = arms
-        self._minus_per_det = minus_per_det
+    first: Bar
+    second: Bar
+    offset: Any
+    guide: str
+    side: float
 
-    @classmethod
-    def between(cls, xp: Any, p: Motion, q: Motion, a: Any, b: Any, side: float) -> SolvedDyad:
-        """
-        Parameters
-        ----------
-        xp : engine (see `chainunit.core.engines`)
-        p, q : motion of the outer pins
-        a, b : lengths P-B and Q-B [m]
-        side : +1 where B lies to the left of the ray from P to Q, -1 where to the right
-        """
-        # in components, as in `Body`; casadi turns each use of 1/x into a division by x, but keeps -1/x
-        dx, dy = q.p.x - p.p.x, q.p.y - p.p.y
-        minus_per_d2 = -1.0 / (dx * dx + dy * dy)
-        along = 0.5 * (1.0 + (b * b - a * a) * minus_per_d2)
-        across = side * xp.sqrt(-(a * a * minus_per_d2) - along * along)
-        x1, y1 = dx * along - dy * across, dy * along + dx * across
-        x2, y2 = x1 - dx, y1 - dy
-        det = x1 * y2 - y1 * x2
-        minus_per_det = -1.0 / det
-        gx, gy = p.p1.x - q.p1.x, p.p1.y - q.p1.y
-        s1, s2 = (gx * x2 + gy * y2) * minus_per_det, (gx * x1 + gy * y1) * minus_per_det
-        k1, k2 = s1 * s1, s2 * s2
-        hx = p.p2.x - q.p2.x - x1 * k1 + x2 * k2
-        hy = p.p2.y - q.p2.y - y1 * k1 + y2 * k2
-        minus_per_a, minus_per_b = -1.0 / a, -1.0 / b
-        r1, u1 = Vec2(x1, y1), Vec2(-(x1 * minus_per_a), -(y1 * minus_per_a))
-        r2, u2 = Vec2(x2, y2), Vec2(-(x2 * minus_per_b), -(y2 * minus_per_b))
-        first = Link(p, u1, s1, (hx * x2 + hy * y2) * minus_per_det)
-        second = Link(q, u2, s2, (hx * x1 + hy * y1) * minus_per_det)
-        return cls((r1, r2), minus_per_det, (first, second), first.carried(r1), det / (a * b))
+    @property
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints."""
+        first, second = self.first, self.second
+        return (
+            HingeData(first.pin, first.name),
+            GuideData(self.guide, first.name, second.name),
+            HingeData(second.pin, second.name),
+        )
 
-    def third_derivatives(
-        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
-    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
-        (p, q), (first, second) = outer, self.links
-        (r1, s1, x), (r2, s2, y) = (self.r1, first.t1, first.t2), (self.r2, second.t1, second.t2)
-        h = p - q - r1.turned() * (s1 * s1 * s1) + r2.turned() * (s2 * s2 * s2)
-        h = h - r1 * (3.0 * (s1 * x)) + r2 * (3.0 * (s2 * y))
-        thirds = (p, h.dot(r2) * self._minus_per_det), (q, h.dot(r1) * self._minus_per_det)
-        return thirds, (first.third_derivative(r1, *thirds[0]),)
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+        """The group at the coordinate `q` of the driver [rad, m]."""
+        start, end, h = at.pins[self.first.pin], at.pins[self.second.pin], self.offset
+        v = start.p - end.p  # way d + offset n
+        square = v.squared()
+        way = self.side * xp.sqrt(square - h * h)
+        d = (v * way - v.turned() * h) * (1.0 / square)
+        joints = Hinge(0, base=start), Guide(0, d, way, v, 1), Hinge(1, base=end)
+        return SolvedGroup(((start, d), (end, d)), joints, way / xp.sqrt(square))
 
-    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, Vec2, Vec2]:
-        """Forces at P (on the first link), at B (on the first link, from the second) and at Q
-        (on the second link) [N], from the loads on each link: force and moment about P and Q."""
-        (f1, m1), (f2, m2) = loads
-        r1, r2, k = self.r1, self.r2, self._minus_per_det
-        x, y = (r1.x * m2 + r2.x * m1) * k, (r1.y * m2 + r2.y * m1) * k
-        return Vec2(-(f1.x + x), -(f1.y + y)), Vec2(x, y), Vec2(x - f2.x, y - f2.y)
+
+@dataclass
+class PRP(Group):
+    """Cross slide: two sliders, `first` and `second`, on a rail each, with the `inner` pin between them. Its margin
+    is the sine of the angle between the rails.
+
+    The frame of each slider starts at the inner pin and has the direction of its rail. `guides_at` are the pins at
+    which the forces of the sliding joints act on the sliders.
+    """
+
+    inner: str
+    first: Bar
+    second: Bar
+    first_rail: Rail
+    second_rail: Rail
+    guides_at: tuple[str, str]
+
+    @property
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints."""
+        first, second = self.first.name, self.second.name
+        return (
+            GuideData(self.guides_at[0], first, self.first_rail),
+            HingeData(self.inner, first, second),
+            GuideData(self.guides_at[1], second, self.second_rail),
+        )
+
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+        """The group at the coordinate `q` of the driver [rad, m]."""
+        a, b = self.first_rail.at_position(at.links), self.second_rail.at_position(at.links)
+        per, gap = 1.0 / a.u.cross(b.u), b.pin.p - a.pin.p
+        # a.u x - b.u y = gap
+        x, y = gap.cross(b.u) * per, gap.cross(a.u) * per
+        on_a, on_b = a.u * x, b.u * y
+        pin = a.pin.p + on_a
+        joints = Guide(0, a.u, x, on_a, a), Hinge(0, ZERO, 1), Guide(1, b.u, y, on_b, b)
+        return SolvedGroup(((pin, a.u), (pin, b.u)), joints, a.u.cross(b.u))
+
+
+@dataclass
+class RPP(Group):
+    """Yoke: the `block` on a pin that moves in a known way, in a slot of the `yoke`, which slides on a `rail`. Its
+    margin is the sine of the angle between rail and slot.
+
+    The frame of the block starts at its pin, that of the yoke at the point of its slot that moves along the rail;
+    both have the direction of the rail. `slot` is the direction of the slot in that frame, a unit vector.
+    `guides_at` are the pins at which the forces of the sliding joints act: on the block from the yoke, and on the
+    yoke from the rail.
+    """
+
+    block: Bar
+    yoke: Bar
+    rail: Rail
+    slot: Vec2
+    guides_at: tuple[str, str]
+
+    @property
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints."""
+        block, yoke = self.block, self.yoke.name
+        return (
+            HingeData(block.pin, block.name),
+            GuideData(self.guides_at[0], block.name, yoke),
+            GuideData(self.guides_at[1], yoke, self.rail),
+        )
+
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+        """The group at the coordinate `q` of the driver [rad, m]."""
+        start, rail, slot = at.pins[self.block.pin], self.rail.at_position(at.links), self.slot
+        d = rail.u
+        e = d * slot.x + d.turned() * slot.y
+        per, w = 1.0 / slot.y, start.p - rail.pin.p  # w = d x + e y, and d x e = slot.y
+        x, y = w.cross(e) * per, d.cross(w) * per
+        way = d * x
+        joints = Hinge(0, base=start), Guide(0, e, y, e * y, 1), Guide(1, d, x, way, rail)
+        return SolvedGroup(((start, d), (rail.pin.p + way, d)), joints, slot.y)

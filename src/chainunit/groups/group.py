@@ -1,17 +1,18 @@
-"""The common interface of all groups: an Assur group as data, and the same group solved at one position."""
+"""The common form of all groups: an Assur group as data, and the same group solved at one position.
+
+A kind of group says which bars and joints it has, and where its links are at a position. Its motion, its reactions
+and its margin follow from the rows of its joints.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeAlias
+from typing import Any, ClassVar, Protocol
 
 from ..core.planar import ZERO, Link, Motion, Vec2
+from .block import Block
 from .body import Bar, Load
-
-Third = tuple[Vec2, Any]
-"""Third derivatives of a link by q: of its pin and of its angle."""
-Joint = tuple[str, str]
-"""A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
+from .joints import UNKNOWNS, Guide, GuideData, Hinge, HingeData, Joint, Rail, Seat, Third
 
 
 class PlacedLinkage(Protocol):
@@ -26,86 +27,71 @@ class PlacedLinkage(Protocol):
         """Links by name."""
 
 
-class Rail(NamedTuple):
-    """A straight line in a link, as data: the name of the link, None for the ground; a point `at` of the line [m] and
-    its direction `along`, a unit vector, both in the frame of the link."""
-
-    of: str | None
-    at: Vec2
-    along: Vec2
-
-    def at_position(self, links: Mapping[str, Link]) -> Link:
-        """The line at the position of its link, as a link of its own: it starts from the point."""
-        if self.of is None:
-            return Link(Motion(self.at), self.along, 0.0, 0.0)
-        link, along = links[self.of], self.along
-        u = link.u * along.x + link.u.turned() * along.y
-        return Link(link.beside(self.at.x, self.at.y), u, link.t1, link.t2)
-
-
-class Slide(NamedTuple):
-    """The motion in a sliding joint: the direction `d` of its line, the way `s` of the link that its reaction acts on
-    along it, and the derivatives of that by q [m, m/rad, m/rad2]."""
-
-    d: Vec2
-    s: Any
-    s1: Any
-    s2: Any
-
-
-Solution: TypeAlias = tuple[tuple[Link, ...], tuple[Motion, ...], Any, tuple[Slide, ...]]
-"""Links, pins, margin and slides of a `SolvedGroup`."""
-
-
-class GuideForce(Vec2):
-    """The reaction of a sliding joint on a link: force [N], and its whole `moment` about the start of the link's
-    frame [N m]."""
-
-    __slots__ = ("moment",)
-
-    def __init__(self, x: Any, y: Any, moment: Any) -> None:
-        super().__init__(x, y)
-        self.moment = moment
-
-    def plus(self, other: Vec2, factor: Any) -> GuideForce:
-        """The sum with `other`, a reaction of the same joint, times a factor."""
-        assert isinstance(other, GuideForce)
-        return GuideForce(
-            self.x + other.x * factor, self.y + other.y * factor, self.moment + other.moment * factor
-        )
-
-    @classmethod
-    def along(cls, n: Vec2, force: Any, moment: Any) -> Self:
-        """The reaction with a `force` in the direction `n`."""
-        return cls(n.x * force, n.y * force, moment)
-
-
 class SolvedGroup:
     """A group at one position: its `links` in the order of the group's bars, the `pins` that it adds, the `margin`,
     which is 0 in a dead position, and the `slides` in its sliding joints, in the order of the group's `guides`."""
 
-    __slots__ = ("links", "margin", "pins", "slides")
+    __slots__ = ("_block", "_joints", "_rates", "_seats", "links", "margin", "pins", "slides")
 
     def __init__(
         self,
-        links: tuple[Link, ...],
-        pins: tuple[Motion, ...],
-        margin: Any = 1.0,
-        slides: tuple[Slide, ...] = (),
+        poses: Sequence[tuple[Vec2 | Motion, Vec2]],
+        joints: Sequence[Hinge | Guide],
+        margin: Any = None,
+        size: Any = 1.0,
+        ends: Sequence[Seat] = (),
     ) -> None:
-        self.links, self.pins, self.margin, self.slides = links, pins, margin, slides
+        """
+        Parameters
+        ----------
+        poses : start and unit vector of each link; a start on a pin before the group as its motion
+        margin : margin, None for the determinant of the joints over the `size`
+        ends : pins that the group adds besides those between its links
+        """
+        self._joints = joints
+        block = self._block = Block(UNKNOWNS * len(poses), [row for joint in joints for row in joint.rows()])
+        self._rates: list[list[Any]] = []
+        for _ in range(2):
+            self._rates.append(self._next_rates([None] * len(joints)))
+        rates = [[_rate(z, k) for z in self._rates] for k in range(len(poses))]
+        self.links = tuple(
+            Link(start if isinstance(start, Motion) else Motion(start, p1, p2), u, t1, t2)
+            for (start, u), ((p1, t1), (p2, t2)) in zip(poses, rates, strict=True)
+        )
+        self.margin = block.det / size if margin is None else margin
+        self.slides = tuple(joint.slide(self._rates) for joint in joints if isinstance(joint, Guide))
+        self._seats = [seat for j in joints if isinstance(j, Hinge) and (seat := j.seat) is not None] + [
+            *ends
+        ]
+        self.pins = tuple(
+            self.links[k].pin if arm is ZERO else self.links[k].carried(arm) for k, arm in self._seats
+        )
 
-    def third_derivatives(
-        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
-    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of each link and of each pin that the group adds, from the third derivatives of the
-        pins that its bars start from and of its rails (of the start of the rail, and of its angle)."""
-        raise NotImplementedError
+    def _next_rates(self, before: Sequence[Third | None]) -> list[Any]:
+        """The unknowns of the next order."""
+        joints = zip(self._joints, before, strict=True)
+        return self._block.solve([b for joint, third in joints for b in joint.right(self._rates, third)])
 
-    def reactions(self, loads: Sequence[Load]) -> Sequence[Vec2]:
+    def third_derivatives(self, before: Sequence[Third | None]) -> tuple[Sequence[Third], Sequence[Vec2]]:
+        """Third derivatives by q of each link and of each pin that the group adds, from those of the pins and lines
+        before the group, by joint."""
+        z = self._next_rates(before)
+        thirds = [_rate(z, k) for k in range(len(self.links))]
+        return thirds, [self.links[k].third_derivative(arm, *thirds[k]) for k, arm in self._seats]
+
+    def reactions(self, loads: Sequence[Load]) -> tuple[list[Vec2], Any]:
         """Forces in the group's joints, in their order [N], from the load of each link; that of a sliding joint is a
-        `GuideForce`."""
-        raise NotImplementedError
+        `GuideForce`. Of a driver also the torque, or the force, along q that holds against the loads [N m, N]."""
+        right = [x for force, moment in loads for x in (-force.x, -force.y, -moment, 0.0)]
+        multipliers = iter(self._block.solve_transposed(right))
+        forces, efforts = zip(*(joint.force(multipliers) for joint in self._joints), strict=True)
+        return [*forces], next((effort for effort in efforts if effort is not None), None)
+
+
+def _rate(z: Sequence[Any], link: int) -> Third:
+    """The derivatives of the start and of the angle of a link among unknowns."""
+    x, y, turn, _ = z[UNKNOWNS * link : UNKNOWNS * (link + 1)]
+    return Vec2(x, y), turn
 
 
 class Group:
@@ -117,27 +103,26 @@ class Group:
     @property
     def bars(self) -> tuple[Bar, ...]:
         """Its links. A bar with a `pin` starts from this pin of the linkage before the group."""
+        return tuple(value for value in vars(self).values() if isinstance(value, Bar))
+
+    @property
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints, in the order of `SolvedGroup.reactions`."""
         raise NotImplementedError
 
     @property
     def pins(self) -> Mapping[str, str]:
         """The pins that the group adds, each with the link on which further groups at this pin hang."""
-        raise NotImplementedError
-
-    @property
-    def joints(self) -> tuple[Joint, ...]:
-        """Pin and link of each reaction, in the order of `SolvedGroup.reactions`."""
-        raise NotImplementedError
+        return {j.pin: j.by for j in self.joints if isinstance(j, HingeData) and j.by is not None}
 
     @property
     def guides(self) -> Mapping[Joint, str | None]:
         """Its sliding joints, each with the link on which the opposite reaction acts, None for the ground."""
-        return {}
-
-    @property
-    def rails(self) -> tuple[Rail, ...]:
-        """The lines of earlier links on which its own links slide."""
-        return ()
+        return {
+            (j.pin, j.link): j.by.of if isinstance(j.by, Rail) else j.by
+            for j in self.joints
+            if isinstance(j, GuideData)
+        }
 
     def derive(self, xp: Any, before: Callable[[float], PlacedLinkage]) -> list[Any]:
         """Numbers that follow from its lengths; `before` gives the linkage before the group at a crank angle
@@ -149,9 +134,21 @@ class Group:
         raise NotImplementedError
 
 
-def rail_third(rail: Rail, placed: Link, links: Mapping[str, Link], thirds: Mapping[str, Third]) -> Third:
-    """The third derivatives of a rail, where it is `placed`, from the third derivatives of the links."""
+def third_before(
+    joint: HingeData | GuideData,
+    links: Mapping[str, Link],
+    thirds: Mapping[str, Third],
+    pins: Mapping[str, Vec2],
+) -> Third | None:
+    """The third derivatives of the pin or of the line before its group on which a joint lies, from those of links and
+    pins; None for a joint inside the group."""
+    if isinstance(joint, HingeData):
+        return (pins.get(joint.pin, ZERO), 0.0) if joint.by is None else None
+    rail = joint.by
+    if not isinstance(rail, Rail):
+        return None
     if rail.of is None:
         return ZERO, 0.0
     link, third = links[rail.of], thirds[rail.of]
-    return link.third_derivative(placed.pin.p - link.pin.p, *third), third[1]
+    start = rail.at_position(links).pin.p - link.pin.p
+    return link.third_derivative(start, *third), third[1]

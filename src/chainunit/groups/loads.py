@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Body
-from .group import GuideForce, Joint, Slide
+from .joints import GuideForce, Joint, Slide
 
 
 class Moving(Protocol):

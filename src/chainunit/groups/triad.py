@@ -33,12 +33,13 @@ import numpy as np
 
 from ..core.engines import MATH
 from ..core.model import Requirement
-from ..core.planar import Link, Motion, Vec2
-from .body import Bar, Load, Mass
-from .group import Group, Joint, PlacedLinkage, Rail, Solution, SolvedGroup, Third
-from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
+from ..core.planar import Motion, Vec2
+from .block import minus_cofactors
+from .body import Bar, Mass
+from .group import Group, PlacedLinkage, SolvedGroup
+from .joints import GuideData, HingeData
+from .legs import LEGS, Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
-LEGS = 3
 SAMPLES = 20
 """Number of crank angles at which a triad is followed once around."""
 HARMONICS = 8
@@ -57,46 +58,10 @@ class Pose(NamedTuple):
     theta: Any
 
 
-class _Rows:
-    """The rows of the three legs at a pose, and the solution of linear systems with them."""
-
-    __slots__ = ("cofactors", "det", "legs", "minus_per_det")
-
-    def __init__(self, legs: tuple[LegAt, ...]) -> None:
-        self.legs = legs
-        rows = [leg.row for leg in legs]
-        self.cofactors = tuple(_cross(rows[(i + 1) % LEGS], rows[(i + 2) % LEGS]) for i in range(LEGS))
-        self.det = _dot(rows[0], self.cofactors[0])
-        # see `chainunit.groups.dyad` for the sign
-        self.minus_per_det = -1.0 / self.det
-
-    @classmethod
-    def at(cls, xp: Any, legs: Sequence[PlacedLeg], pose: Pose) -> _Rows:
-        """The rows at a pose."""
-        origin, u = Vec2(pose.x, pose.y), Vec2(xp.cos(pose.theta), xp.sin(pose.theta))
-        return cls(tuple(leg(origin, u) for leg in legs))
-
-    def solve(self, b: Sequence[Any]) -> tuple[Any, Any, Any]:
-        """z with row_i . z = b_i."""
-        (b0, b1, b2), (c0, c1, c2) = b, self.cofactors
-        k = self.minus_per_det
-        return (
-            -(b0 * c0[0] + b1 * c1[0] + b2 * c2[0]) * k,
-            -(b0 * c0[1] + b1 * c1[1] + b2 * c2[1]) * k,
-            -(b0 * c0[2] + b1 * c1[2] + b2 * c2[2]) * k,
-        )
-
-    def combine(self, force: Vec2, moment: Any) -> tuple[Any, ...]:
-        """lambda with sum of lambda_i row_i = (force, moment)."""
-        return tuple(-_dot((force.x, force.y, moment), c) * self.minus_per_det for c in self.cofactors)
-
-
-def _cross(a: tuple[Any, Any, Any], b: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _dot(a: tuple[Any, Any, Any], b: tuple[Any, Any, Any]) -> Any:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def legs_at(xp: Any, legs: Sequence[PlacedLeg], pose: Pose) -> list[LegAt]:
+    """The legs at a pose."""
+    origin, u = Vec2(pose.x, pose.y), Vec2(xp.cos(pose.theta), xp.sin(pose.theta))
+    return [leg(origin, u) for leg in legs]
 
 
 def correct_pose(xp: Any, legs: Sequence[PlacedLeg], near: Pose, steps: int) -> Pose:
@@ -104,9 +69,13 @@ def correct_pose(xp: Any, legs: Sequence[PlacedLeg], near: Pose, steps: int) -> 
     number of right digits. It also doubles the order up to which the derivatives of the pose are right."""
     pose = near
     for _ in range(steps):
-        rows = _Rows.at(xp, legs, pose)
-        dx, dy, turn = rows.solve([leg.gap for leg in rows.legs])
-        pose = Pose(pose.x + dx, pose.y + dy, pose.theta + turn)
+        placed = legs_at(xp, legs, pose)
+        minus, det = minus_cofactors([leg.row for leg in placed])
+        minus_per = -1.0 / det
+        moved = (
+            sum(leg.gap * row[k] for leg, row in zip(placed, minus, strict=True)) for k in range(len(pose))
+        )
+        pose = Pose(*(x + dx * minus_per for x, dx in zip(pose, moved, strict=True)))
     return pose
 
 
@@ -133,28 +102,10 @@ class Triad(Group):
         return *(leg.bar for leg in self.legs), Bar(self.name, "", None, self.mass, self.points)
 
     @property
-    def pins(self) -> dict[str, str]:
-        """The pins that the triad adds, each with the link that carries it."""
-        return {leg.inner: self.name for leg in self.legs if leg.inner}
-
-    @property
-    def joints(self) -> tuple[Joint, ...]:
-        """Pin and link of each reaction, in the order of `SolvedTriad.reactions`."""
-        return *(leg.joints[0] for leg in self.legs), *(leg.joints[1] for leg in self.legs)
-
-    @property
-    def guides(self) -> Mapping[Joint, str | None]:
-        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
-        return {
-            leg.joints[0] if leg.rail else leg.joints[1]: leg.rail.of if leg.rail else self.name
-            for leg in self.legs
-            if leg.rail or not leg.inner
-        }
-
-    @property
-    def rails(self) -> tuple[Rail, ...]:
-        """The lines of earlier links on which the group slides."""
-        return tuple(leg.rail for leg in self.legs if leg.rail)
+    def joints(self) -> tuple[HingeData | GuideData, ...]:
+        """Its joints, the outer ones of the legs first."""
+        outer, inner = zip(*(leg.joints(self.name) for leg in self.legs), strict=True)
+        return *outer, *inner
 
     def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedTriad:
         """The triad with the linkage `at` before it, on the branch that the series `derived` gives."""
@@ -162,11 +113,11 @@ class Triad(Group):
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
         if self.turns:
             near = near._replace(theta=near.theta + self.turns * q)
-        return SolvedTriad.at(xp, legs, correct_pose(xp, legs, near, _STEPS))
+        return SolvedTriad(xp, legs, correct_pose(xp, legs, near, _STEPS))
 
     def at_position(self, at: PlacedLinkage) -> tuple[PlacedLeg, ...]:
         """The legs, with the linkage `at` before them, for any pose of the ternary link."""
-        return tuple(leg.at_position(at) for leg in self.legs)
+        return tuple(leg.at_position(k, at) for k, leg in enumerate(self.legs))
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
         """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""
@@ -271,80 +222,27 @@ def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
 
 
 class SolvedTriad(SolvedGroup):
-    """A solved triad. Its `links` are the legs and then the ternary link (origin and x axis of its frame); its `pins`
-    are in the order of the legs; its `margin` is the determinant over the lengths of the rods and the size of the
-    ternary link: 0 is a dead position."""
+    """A solved triad with its `legs`. Its `links` are the legs and then the ternary link (origin and x axis of its
+    frame); its `pins` are in the order of the legs; its `margin` is the determinant over the lengths of the rods and
+    the size of the ternary link: 0 is a dead position."""
 
-    __slots__ = ("_rows",)
+    __slots__ = ("legs",)
 
-    def __init__(self, rows: _Rows, *common: *Solution) -> None:
-        super().__init__(*common)
-        self._rows = rows
-
-    @property
-    def legs(self) -> tuple[LegAt, ...]:
-        """The legs at the pose."""
-        return self._rows.legs
-
-    @classmethod
-    def at(cls, xp: Any, placed: Sequence[PlacedLeg], pose: Pose) -> SolvedTriad:
+    def __init__(self, xp: Any, placed: Sequence[PlacedLeg], pose: Pose) -> None:
         """
         Parameters
         ----------
         xp : engine (see `chainunit.core.engines`)
-        placed : the three legs, see `Leg.placed`
+        placed : the three legs, see `Leg.at_position`
         pose : pose of the ternary link, see `correct_pose`
         """
-        rows = _Rows.at(xp, placed, pose)
-        x1, y1, t1 = rows.solve([leg.first() for leg in rows.legs])
-        origin1 = Vec2(x1, y1)
-        x2, y2, t2 = rows.solve([leg.second(origin1, t1) for leg in rows.legs])
-        origin = Motion(Vec2(pose.x, pose.y), origin1, Vec2(x2, y2))
-        ternary = Link(origin, Vec2(xp.cos(pose.theta), xp.sin(pose.theta)), t1, t2)
-        solved = [leg.solution(ternary) for leg in rows.legs]
-        size = xp.sqrt(sum((rows.legs[i].spot - rows.legs[i - 1].spot).squared() for i in range(LEGS)))
-        margin = rows.det / (rows.legs[0].size * rows.legs[1].size * rows.legs[2].size * size)
-        return cls(
-            rows,
-            (*(leg.link for leg in solved), ternary),
-            tuple(leg.pin for leg in solved if leg.pin is not None),
-            margin,
-            tuple(leg.slide for leg in solved if leg.slide is not None),
-        )
-
-    def third_derivatives(
-        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
-    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
-        *_, ternary = self.links
-        starts, lines = iter(outer), iter(rails)
-        before = [next(lines) if leg.on_rail else (next(starts), 0.0) for leg in self.legs]
-        x, y, t3 = self._rows.solve(
-            [leg.third_right_side(ternary, each) for leg, each in zip(self.legs, before, strict=True)]
-        )
-        own = Vec2(x, y), t3
-        ends = [leg.link_third(ternary, own, each) for leg, each in zip(self.legs, before, strict=True)]
-        return [*(link for link, _ in ends), own], [pin for _, pin in ends if pin is not None]
-
-    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
-        """Outer reactions of the legs, then their inner ones [N].
-
-        The loads are force and moment: of each leg about the start of its frame, of the ternary link about its
-        origin. The load of a leg gives the part of its action that does not belong to its row; the factors of the
-        rows follow from the balance of two forces and one moment on the ternary link.
-        """
-        *legs, (force, moment) = loads
-        known = []
-        for leg, load in zip(self.legs, legs, strict=True):
-            part, couple = leg.known_part(load)
-            known.append(part)
-            force, moment = force - part, moment - couple
-        pulls = self._rows.combine(force, moment)
-        both = [
-            leg.reactions(load, part, pull)
-            for leg, load, part, pull in zip(self.legs, legs, known, pulls, strict=True)
-        ]
-        return *(outer for outer, _ in both), *(inner for _, inner in both)
+        legs = self.legs = legs_at(xp, placed, pose)
+        size = xp.sqrt(sum((legs[k].spot - legs[k - 1].spot).squared() for k in range(LEGS)))
+        for leg in legs:
+            size = size if leg.length is None else size * leg.length
+        ternary = Vec2(pose.x, pose.y), Vec2(xp.cos(pose.theta), xp.sin(pose.theta))
+        joints = *(leg.outer for leg in legs), *(leg.inner for leg in legs)
+        super().__init__((*(leg.pose for leg in legs), ternary), joints, size=size)
 
 
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:
@@ -398,11 +296,11 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
             try:
                 near = Pose(float(start.x), float(start.y), theta)
                 pose = correct_pose(MATH, legs, near, 20)
-                rows = _Rows.at(MATH, legs, pose)
+                closed = legs_at(MATH, legs, pose)
             except (ArithmeticError, ValueError):
                 continue
             angle = math.remainder(pose.theta, 2.0 * math.pi)
-            closes = all(abs(leg.gap) < 5e-10 * size * size for leg in rows.legs)
+            closes = all(abs(leg.gap) < 5e-10 * size * size for leg in closed)
             if closes and not any(
                 abs(math.remainder(angle - other.theta, 2.0 * math.pi)) < 1e-7
                 and math.hypot(pose.x - other.x, pose.y - other.y) < 1e-7 * size

@@ -14,18 +14,18 @@ from typing import Any, NamedTuple
 from ..core.brief import briefly_shown
 from ..core.planar import Vec2
 from ..groups.driver import Driver
-from ..groups.group import Group, Joint
+from ..groups.group import Group
+from ..groups.joints import GuideData, Joint
 from .extremes import MotionExtreme
 
 
 class Connections(NamedTuple):
-    """How a group hangs in its linkage: names of its links, of the pins that it adds, of the pins that its bars start
-    from, and its joints: each with the link on which the opposite reaction acts, None for the ground, and again that
-    link where it stands before the group. `guides` are those of its joints that slide."""
+    """How a group hangs in its linkage: names of its links, of the pins that it adds, and its joints: each with the
+    link on which the opposite reaction acts, None for the ground, and again that link where it stands before the
+    group. `guides` are those of its joints that slide."""
 
     links: tuple[str, ...]
     pins: tuple[str, ...]
-    outer: tuple[str, ...]
     joints: tuple[tuple[Joint, str | None, str | None], ...]
     guides: tuple[Joint, ...] = ()
 
@@ -80,13 +80,13 @@ class Linkage:
             carries |= inner
             joints = []
             for joint in group.joints:
-                carrier = guides[joint] if joint in guides else carries.get(joint[0])
-                joints.append((joint, carrier, None if carrier in own else carrier))
+                name = joint.pin, joint.link
+                carrier = guides[name] if isinstance(joint, GuideData) else carries.get(joint.pin)
+                joints.append((name, carrier, None if carrier in own else carrier))
             for bar in bars:
                 carries |= dict.fromkeys(bar.points, bar.name)
                 points[bar.name] = tuple(bar.points)
-            outer = tuple(bar.pin for bar in bars if bar.pin)
-            groups.append(Connections(own, tuple(inner), outer, tuple(joints), tuple(guides)))
+            groups.append(Connections(own, tuple(inner), tuple(joints), tuple(guides)))
         return Topology(carries, tuple(groups), points)
 
     @property

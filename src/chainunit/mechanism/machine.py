@@ -20,8 +20,9 @@ from typing import Any
 from ..core.engines import Dual, dual, slope
 from ..core.planar import ZERO, Link, Motion, Vec2, growth
 from ..groups.body import NO_LOAD, Body, Load, body_on, reflected_inertia
-from ..groups.driver import PushedRam, SolvedDriver, TurnedCrank
-from ..groups.group import GuideForce, Joint, Slide, SolvedGroup, Third, rail_third
+from ..groups.driver import Crank, Ram
+from ..groups.group import SolvedGroup, third_before
+from ..groups.joints import GuideForce, Joint, Slide, Third
 from ..groups.loads import Effect, Moving, Wrench
 from .linkage import Connections, Linkage, Topology
 
@@ -83,10 +84,8 @@ class Mechanism:
         thirds: dict[str, Third] = {}
         groups = (self.linkage.driver, *self.linkage.groups)
         for group, (solved, connections) in zip(groups, self._groups, strict=True):
-            links, inner = solved.third_derivatives(
-                [pins.get(pin, ZERO) for pin in connections.outer],
-                [rail_third(rail, rail.at_position(self.links), self.links, thirds) for rail in group.rails],
-            )
+            before = [third_before(joint, self.links, thirds, pins) for joint in group.joints]
+            links, inner = solved.third_derivatives(before)
             thirds.update(zip(connections.links, links, strict=True))
             pins.update(zip(connections.pins, inner, strict=True))
             for name in connections.links:
@@ -98,10 +97,13 @@ class Mechanism:
     def reaction_turn(self, reactions: Mapping[Joint, Vec2], effort: Any) -> Iterator[Wrench]:
         """The part of the reactions in the moments on the links as their arms turn with q, and in the forces as the
         guides turn."""
+        # the force of a cylinder turns with it
         driver, connections = self._groups[0]
-        assert isinstance(driver, SolvedDriver)
-        for k, force in driver.force_turn(effort):
-            yield Wrench(connections.links[k], force, 0.0)
+        barrel, *rod = driver.links
+        if rod:
+            more = barrel.u.turned() * (effort * barrel.t1)
+            yield Wrench(connections.links[1], more, 0.0)
+            yield Wrench(connections.links[0], -more, 0.0)
         for _, connections in self._groups:
             for joint, carrier, _ in connections.joints:
                 (pin, name), force = joint, reactions[joint]
@@ -141,9 +143,8 @@ class Mechanism:
 
     def margins(self) -> list[Any]:
         """The margin of each group; 0 is a dead position."""
-        return [
-            solved.margin for solved, _ in self._groups if not isinstance(solved, (TurnedCrank, PushedRam))
-        ]
+        alone = isinstance(self.linkage.driver, Crank | Ram)
+        return [solved.margin for solved, _ in self._groups[alone:]]
 
     def reactions(self, acting: Mapping[str, Load]) -> tuple[Any, dict[Joint, Vec2]]:
         """The torque (or force) along the coordinate [N m, N] and the force in each joint on its link [N], from what
@@ -151,7 +152,7 @@ class Mechanism:
         loads = dict(acting)
         reactions: dict[Joint, Vec2] = {}
         for solved, connections in reversed(self._groups):
-            forces = solved.reactions([loads.get(name, NO_LOAD) for name in connections.links])
+            forces, effort = solved.reactions([loads.get(name, NO_LOAD) for name in connections.links])
             for (joint, _, before), force in zip(connections.joints, forces, strict=True):
                 reactions[joint] = force
                 if before is not None:
@@ -165,9 +166,7 @@ class Mechanism:
                         total - force,
                         moment - (at.x - pin.x) * force.y + (at.y - pin.y) * force.x,
                     )
-        driver, connections = self._groups[0]
-        assert isinstance(driver, SolvedDriver)
-        return driver.effort([loads.get(name, NO_LOAD) for name in connections.links]), reactions
+        return effort, reactions
 
 
 def add_wrenches(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:

@@ -30,7 +30,7 @@ from ..core.quantities import (
     group,
     quantity,
 )
-from ..groups.group import Joint
+from ..groups.joints import Joint
 from .driver_ports import ROTATING, DriverPort, RotatingStates
 from .end_stops import EndStops, StopAction, stop_action
 from .linkage import Linkage, Topology

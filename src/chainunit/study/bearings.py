@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.engines import MATH
 from .drive import Drive
 from .readings import machine_series
 from .window import mean
@@ -45,8 +44,8 @@ def driver_bearing(drive: Drive) -> str:
     that does not show it, such as a foreign FMU."""
     if drive.foreign_machine:
         return ""
-    model, p = drive.simulated_machine.model, drive.simulated_machine.p
-    (bearing,) = model.linkage(MATH, p, model.Inputs()).driver.joints
+    model = drive.simulated_machine.model
+    ((bearing, *_),) = model.topology().groups[0].joints
     titles = {model.joints.get(output): title for title, output in model.pins.items()}
     return titles.get(bearing, "")
 

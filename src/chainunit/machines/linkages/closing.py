@@ -8,8 +8,7 @@ from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...groups.dyad import Dyad
-from ...groups.sliding import RRP
+from ...groups.dyad import RRP, Dyad
 from ...mechanism.assur import AssurGroup
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism

@@ -9,14 +9,12 @@ from typing import Any
 from ...core.errors import InputError
 from ...core.planar import Vec2
 from ...groups.body import Bar, Mass
-from ...groups.cylinder import Cylinder
-from ...groups.driver import Crank, Driver, Ram
-from ...groups.dyad import Dyad
-from ...groups.group import Group, Rail
+from ...groups.driver import Crank, Cylinder, Driver, Ram
+from ...groups.dyad import PRP, RPP, RPR, RRP, Dyad
+from ...groups.group import Group
+from ...groups.joints import Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
-from ...groups.sliding import RPR, RRP
 from ...groups.triad import Pose, Triad
-from ...groups.yokes import PRP, RPP
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry, RoughPoses
 from .structure import CYLINDER, JointEntry

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from ...core.planar import Motion, Vec2
-from ...groups.group import GuideForce
+from ...groups.joints import GuideForce
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.machine import Mechanism
 from .declarations import GuideReaction, PointMotion

@@ -1,0 +1,239 @@
+"""The joints of a group: rows of its linear system, and the reactions that follow from their multipliers.
+
+A joint holds a point of a `link` to a point of another link, by a hinge or by a guide. The other link is one of the
+same group, `by`, or moves in a known way. The rows say that both points move alike; in a guide the link also slides
+along a line of the other one, and both turn alike. For each order of derivative by the coordinate only the right
+sides differ. The multipliers of the rows are the components of the reaction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, Self
+
+from ..core.planar import ZERO, Link, Motion, Vec2
+from .block import Row
+
+Third = tuple[Vec2, Any]
+"""Third derivatives of a link by q: of its pin and of its angle."""
+Joint = tuple[str, str]
+"""A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
+Seat = tuple[int, Vec2]
+"""A pin on a link: the number of the link in its group, and the arm from its start."""
+UNKNOWNS = 4
+"""Number of the unknowns of a link: derivatives of its start along x and y, of its angle, and of its way along the
+line on which it starts."""
+Rates = Sequence[Sequence[Any]]
+"""Derivatives by q of the unknowns of a group, by order from the first one on."""
+
+
+class Rail(NamedTuple):
+    """A straight line in a link, as data: the name of the link, None for the ground; a point `at` of the line [m] and
+    its direction `along`, a unit vector, both in the frame of the link."""
+
+    of: str | None
+    at: Vec2
+    along: Vec2
+
+    def at_position(self, links: Mapping[str, Link]) -> Link:
+        """The line at the position of its link, as a link of its own: it starts from the point."""
+        if self.of is None:
+            return Link(Motion(self.at), self.along, 0.0, 0.0)
+        link, along = links[self.of], self.along
+        u = link.u * along.x + link.u.turned() * along.y
+        return Link(link.beside(self.at.x, self.at.y), u, link.t1, link.t2)
+
+
+class HingeData(NamedTuple):
+    """A hinge as data: its pin, the link on which its reaction acts, and the link of the same group that carries the
+    pin; None if a link before the group does."""
+
+    pin: str
+    link: str
+    by: str | None = None
+
+
+class GuideData(NamedTuple):
+    """A sliding joint as data: the pin at which its reaction counts, the link on which this acts, and the other link
+    of the same group, or a line of a link before it."""
+
+    pin: str
+    link: str
+    by: str | Rail
+
+
+class Slide(NamedTuple):
+    """The motion in a sliding joint: the direction `d` of its line, the way `s` of the link that its reaction acts on
+    along it, and the derivatives of that by q [m, m/rad, m/rad2]."""
+
+    d: Vec2
+    s: Any
+    s1: Any
+    s2: Any
+
+
+class GuideForce(Vec2):
+    """The reaction of a sliding joint on a link: force [N], and its whole `moment` about the start of the link's
+    frame [N m]."""
+
+    __slots__ = ("moment",)
+
+    def __init__(self, x: Any, y: Any, moment: Any) -> None:
+        super().__init__(x, y)
+        self.moment = moment
+
+    def plus(self, other: Vec2, factor: Any) -> GuideForce:
+        """The sum with `other`, a reaction of the same joint, times a factor."""
+        assert isinstance(other, GuideForce)
+        return GuideForce(
+            self.x + other.x * factor, self.y + other.y * factor, self.moment + other.moment * factor
+        )
+
+    @classmethod
+    def along(cls, n: Vec2, force: Any, moment: Any) -> Self:
+        """The reaction with a `force` in the direction `n`."""
+        return cls(n.x * force, n.y * force, moment)
+
+
+class Placed:
+    """A joint at one position: the numbers of its links in the group, with the arms from their starts to the point at
+    which they meet. The point of a link before the group has the motion `base`."""
+
+    __slots__ = ("_arm", "_base", "_by", "_by_arm", "_link")
+
+    def __init__(self, link: int, arm: Vec2, by: int | None, by_arm: Vec2, base: Motion | None) -> None:
+        self._link, self._arm, self._by, self._by_arm, self._base = link, arm, by, by_arm, base
+
+    def rows(self) -> list[Row]:
+        """Its rows: of the point along x and y, then the others."""
+        x, y = Row(), Row()
+        for link, arm, sign in ((self._link, self._arm, 1), (self._by, self._by_arm, -1)):
+            if link is not None:
+                k = UNKNOWNS * link
+                x[k], y[k + 1] = sign, sign
+                if arm is not ZERO:
+                    x[k + 2], y[k + 2] = (-arm.y, arm.x) if sign > 0 else (arm.y, -arm.x)
+        return [x, y]
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """The right sides of its rows for the derivatives after those of `rates`; `before` are the third derivatives
+        of the pin or line before the group."""
+        e, base = ZERO, self._base
+        if base is not None:
+            e = before[0] if before is not None else base.p2 if rates else base.p1
+        if not rates:
+            return [e.x, e.y]
+        for link, arm, sign in ((self._link, self._arm, 1.0), (self._by, self._by_arm, -1.0)):
+            if link is not None and arm is not ZERO:
+                t1, *t2 = (z[UNKNOWNS * link + 2] for z in rates)
+                if t2:
+                    e = e.plus(arm.turned(), sign * (t1 * t1 * t1)).plus(arm, 3.0 * sign * (t1 * t2[0]))
+                else:
+                    e = e.plus(arm, sign * (t1 * t1))
+        return [e.x, e.y]
+
+
+class Hinge(Placed):
+    """A hinge at one position. A link starts from the one on a pin before the group. The link of a crank is `driven`:
+    its angle changes by this number, 1 or -1, with q."""
+
+    __slots__ = ("_driven",)
+
+    def __init__(
+        self,
+        link: int,
+        arm: Vec2 = ZERO,
+        by: int | None = None,
+        by_arm: Vec2 = ZERO,
+        base: Motion | None = None,
+        driven: int = 0,
+    ) -> None:
+        super().__init__(link, arm, by, by_arm, base)
+        self._driven = driven
+
+    @property
+    def seat(self) -> Seat | None:
+        """Its pin on a link of the group, if it joins two of them."""
+        if self._by is None:
+            return None
+        return (self._by, ZERO) if self._by_arm is ZERO else (self._link, self._arm)
+
+    def rows(self) -> list[Row]:
+        """See `Placed`; of a crank also of its angle."""
+        return (
+            [*super().rows(), {UNKNOWNS * self._link + 2: self._driven}] if self._driven else super().rows()
+        )
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """See `Placed`."""
+        right = super().right(rates, before)
+        return [*right, 0.0 if rates else 1.0] if self._driven else right
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2, Any]:
+        """The reaction on the link [N], and the torque of a driver [N m], from the multipliers of its rows."""
+        reaction = Vec2(next(multipliers), next(multipliers))
+        return reaction, next(multipliers) if self._driven else None
+
+
+class Guide(Placed):
+    """A sliding joint at one position: the line through a point of the other link in the direction `d`, on which the
+    link starts, at the way `s`; `arm` goes from the start of the other link, or of the rail before the group, to the
+    start of the link. A `line` makes the way the coordinate: it is how far the force of the driver lies to the left
+    of the start of the link [m]."""
+
+    __slots__ = ("_d", "_line", "_other", "_s")
+
+    def __init__(self, link: int, d: Vec2, s: Any, arm: Vec2, other: int | Link, line: Any = None) -> None:
+        by, base = (other, None) if isinstance(other, int) else (None, other.carried(arm))
+        super().__init__(link, ZERO, by, arm, base)
+        self._d, self._s, self._other, self._line = d, s, other, line
+
+    def rows(self) -> list[Row]:
+        """See `Placed`; then of the angle. The way is an unknown, too."""
+        (x, y), k, other = super().rows(), UNKNOWNS * self._link, self._other
+        if self._line is None:
+            x[k + 3], y[k + 3] = -self._d.x, -self._d.y
+        return [x, y, {k + 2: 1, UNKNOWNS * other + 2: -1} if isinstance(other, int) else {k + 2: 1}]
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """See `Placed`."""
+        other, angle, order, d = self._other, 0.0, len(rates), self._d
+        if isinstance(other, int):
+            turns = [z[UNKNOWNS * other + 2] for z in rates]
+        else:
+            turns = [other.t1, other.t2]
+            if before is not None:
+                before = other.third_derivative(self._by_arm, *before), before[1]
+                turns.append(before[1])
+            angle = turns[order]
+        e = Vec2(*super().right(rates, before))
+        if order == 0:
+            e = e + d if self._line is not None else e
+        elif order == 1:
+            e = e.plus(d.turned(), 2.0 * (turns[0] * self._speed(rates, 0)))
+        else:
+            t1, s1 = turns[0], self._speed(rates, 0)
+            across = 3.0 * (turns[1] * s1 + t1 * self._speed(rates, 1))
+            e = e.plus(d.turned(), across).plus(d, -3.0 * (t1 * t1 * s1))
+        return [e.x, e.y, angle]
+
+    def _speed(self, rates: Rates, order: int) -> Any:
+        """The derivative of the way by q."""
+        return rates[order][UNKNOWNS * self._link + 3] if self._line is None else 1.0 - order
+
+    def slide(self, rates: Rates) -> Slide:
+        """The motion along its line."""
+        return Slide(self._d, self._s, self._speed(rates, 0), self._speed(rates, 1))
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[GuideForce, Any]:
+        """The reaction on the link, force [N] and moment [N m], and the force of a driver [N], from the multipliers
+        of its rows."""
+        force, moment = Vec2(next(multipliers), next(multipliers)), next(multipliers)
+        if self._line is None and self._by is not None:
+            # normal to the line as it is: no load acts on the way alone
+            return GuideForce(force.x, force.y, moment), None
+        n, effort = self._d.turned(), None
+        if self._line is not None:
+            effort = force.dot(self._d)
+            moment = moment + self._line * effort
+        return GuideForce.along(n, force.dot(n), moment), effort
