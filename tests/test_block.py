@@ -16,7 +16,7 @@ from chainunit.groups.body import Bar
 from chainunit.groups.driver import Crank, Cylinder, Ram
 from chainunit.groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from chainunit.groups.group import SolvedGroup
-from chainunit.groups.joints import UNKNOWNS, Guide, Hinge, Rail
+from chainunit.groups.joints import UNKNOWNS, Hinge, Rail, Turn
 from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
 from chainunit.groups.triad import Pose, SolvedTriad
 
@@ -161,7 +161,7 @@ def test_a_joint_is_its_rows():
     """A joint of another kind, by its rows alone: it holds the ratio of two angles, as gears do, and moves and loads
     the links as the ratio says."""
 
-    class Ratio(Guide):
+    class Ratio(Turn):
         def rows(self):
             return [{2: 1, UNKNOWNS + 2: -RATIO}]
 
@@ -171,13 +171,8 @@ def test_a_joint_is_its_rows():
         def force(self, multipliers):
             return next(multipliers), None
 
-        def slide(self, rates):
-            return None
-
     rng, at = np.random.default_rng(2), before(np.random.default_rng(1))
-    joints = [
-        Hinge(0, base=at.pins["P"], driven=1), Hinge(1, base=at.pins["Q"]), Ratio(0, unit(0.0), 0.0, ZERO, 1)
-    ]  # fmt: skip
+    joints = [Hinge(0, base=at.pins["P"]), Turn(0, 1), Hinge(1, base=at.pins["Q"]), Ratio(0, 1)]
     poses = [(at.pins["P"], unit(0.0)), (at.pins["Q"], unit(1.0))]
     group = SolvedGroup(poses, joints)
     assert [k.t1 for k in group.links] == [1.0, pytest.approx(1.0 / RATIO)]

@@ -16,7 +16,7 @@ from ..core.planar import ZERO, Vec2
 from .body import Bar, Mass
 from .dyad import meeting
 from .group import Group, PlacedLinkage, SolvedGroup
-from .joints import Guide, GuideData, Hinge, HingeData, Rail
+from .joints import Guide, GuideData, Hinge, HingeData, Rail, Turn
 
 UPWARD = Vec2(0.0, 1.0)
 
@@ -70,9 +70,9 @@ class Crank(Driver):
         bearing, start = at.pins[self.bar.pin], self.start
         c, s = xp.cos(q), xp.sin(q) * self.sense
         u = Vec2(start.x * c - start.y * s, start.y * c + start.x * s)
-        hinge = Hinge(0, base=bearing, driven=int(self.sense))
+        joints = Hinge(0, base=bearing), Turn(0, int(self.sense))
         ends = [] if self.bar.length is None else [(0, u * self.bar.length)]
-        return SolvedGroup([(bearing, u)], [hinge], ends=ends)
+        return SolvedGroup([(bearing, u)], joints, ends=ends)
 
 
 @dataclass

@@ -7,12 +7,13 @@ and its margin follow from the rows of its joints.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any, ClassVar, Protocol
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .block import Block
 from .body import Bar, Load
-from .joints import UNKNOWNS, Guide, GuideData, Hinge, HingeData, Joint, Rail, Seat, Third
+from .joints import UNKNOWNS, Guide, GuideData, Hinge, HingeData, Joint, Placed, Rail, Seat, Third
 
 
 class PlacedLinkage(Protocol):
@@ -36,7 +37,7 @@ class SolvedGroup:
     def __init__(
         self,
         poses: Sequence[tuple[Vec2 | Motion, Vec2]],
-        joints: Sequence[Hinge | Guide],
+        joints: Sequence[Placed],
         margin: Any = None,
         size: Any = 1.0,
         ends: Sequence[Seat] = (),
@@ -51,25 +52,24 @@ class SolvedGroup:
         self._joints = joints
         block = self._block = Block(UNKNOWNS * len(poses), [row for joint in joints for row in joint.rows()])
         self._rates: list[list[Any]] = []
-        for _ in range(2):
-            self._rates.append(self._next_rates([None] * len(joints)))
-        rates = [[_rate(z, k) for z in self._rates] for k in range(len(poses))]
+        self._rates += [self._next_rates()]
+        self._rates += [self._next_rates()]
+        first, second = ([_rate(z, k) for k in range(len(poses))] for z in self._rates)
         self.links = tuple(
             Link(start if isinstance(start, Motion) else Motion(start, p1, p2), u, t1, t2)
-            for (start, u), ((p1, t1), (p2, t2)) in zip(poses, rates, strict=True)
+            for (start, u), (p1, t1), (p2, t2) in zip(poses, first, second, strict=True)
         )
         self.margin = block.det / size if margin is None else margin
         self.slides = tuple(joint.slide(self._rates) for joint in joints if isinstance(joint, Guide))
-        self._seats = [seat for j in joints if isinstance(j, Hinge) and (seat := j.seat) is not None] + [
-            *ends
-        ]
+        seats = (joint.seat for joint in joints if isinstance(joint, Hinge) and not isinstance(joint, Guide))
+        self._seats = [*(seat for seat in seats if seat), *ends]
         self.pins = tuple(
             self.links[k].pin if arm is ZERO else self.links[k].carried(arm) for k, arm in self._seats
         )
 
-    def _next_rates(self, before: Sequence[Third | None]) -> list[Any]:
+    def _next_rates(self, before: Sequence[Third | None] = ()) -> list[Any]:
         """The unknowns of the next order."""
-        joints = zip(self._joints, before, strict=True)
+        joints = zip_longest(self._joints, before)
         return self._block.solve([b for joint, third in joints for b in joint.right(self._rates, third)])
 
     def third_derivatives(self, before: Sequence[Third | None]) -> tuple[Sequence[Third], Sequence[Vec2]]:
@@ -85,7 +85,8 @@ class SolvedGroup:
         right = [x for force, moment in loads for x in (-force.x, -force.y, -moment, 0.0)]
         multipliers = iter(self._block.solve_transposed(right))
         forces, efforts = zip(*(joint.force(multipliers) for joint in self._joints), strict=True)
-        return [*forces], next((effort for effort in efforts if effort is not None), None)
+        effort = next((effort for effort in efforts if effort is not None), None)
+        return [force for force in forces if force is not None], effort
 
 
 def _rate(z: Sequence[Any], link: int) -> Third:

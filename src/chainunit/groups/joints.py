@@ -95,49 +95,11 @@ class GuideForce(Vec2):
         return cls(n.x * force, n.y * force, moment)
 
 
-class Placed:
-    """A joint at one position: the numbers of its links in the group, with the arms from their starts to the point at
-    which they meet. The point of a link before the group has the motion `base`."""
+class Hinge:
+    """A hinge at one position: the numbers of its links in the group, with the arms from their starts to the point at
+    which they meet. The pin of a link before the group has the motion `base`; the link starts from it."""
 
     __slots__ = ("_arm", "_base", "_by", "_by_arm", "_link")
-
-    def __init__(self, link: int, arm: Vec2, by: int | None, by_arm: Vec2, base: Motion | None) -> None:
-        self._link, self._arm, self._by, self._by_arm, self._base = link, arm, by, by_arm, base
-
-    def rows(self) -> list[Row]:
-        """Its rows: of the point along x and y, then the others."""
-        x, y = Row(), Row()
-        for link, arm, sign in ((self._link, self._arm, 1), (self._by, self._by_arm, -1)):
-            if link is not None:
-                k = UNKNOWNS * link
-                x[k], y[k + 1] = sign, sign
-                if arm is not ZERO:
-                    x[k + 2], y[k + 2] = (-arm.y, arm.x) if sign > 0 else (arm.y, -arm.x)
-        return [x, y]
-
-    def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """The right sides of its rows for the derivatives after those of `rates`; `before` are the third derivatives
-        of the pin or line before the group."""
-        e, base = ZERO, self._base
-        if base is not None:
-            e = before[0] if before is not None else base.p2 if rates else base.p1
-        if not rates:
-            return [e.x, e.y]
-        for link, arm, sign in ((self._link, self._arm, 1.0), (self._by, self._by_arm, -1.0)):
-            if link is not None and arm is not ZERO:
-                t1, *t2 = (z[UNKNOWNS * link + 2] for z in rates)
-                if t2:
-                    e = e.plus(arm.turned(), sign * (t1 * t1 * t1)).plus(arm, 3.0 * sign * (t1 * t2[0]))
-                else:
-                    e = e.plus(arm, sign * (t1 * t1))
-        return [e.x, e.y]
-
-
-class Hinge(Placed):
-    """A hinge at one position. A link starts from the one on a pin before the group. The link of a crank is `driven`:
-    its angle changes by this number, 1 or -1, with q."""
-
-    __slots__ = ("_driven",)
 
     def __init__(
         self,
@@ -146,10 +108,8 @@ class Hinge(Placed):
         by: int | None = None,
         by_arm: Vec2 = ZERO,
         base: Motion | None = None,
-        driven: int = 0,
     ) -> None:
-        super().__init__(link, arm, by, by_arm, base)
-        self._driven = driven
+        self._link, self._arm, self._by, self._by_arm, self._base = link, arm, by, by_arm, base
 
     @property
     def seat(self) -> Seat | None:
@@ -159,23 +119,65 @@ class Hinge(Placed):
         return (self._by, ZERO) if self._by_arm is ZERO else (self._link, self._arm)
 
     def rows(self) -> list[Row]:
-        """See `Placed`; of a crank also of its angle."""
-        return (
-            [*super().rows(), {UNKNOWNS * self._link + 2: self._driven}] if self._driven else super().rows()
-        )
+        """Its rows: of the point along x and y."""
+        k, r = UNKNOWNS * self._link, self._arm
+        x, y = ({k: 1}, {k + 1: 1}) if r is ZERO else ({k: 1, k + 2: -r.y}, {k + 1: 1, k + 2: r.x})
+        if self._by is not None:
+            k, r = UNKNOWNS * self._by, self._by_arm
+            x[k] = y[k + 1] = -1
+            if r is not ZERO:
+                x[k + 2], y[k + 2] = r.y, -r.x
+        return [x, y]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Placed`."""
-        right = super().right(rates, before)
-        return [*right, 0.0 if rates else 1.0] if self._driven else right
+        """The right sides of its rows for the derivatives after those of `rates`; `before` are the third derivatives
+        of the pin or line before the group."""
+        e, base = ZERO, self._base
+        if base is not None:
+            e = before[0] if before is not None else base.p2 if rates else base.p1
+        if rates and self._arm is not ZERO:
+            e = _bent(e, self._arm, rates, self._link, 1.0)
+        if rates and self._by is not None and self._by_arm is not ZERO:
+            e = _bent(e, self._by_arm, rates, self._by, -1.0)
+        return [e.x, e.y]
 
-    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2, Any]:
-        """The reaction on the link [N], and the torque of a driver [N m], from the multipliers of its rows."""
-        reaction = Vec2(next(multipliers), next(multipliers))
-        return reaction, next(multipliers) if self._driven else None
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """The reaction on the link [N], and the effort of a driver [N m, N], from the multipliers of its rows; None
+        for what it does not have."""
+        return Vec2(next(multipliers), next(multipliers)), None
 
 
-class Guide(Placed):
+def _bent(e: Vec2, arm: Vec2, rates: Rates, link: int, sign: float) -> Vec2:
+    """The vector and what the known derivatives of a link's angle take from the next one of the end of an arm."""
+    turn = UNKNOWNS * link + 2
+    t1 = rates[0][turn]
+    if len(rates) == 1:
+        return e.plus(arm, sign * (t1 * t1))
+    return e.plus(arm.turned(), sign * (t1 * t1 * t1)).plus(arm, 3.0 * sign * (t1 * rates[1][turn]))
+
+
+class Turn:
+    """The drive of a crank: its angle changes by `sense`, 1 or -1, with q."""
+
+    __slots__ = ("_link", "_sense")
+
+    def __init__(self, link: int, sense: int) -> None:
+        self._link, self._sense = link, sense
+
+    def rows(self) -> list[Row]:
+        """Its row: of the angle."""
+        return [{UNKNOWNS * self._link + 2: self._sense}]
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """See `Hinge`."""
+        return [0.0 if rates else 1.0]
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """See `Hinge`."""
+        return None, next(multipliers)
+
+
+class Guide(Hinge):
     """A sliding joint at one position: the line through a point of the other link in the direction `d`, on which the
     link starts, at the way `s`; `arm` goes from the start of the other link, or of the rail before the group, to the
     start of the link. A `line` makes the way the coordinate: it is how far the force of the driver lies to the left
@@ -189,14 +191,14 @@ class Guide(Placed):
         self._d, self._s, self._other, self._line = d, s, other, line
 
     def rows(self) -> list[Row]:
-        """See `Placed`; then of the angle. The way is an unknown, too."""
+        """See `Hinge`; then of the angle. The way is an unknown, too."""
         (x, y), k, other = super().rows(), UNKNOWNS * self._link, self._other
         if self._line is None:
             x[k + 3], y[k + 3] = -self._d.x, -self._d.y
         return [x, y, {k + 2: 1, UNKNOWNS * other + 2: -1} if isinstance(other, int) else {k + 2: 1}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Placed`."""
+        """See `Hinge`."""
         other, angle, order, d = self._other, 0.0, len(rates), self._d
         if isinstance(other, int):
             turns = [z[UNKNOWNS * other + 2] for z in rates]
@@ -225,9 +227,8 @@ class Guide(Placed):
         """The motion along its line."""
         return Slide(self._d, self._s, self._speed(rates, 0), self._speed(rates, 1))
 
-    def force(self, multipliers: Iterator[Any]) -> tuple[GuideForce, Any]:
-        """The reaction on the link, force [N] and moment [N m], and the force of a driver [N], from the multipliers
-        of its rows."""
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """See `Hinge`; the reaction is a `GuideForce`."""
         force, moment = Vec2(next(multipliers), next(multipliers)), next(multipliers)
         if self._line is None and self._by is not None:
             # normal to the line as it is: no load acts on the way alone
@@ -237,3 +238,7 @@ class Guide(Placed):
             effort = force.dot(self._d)
             moment = moment + self._line * effort
         return GuideForce.along(n, force.dot(n), moment), effort
+
+
+Placed = Hinge | Turn
+"""A joint or a drive at one position."""
