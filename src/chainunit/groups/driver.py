@@ -15,8 +15,8 @@ from typing import Any
 from ..core.planar import ZERO, Vec2
 from .body import Bar, Mass
 from .dyad import meeting
-from .group import Group, PlacedLinkage, SolvedGroup
-from .joints import Guide, GuideData, Hinge, HingeData, Rail, Turn
+from .group import Group, SolvedGroup
+from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail, Turn
 
 UPWARD = Vec2(0.0, 1.0)
 
@@ -51,7 +51,7 @@ class Crank(Driver):
         return {} if self.bar.length is None else {self.end: self.bar.name}
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its bearing."""
         return (HingeData(self.bar.pin, self.bar.name),)
 
@@ -65,7 +65,7 @@ class Crank(Driver):
         arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
         return mass.I + mass.m * arm2
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The crank at the angle `q` [rad]."""
         bearing, start = at.pins[self.bar.pin], self.start
         c, s = xp.cos(q), xp.sin(q) * self.sense
@@ -87,7 +87,7 @@ class Ram(Driver):
     end: str = ""
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its rail."""
         return (GuideData(self.guide, self.bar.name, self.rail),)
 
@@ -96,7 +96,7 @@ class Ram(Driver):
         """Its mass [kg]."""
         return 0.0 if self.bar.mass is None else self.bar.mass.m
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The ram at the way `q` [m]."""
         rail = self.rail.at_position(at.links)
         way = rail.u * q
@@ -130,7 +130,7 @@ class Cylinder(Driver):
     side: float
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints."""
         barrel, rod, lever = self.bar, self.rod.name, self.lever
         return (
@@ -145,7 +145,7 @@ class Cylinder(Driver):
         """The mass of the rod [kg]."""
         return 0.0 if self.rod.mass is None else self.rod.mass.m
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The cylinder at the way `q` [m]."""
         p, o = at.pins[self.bar.pin], at.pins[self.lever.pin]
         way, h, b = q + self.shift, self.offset, self.lever.length

@@ -16,8 +16,8 @@ from typing import Any
 
 from ..core.planar import ZERO, Vec2
 from .body import Bar
-from .group import Group, PlacedLinkage, SolvedGroup
-from .joints import Guide, GuideData, Hinge, HingeData, Rail
+from .group import Group, SolvedGroup
+from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
 
 
 @dataclass
@@ -33,7 +33,7 @@ class Dyad(Group):
     side: float
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints."""
         first, second = self.first, self.second
         return (
@@ -42,7 +42,7 @@ class Dyad(Group):
             HingeData(second.pin, second.name),
         )
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The dyad where its outer pins are."""
         a, b, start, end = (
             self.first.length,
@@ -87,7 +87,7 @@ class RRP(Group):
     side: float
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints."""
         first, slider = self.first, self.slider.name
         return (
@@ -96,7 +96,7 @@ class RRP(Group):
             GuideData(self.guide, slider, self.rail),
         )
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The group at the coordinate `q` of the driver [rad, m]."""
         start, rail, a = at.pins[self.first.pin], self.rail.at_position(at.links), self.first.length
         d, w = rail.u, rail.pin.p - start.p
@@ -131,7 +131,7 @@ class RPR(Group):
     side: float
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints."""
         first, second = self.first, self.second
         return (
@@ -140,7 +140,7 @@ class RPR(Group):
             HingeData(second.pin, second.name),
         )
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The group at the coordinate `q` of the driver [rad, m]."""
         start, end, h = at.pins[self.first.pin], at.pins[self.second.pin], self.offset
         v = start.p - end.p  # way d + offset n
@@ -168,7 +168,7 @@ class PRP(Group):
     guides_at: tuple[str, str]
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints."""
         first, second = self.first.name, self.second.name
         return (
@@ -177,7 +177,7 @@ class PRP(Group):
             GuideData(self.guides_at[1], second, self.second_rail),
         )
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The group at the coordinate `q` of the driver [rad, m]."""
         a, b = self.first_rail.at_position(at.links), self.second_rail.at_position(at.links)
         per, gap = 1.0 / a.u.cross(b.u), b.pin.p - a.pin.p
@@ -207,7 +207,7 @@ class RPP(Group):
     guides_at: tuple[str, str]
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints."""
         block, yoke = self.block, self.yoke.name
         return (
@@ -216,7 +216,7 @@ class RPP(Group):
             GuideData(self.guides_at[1], yoke, self.rail),
         )
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The group at the coordinate `q` of the driver [rad, m]."""
         start, rail, slot = at.pins[self.block.pin], self.rail.at_position(at.links), self.slot
         d = rail.u

@@ -8,24 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import zip_longest
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .block import Block
 from .body import Bar, Load
-from .joints import UNKNOWNS, Guide, GuideData, Hinge, HingeData, Joint, Placed, Rail, Seat, Third
-
-
-class PlacedLinkage(Protocol):
-    """The linkage before a group at one position: its `pins` with points, and its `links`, by name."""
-
-    @property
-    def pins(self) -> Mapping[str, Motion]:
-        """Motion of each pin and point."""
-
-    @property
-    def links(self) -> Mapping[str, Link]:
-        """Links by name."""
+from .joints import UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Seat, Third
 
 
 class SolvedGroup:
@@ -60,9 +48,8 @@ class SolvedGroup:
             for (start, u), (p1, t1), (p2, t2) in zip(poses, first, second, strict=True)
         )
         self.margin = block.det / size if margin is None else margin
-        self.slides = tuple(joint.slide(self._rates) for joint in joints if isinstance(joint, Guide))
-        seats = (joint.seat for joint in joints if isinstance(joint, Hinge) and not isinstance(joint, Guide))
-        self._seats = [*(seat for seat in seats if seat), *ends]
+        self.slides = tuple(slide for joint in joints if (slide := joint.slide(self._rates)))
+        self._seats = [*(seat for joint in joints if (seat := joint.seat)), *ends]
         self.pins = tuple(
             self.links[k].pin if arm is ZERO else self.links[k].carried(arm) for k, arm in self._seats
         )
@@ -107,7 +94,7 @@ class Group:
         return tuple(value for value in vars(self).values() if isinstance(value, Bar))
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints, in the order of `SolvedGroup.reactions`."""
         raise NotImplementedError
 
@@ -119,37 +106,13 @@ class Group:
     @property
     def guides(self) -> Mapping[Joint, str | None]:
         """Its sliding joints, each with the link on which the opposite reaction acts, None for the ground."""
-        return {
-            (j.pin, j.link): j.by.of if isinstance(j.by, Rail) else j.by
-            for j in self.joints
-            if isinstance(j, GuideData)
-        }
+        return {(joint.pin, joint.link): joint.carrier({}) for joint in self.joints if joint.slides}
 
-    def derive(self, xp: Any, before: Callable[[float], PlacedLinkage]) -> list[Any]:
+    def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """Numbers that follow from its lengths; `before` gives the linkage before the group at a crank angle
         [rad]."""
         return []
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The group at the coordinate `q` [rad]; `at` is the linkage before the group at this coordinate."""
         raise NotImplementedError
-
-
-def third_before(
-    joint: HingeData | GuideData,
-    links: Mapping[str, Link],
-    thirds: Mapping[str, Third],
-    pins: Mapping[str, Vec2],
-) -> Third | None:
-    """The third derivatives of the pin or of the line before its group on which a joint lies, from those of links and
-    pins; None for a joint inside the group."""
-    if isinstance(joint, HingeData):
-        return (pins.get(joint.pin, ZERO), 0.0) if joint.by is None else None
-    rail = joint.by
-    if not isinstance(rail, Rail):
-        return None
-    if rail.of is None:
-        return ZERO, 0.0
-    link, third = links[rail.of], thirds[rail.of]
-    start = rail.at_position(links).pin.p - link.pin.p
-    return link.third_derivative(start, *third), third[1]

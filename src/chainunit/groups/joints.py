@@ -9,10 +9,11 @@ sides differ. The multipliers of the rows are the components of the reaction.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .block import Row
+from .body import Load
 
 Third = tuple[Vec2, Any]
 """Third derivatives of a link by q: of its pin and of its angle."""
@@ -44,6 +45,18 @@ class Rail(NamedTuple):
         return Link(link.beside(self.at.x, self.at.y), u, link.t1, link.t2)
 
 
+class LinkageInMotion(Protocol):
+    """A linkage at one position: its `pins` with points, and its `links`, by name."""
+
+    @property
+    def pins(self) -> Mapping[str, Motion]:
+        """Motion of each pin and point."""
+
+    @property
+    def links(self) -> Mapping[str, Link]:
+        """Links by name."""
+
+
 class HingeData(NamedTuple):
     """A hinge as data: its pin, the link on which its reaction acts, and the link of the same group that carries the
     pin; None if a link before the group does."""
@@ -51,6 +64,34 @@ class HingeData(NamedTuple):
     pin: str
     link: str
     by: str | None = None
+
+    @property
+    def slides(self) -> bool:
+        """Whether its links slide along each other."""
+        return False
+
+    def carrier(self, carries: Mapping[str, str]) -> str | None:
+        """The link on which the opposite reaction acts, None for the ground, from the links that carry pins."""
+        return carries.get(self.pin)
+
+    def third_before(
+        self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
+    ) -> Third | None:
+        """The third derivatives of its pin or line on a link before the group, from those of the `links` and `pins`;
+        None if it joins two links of the group."""
+        return (pins.get(self.pin, ZERO), 0.0) if self.by is None else None
+
+    def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
+        """What the opposite reaction does to the link `carrier`."""
+        return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
+
+    def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
+        """The derivatives by q of what the present reaction does to its links, as arms and lines turn."""
+        p1, start = m.pins[self.pin].p1, m.links[self.link].pin.p1
+        if p1 is not start:
+            yield self.link, (ZERO, (p1 - start).cross(reaction))
+        if carrier is not None:
+            yield carrier, (ZERO, (m.links[carrier].pin.p1 - p1).cross(reaction))
 
 
 class GuideData(NamedTuple):
@@ -60,6 +101,47 @@ class GuideData(NamedTuple):
     pin: str
     link: str
     by: str | Rail
+
+    @property
+    def slides(self) -> bool:
+        """Whether its links slide along each other."""
+        return True
+
+    def carrier(self, carries: Mapping[str, str]) -> str | None:
+        """See `HingeData`."""
+        return self.by.of if isinstance(self.by, Rail) else self.by
+
+    def third_before(
+        self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
+    ) -> Third | None:
+        """See `HingeData`."""
+        if not isinstance(self.by, Rail):
+            return None
+        if self.by.of is None:
+            return ZERO, 0.0
+        link, third = m.links[self.by.of], links[self.by.of]
+        start = self.by.at_position(m.links).pin.p - link.pin.p
+        return link.third_derivative(start, *third), third[1]
+
+    def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
+        """See `HingeData`."""
+        assert isinstance(reaction, GuideForce)
+        arm = m.links[self.link].pin.p - m.links[carrier].pin.p
+        return -reaction, -(reaction.moment + arm.cross(reaction))
+
+    def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
+        """See `HingeData`: the force is normal to the line, which turns with the link."""
+        link = m.links[self.link]
+        more = reaction.turned() * link.t1
+        yield self.link, (more, 0.0)
+        if carrier is not None:
+            other = m.links[carrier]
+            arm, arm1 = link.pin.p - other.pin.p, link.pin.p1 - other.pin.p1
+            yield carrier, (-more, -(arm1.cross(reaction) + arm.cross(more)))
+
+
+JointData = HingeData | GuideData
+"""A joint as data."""
 
 
 class Slide(NamedTuple):
@@ -95,7 +177,36 @@ class GuideForce(Vec2):
         return cls(n.x * force, n.y * force, moment)
 
 
-class Hinge:
+class Placed:
+    """A joint, or a drive, at one position, by the numbers of its links in the group."""
+
+    __slots__ = ()
+
+    @property
+    def seat(self) -> Seat | None:
+        """The pin that it adds to the group."""
+        return None
+
+    def rows(self) -> list[Row]:
+        """Its rows."""
+        raise NotImplementedError
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """The right sides of its rows for the derivatives after those of `rates`; `before` are the third derivatives
+        of the pin or line before the group."""
+        raise NotImplementedError
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """The reaction on the link [N], and the effort of a driver [N m, N], from the multipliers of its rows; None
+        for what it does not have."""
+        raise NotImplementedError
+
+    def slide(self, rates: Rates) -> Slide | None:
+        """The motion along its line."""
+        return None
+
+
+class Hinge(Placed):
     """A hinge at one position: the numbers of its links in the group, with the arms from their starts to the point at
     which they meet. The pin of a link before the group has the motion `base`; the link starts from it."""
 
@@ -113,7 +224,7 @@ class Hinge:
 
     @property
     def seat(self) -> Seat | None:
-        """Its pin on a link of the group, if it joins two of them."""
+        """Its pin, if it joins two links of the group."""
         if self._by is None:
             return None
         return (self._by, ZERO) if self._by_arm is ZERO else (self._link, self._arm)
@@ -130,8 +241,7 @@ class Hinge:
         return [x, y]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """The right sides of its rows for the derivatives after those of `rates`; `before` are the third derivatives
-        of the pin or line before the group."""
+        """See `Placed`."""
         e, base = ZERO, self._base
         if base is not None:
             e = before[0] if before is not None else base.p2 if rates else base.p1
@@ -142,8 +252,7 @@ class Hinge:
         return [e.x, e.y]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """The reaction on the link [N], and the effort of a driver [N m, N], from the multipliers of its rows; None
-        for what it does not have."""
+        """See `Placed`."""
         return Vec2(next(multipliers), next(multipliers)), None
 
 
@@ -156,7 +265,7 @@ def _bent(e: Vec2, arm: Vec2, rates: Rates, link: int, sign: float) -> Vec2:
     return e.plus(arm.turned(), sign * (t1 * t1 * t1)).plus(arm, 3.0 * sign * (t1 * rates[1][turn]))
 
 
-class Turn:
+class Turn(Placed):
     """The drive of a crank: its angle changes by `sense`, 1 or -1, with q."""
 
     __slots__ = ("_link", "_sense")
@@ -169,11 +278,11 @@ class Turn:
         return [{UNKNOWNS * self._link + 2: self._sense}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Hinge`."""
+        """See `Placed`."""
         return [0.0 if rates else 1.0]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """See `Hinge`."""
+        """See `Placed`."""
         return None, next(multipliers)
 
 
@@ -190,6 +299,11 @@ class Guide(Hinge):
         super().__init__(link, ZERO, by, arm, base)
         self._d, self._s, self._other, self._line = d, s, other, line
 
+    @property
+    def seat(self) -> Seat | None:
+        """None: it adds no pin."""
+        return None
+
     def rows(self) -> list[Row]:
         """See `Hinge`; then of the angle. The way is an unknown, too."""
         (x, y), k, other = super().rows(), UNKNOWNS * self._link, self._other
@@ -198,7 +312,7 @@ class Guide(Hinge):
         return [x, y, {k + 2: 1, UNKNOWNS * other + 2: -1} if isinstance(other, int) else {k + 2: 1}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Hinge`."""
+        """See `Placed`."""
         other, angle, order, d = self._other, 0.0, len(rates), self._d
         if isinstance(other, int):
             turns = [z[UNKNOWNS * other + 2] for z in rates]
@@ -228,7 +342,7 @@ class Guide(Hinge):
         return Slide(self._d, self._s, self._speed(rates, 0), self._speed(rates, 1))
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """See `Hinge`; the reaction is a `GuideForce`."""
+        """See `Placed`; the reaction is a `GuideForce`."""
         force, moment = Vec2(next(multipliers), next(multipliers)), next(multipliers)
         if self._line is None and self._by is not None:
             # normal to the line as it is: no load acts on the way alone
@@ -238,7 +352,3 @@ class Guide(Hinge):
             effort = force.dot(self._d)
             moment = moment + self._line * effort
         return GuideForce.along(n, force.dot(n), moment), effort
-
-
-Placed = Hinge | Turn
-"""A joint or a drive at one position."""

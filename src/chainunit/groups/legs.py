@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar
-from .group import PlacedLinkage
-from .joints import Guide, GuideData, Hinge, HingeData, Rail
+from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
 
 LEGS = 3
 
@@ -49,11 +48,11 @@ class Leg:
 
     bar: Bar
 
-    def joints(self, ternary: str) -> tuple[HingeData | GuideData, HingeData | GuideData]:
+    def joints(self, ternary: str) -> tuple[JointData, JointData]:
         """Its outer joint, and the one with the ternary link of this name."""
         raise NotImplementedError
 
-    def at_position(self, number: int, at: PlacedLinkage) -> PlacedLeg:
+    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
         """The leg of this number, with the linkage `at` before it."""
         raise NotImplementedError
 
@@ -66,12 +65,12 @@ class RodLeg(Leg):
     pin: str
     arm: Vec2
 
-    def joints(self, ternary: str) -> tuple[HingeData | GuideData, HingeData | GuideData]:
+    def joints(self, ternary: str) -> tuple[JointData, JointData]:
         """See `Leg`."""
         name = self.bar.name
         return HingeData(self.bar.pin, name), HingeData(self.pin, name, ternary)
 
-    def at_position(self, number: int, at: PlacedLinkage) -> PlacedLeg:
+    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
         """See `Leg`."""
         return partial(_rod, number, at.pins[self.bar.pin], self.bar.length, self.arm)
 
@@ -88,11 +87,11 @@ class BlockLeg(Leg):
     on: Rail
     guide: str
 
-    def joints(self, ternary: str) -> tuple[HingeData | GuideData, HingeData | GuideData]:
+    def joints(self, ternary: str) -> tuple[JointData, JointData]:
         """See `Leg`."""
         return GuideData(self.guide, self.bar.name, self.on), HingeData(self.pin, self.bar.name, ternary)
 
-    def at_position(self, number: int, at: PlacedLinkage) -> PlacedLeg:
+    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
         """See `Leg`."""
         return partial(_block, number, self.on.at_position(at.links), self.arm)
 
@@ -109,11 +108,11 @@ class SlotLeg(Leg):
     along: Vec2
     guide: str
 
-    def joints(self, ternary: str) -> tuple[HingeData | GuideData, HingeData | GuideData]:
+    def joints(self, ternary: str) -> tuple[JointData, JointData]:
         """See `Leg`."""
         return HingeData(self.bar.pin, self.bar.name), GuideData(self.guide, self.bar.name, ternary)
 
-    def at_position(self, number: int, at: PlacedLinkage) -> PlacedLeg:
+    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
         """See `Leg`."""
         return partial(_slot, number, at.pins[self.bar.pin], self.at, self.along)
 

@@ -7,10 +7,10 @@ axis. Each leg gives a row, the wrench that it can exert on the ternary link; of
 
     (r.x, r.y, A x r).
 
-The matrix of these three rows is that of every linear system here: Newton's correction, the first and second
-derivative of the pose, the pull of the legs. Its determinant vanishes where the lines of the legs meet in one point
-or are parallel: these are the dead positions of a triad, and there are no others. Where C, D and E lie on one line,
-this matrix is regular; the three moment equations about C, D and E, which paper 003 solves, are singular there.
+Newton's correction of the pose solves these three rows, and they are what is left of the matrix of the group after
+the legs are eliminated. Their determinant vanishes if the lines of the legs meet in one point or are parallel: these
+are the dead positions of a triad, and there are no others. If C, D and E lie on one line, the matrix is regular; the
+three moment equations about C, D and E, which paper 003 solves, are singular there.
 
 There is no closed form for the pose. Up to six assembly modes are the real roots of a polynomial (`assembly_modes`),
 and `correct_pose` follows a mode from one position to the next.
@@ -36,8 +36,8 @@ from ..core.model import Requirement
 from ..core.planar import Motion, Vec2
 from .block import minus_cofactors
 from .body import Bar, Mass
-from .group import Group, PlacedLinkage, SolvedGroup
-from .joints import GuideData, HingeData
+from .group import Group, SolvedGroup
+from .joints import JointData, LinkageInMotion
 from .legs import LEGS, Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
 SAMPLES = 20
@@ -102,12 +102,12 @@ class Triad(Group):
         return *(leg.bar for leg in self.legs), Bar(self.name, "", None, self.mass, self.points)
 
     @property
-    def joints(self) -> tuple[HingeData | GuideData, ...]:
+    def joints(self) -> tuple[JointData, ...]:
         """Its joints, the outer ones of the legs first."""
         outer, inner = zip(*(leg.joints(self.name) for leg in self.legs), strict=True)
         return *outer, *inner
 
-    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedTriad:
+    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedTriad:
         """The triad with the linkage `at` before it, on the branch that the series `derived` gives."""
         legs = self.at_position(at)
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
@@ -115,7 +115,7 @@ class Triad(Group):
             near = near._replace(theta=near.theta + self.turns * q)
         return SolvedTriad(xp, legs, correct_pose(xp, legs, near, _STEPS))
 
-    def at_position(self, at: PlacedLinkage) -> tuple[PlacedLeg, ...]:
+    def at_position(self, at: LinkageInMotion) -> tuple[PlacedLeg, ...]:
         """The legs, with the linkage `at` before them, for any pose of the ternary link."""
         return tuple(leg.at_position(k, at) for k, leg in enumerate(self.legs))
 
@@ -129,7 +129,7 @@ class Triad(Group):
         )
 
     def _followed(
-        self, xp: Any, before: Callable[[float], PlacedLinkage], angles: Sequence[float]
+        self, xp: Any, before: Callable[[float], LinkageInMotion], angles: Sequence[float]
     ) -> list[Pose]:
         """The poses at these crank angles, each from the ones before it."""
 
@@ -144,13 +144,13 @@ class Triad(Group):
             poses.append(pose(q, near))
         return poses
 
-    def turns_in_a_turn(self, xp: Any, before: Callable[[float], PlacedLinkage]) -> float:
+    def turns_in_a_turn(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> float:
         """How often the ternary link turns in a turn of the crank, see `turns`."""
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
         first, *_, last = self._followed(xp, before, angles)
         return float(round((last.theta - first.theta) / (2.0 * math.pi)))
 
-    def derive(self, xp: Any, before: Callable[[float], PlacedLinkage]) -> list[Any]:
+    def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
         the linkage before the triad at a crank angle [rad]."""
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]

@@ -15,7 +15,7 @@ from ..core.brief import briefly_shown
 from ..core.planar import Vec2
 from ..groups.driver import Driver
 from ..groups.group import Group
-from ..groups.joints import GuideData, Joint
+from ..groups.joints import Joint
 from .extremes import MotionExtreme
 
 
@@ -81,7 +81,7 @@ class Linkage:
             joints = []
             for joint in group.joints:
                 name = joint.pin, joint.link
-                carrier = guides[name] if isinstance(joint, GuideData) else carries.get(joint.pin)
+                carrier = joint.carrier(carries)
                 joints.append((name, carrier, None if carrier in own else carrier))
             for bar in bars:
                 carries |= dict.fromkeys(bar.points, bar.name)

@@ -21,8 +21,8 @@ from ..core.engines import Dual, dual, slope
 from ..core.planar import ZERO, Link, Motion, Vec2, growth
 from ..groups.body import NO_LOAD, Body, Load, body_on, reflected_inertia
 from ..groups.driver import Crank, Ram
-from ..groups.group import SolvedGroup, third_before
-from ..groups.joints import GuideForce, Joint, Slide, Third
+from ..groups.group import Group, SolvedGroup
+from ..groups.joints import Joint, Slide, Third
 from ..groups.loads import Effect, Moving, Wrench
 from .linkage import Connections, Linkage, Topology
 
@@ -53,7 +53,7 @@ class Mechanism:
         self.slides: dict[Joint, Slide] = {}
         self._groups: list[tuple[SolvedGroup, Connections]] = []
         links, pins, first = self.links, self.pins, 0
-        for group, connections in zip((linkage.driver, *linkage.groups), self.topology.groups, strict=True):
+        for group, connections in zip(self._data, self.topology.groups, strict=True):
             last = first + group.derived_count
             solved = group.solve(xp, q, self, derived[first:last])
             first = last
@@ -72,6 +72,10 @@ class Mechanism:
                     turn = links[joint[1]].t1
                     self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
 
+    @property
+    def _data(self) -> tuple[Group, ...]:
+        return self.linkage.driver, *self.linkage.groups
+
     def with_bodies(self, linkage: Linkage) -> Mechanism:
         """The same motion with the bodies and loads of another linkage of the same lengths."""
         other = copy.copy(self)
@@ -82,9 +86,8 @@ class Mechanism:
         """Third derivatives by q of each link and of each pin that is not in the ground."""
         pins: dict[str, Vec2] = {}
         thirds: dict[str, Third] = {}
-        groups = (self.linkage.driver, *self.linkage.groups)
-        for group, (solved, connections) in zip(groups, self._groups, strict=True):
-            before = [third_before(joint, self.links, thirds, pins) for joint in group.joints]
+        for group, (solved, connections) in zip(self._data, self._groups, strict=True):
+            before = [joint.third_before(self, thirds, pins) for joint in group.joints]
             links, inner = solved.third_derivatives(before)
             thirds.update(zip(connections.links, links, strict=True))
             pins.update(zip(connections.pins, inner, strict=True))
@@ -104,27 +107,10 @@ class Mechanism:
             more = barrel.u.turned() * (effort * barrel.t1)
             yield Wrench(connections.links[1], more, 0.0)
             yield Wrench(connections.links[0], -more, 0.0)
-        for _, connections in self._groups:
-            for joint, carrier, _ in connections.joints:
-                (pin, name), force = joint, reactions[joint]
-                if joint in self.slides:
-                    yield from self._guide_turn(name, carrier, force)
-                    continue
-                p1, start = self.pins[pin].p1, self.links[name].pin.p1
-                if p1 is not start:
-                    yield Wrench(name, ZERO, (p1 - start).cross(force))
-                if carrier is not None:
-                    yield Wrench(carrier, ZERO, (self.links[carrier].pin.p1 - p1).cross(force))
-
-    def _guide_turn(self, name: str, carrier: str | None, force: Vec2) -> Iterator[Wrench]:
-        """That part of the reaction of a guide: the force is normal to its line, which turns with the link."""
-        link = self.links[name]
-        more = force.turned() * link.t1
-        yield Wrench(name, more, 0.0)
-        if carrier is not None:
-            other = self.links[carrier]
-            arm, arm1 = link.pin.p - other.pin.p, link.pin.p1 - other.pin.p1
-            yield Wrench(carrier, -more, -(arm1.cross(force) + arm.cross(more)))
+        for group, (_, connections) in zip(self._data, self._groups, strict=True):
+            for joint, (name, carrier, _) in zip(group.joints, connections.joints, strict=True):
+                for link, (force, moment) in joint.turning(self, carrier, reactions[name]):
+                    yield Wrench(link, force, moment)
 
     def carrier(self, pin: str) -> str:
         """The link that carries a pin or a point."""
@@ -151,21 +137,12 @@ class Mechanism:
         acts on the links, without friction: the force pass, independent of virtual work."""
         loads = dict(acting)
         reactions: dict[Joint, Vec2] = {}
-        for solved, connections in reversed(self._groups):
+        for group, (solved, connections) in zip(reversed(self._data), reversed(self._groups), strict=True):
             forces, effort = solved.reactions([loads.get(name, NO_LOAD) for name in connections.links])
-            for (joint, _, before), force in zip(connections.joints, forces, strict=True):
-                reactions[joint] = force
+            for joint, (name, _, before), force in zip(group.joints, connections.joints, forces, strict=True):
+                reactions[name] = force
                 if before is not None:
-                    total, moment = loads.get(before, NO_LOAD)
-                    pin = self.links[before].pin.p
-                    if isinstance(force, GuideForce):
-                        at, moment = self.links[joint[1]].pin.p, moment - force.moment
-                    else:
-                        at = self.pins[joint[0]].p
-                    loads[before] = (
-                        total - force,
-                        moment - (at.x - pin.x) * force.y + (at.y - pin.y) * force.x,
-                    )
+                    add_wrenches(loads, [Wrench(before, *joint.opposite(self, before, force))])
         return effort, reactions
 
 
