@@ -149,6 +149,28 @@ def test_no_pivot_vanishes_outside_a_dead_position(angle):
     assert slider.slides[0].s1 == pytest.approx(Vec2(1.0, 2.0).dot(a))
 
 
+@pytest.mark.parametrize("along", [(1, 0), (0, 1), (-1, 0)])
+def test_whole_numbers_are_numbers(along):
+    """A rail whose components are integers gives what the same one in floats gives."""
+    at = before(np.random.default_rng(4))
+
+    def numbers(number):
+        rail = Rail(None, Vec2(number(0), number(0)), Vec2(*map(number, along)))
+        cross = Rail(None, Vec2(number(1), number(1)), Vec2(number(-along[1]), number(along[0])))
+        for group in (
+            RRP("C", Bar("a", "Q", 2.0), Bar("b", "", None), rail, "C", 1.0),
+            PRP("C", Bar("a", "", None), Bar("b", "", None), rail, cross, ("C", "C")),
+            RPP(Bar("a", "P", None), Bar("b", "", None), rail, Vec2(number(0), number(1)), ("P", "P")),
+            Ram(Bar("a", "", None), rail, "G"),
+        ):
+            placed = group.solve(MATH, 0.3, at, ())
+            forces, _ = placed.reactions([(Vec2(1.0, 2.0), 3.0)] * len(placed.links))
+            yield from (x for k in placed.links for x in (k.pin.p2.x, k.pin.p2.y, k.t2))
+            yield from (x for force in forces for x in (force.x, force.y))
+
+    assert [*numbers(int)] == pytest.approx([*numbers(float)], rel=1e-14, abs=1e-15)
+
+
 def test_a_plan_is_made_once_for_a_kind_of_group():
     _plan.cache_clear()
     for seed in range(5):

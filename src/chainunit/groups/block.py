@@ -60,7 +60,7 @@ class Block:
 
     def __init__(self, size: int, rows: list[Row]) -> None:
         self._size = size
-        pattern = [tuple([(j, x if type(x) is int else 0) for j, x in row.items()]) for row in rows]
+        pattern = [tuple([(j, x if type(x) is int else None) for j, x in row.items()]) for row in rows]
         plan = self._plan = _plan(tuple(pattern))
         self._steps = [_eliminated(rows, pivot) for pivot in plan.pivots]
         minus, self.det = minus_cofactors([[rows[i].get(j, 0) for j in plan.unknowns] for i in plan.rows])
@@ -151,9 +151,9 @@ def _add(row: Row, other: Row, factor: Any) -> None:
 
 
 @cache
-def _plan(pattern: tuple[tuple[tuple[int, int], ...], ...]) -> Plan:
-    """The plan of a system, from its coefficients that are known beforehand; 0 is one that is not."""
-    rows: list[Row] = [{j: x or math.nan for j, x in row} for row in pattern]
+def _plan(pattern: tuple[tuple[tuple[int, int | None], ...], ...]) -> Plan:
+    """The plan of a system, from its coefficients that are known beforehand; None is one that is not."""
+    rows: list[Row] = [{j: math.nan if x is None else x for j, x in row} for row in pattern]
     left, pivots = set(range(len(rows))), []
     while pivot := _next(rows, left):
         pivots.append(pivot)
