@@ -11,12 +11,12 @@ import pytest
 
 from chainunit.core.engines import MATH
 from chainunit.core.planar import ZERO, Link, Motion, Vec2
-from chainunit.groups.block import Block, _plan
+from chainunit.groups.block import GroupMatrix, _plan
 from chainunit.groups.body import Bar
 from chainunit.groups.driver import Crank, Cylinder, Ram
 from chainunit.groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from chainunit.groups.group import SolvedGroup
-from chainunit.groups.joints import UNKNOWNS, Hinge, Rail, Turn
+from chainunit.groups.joints import UNKNOWNS, CrankDrive, Hinge, Rail
 from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
 from chainunit.groups.triad import Pose, SolvedTriad
 
@@ -93,7 +93,7 @@ def test_each_group_is_solved_in_both_directions(name, seed):
     rng = np.random.default_rng(seed)
     group = solved(name, rng)
     rows, matrix, unknowns = dense(group._joints, len(group.links))
-    block = Block(UNKNOWNS * len(group.links), rows)
+    block = GroupMatrix(UNKNOWNS * len(group.links), rows)
     square = matrix[:, unknowns]
     b, c = rng.uniform(-1, 1, len(matrix)), np.zeros(UNKNOWNS * len(group.links))
     x = np.array(block.solve(b))
@@ -183,7 +183,7 @@ def test_a_joint_is_its_rows():
     """A joint of another kind, by its rows alone: it holds the ratio of two angles, as gears do, and moves and loads
     the links as the ratio says."""
 
-    class Ratio(Turn):
+    class Ratio(CrankDrive):
         def rows(self):
             return [{2: 1, UNKNOWNS + 2: -RATIO}]
 
@@ -194,7 +194,7 @@ def test_a_joint_is_its_rows():
             return next(multipliers), None
 
     rng, at = np.random.default_rng(2), before(np.random.default_rng(1))
-    joints = [Hinge(0, base=at.pins["P"]), Turn(0, 1), Hinge(1, base=at.pins["Q"]), Ratio(0, 1)]
+    joints = [Hinge(0, base=at.pins["P"]), CrankDrive(0, 1), Hinge(1, base=at.pins["Q"]), Ratio(0, 1)]
     poses = [(at.pins["P"], unit(0.0)), (at.pins["Q"], unit(1.0))]
     group = SolvedGroup(poses, joints)
     assert [k.t1 for k in group.links] == [1.0, pytest.approx(1.0 / RATIO)]

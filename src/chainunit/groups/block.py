@@ -52,7 +52,7 @@ class _Step(NamedTuple):
     turn: tuple[Any, Any]
 
 
-class Block:
+class GroupMatrix:
     """A system of `rows` for as many of the unknowns, which number `size`. `det` is the determinant of the part that
     Cramer's rule solves: 0 is a dead position. The rows are used up."""
 
@@ -123,7 +123,7 @@ def _eliminated(rows: list[Row], pivot: Pivot) -> _Step:
     rest, turn, lost = rows[i], (1, 0), []
     per = rest.pop(j)
     if k >= 0:
-        # the opposite of the sum: see `Block` on -1/x
+        # the opposite of the sum: see `GroupMatrix` on -1/x
         p, q = turn = -per, -rows[k].pop(j)
         one, other, rest = rest, rows[k], {}
         _add(rest, one, p)
@@ -174,11 +174,9 @@ def _next(rows: Sequence[Row], left: set[int]) -> Pivot | None:
         for i in column
         if rows[i][j] in (1, -1)
     ]
-    if units:
-        changes, i, j = min(units)
-        if changes <= _FEW or len(left) <= _CRAMER:
-            return Pivot(-i, j, tuple(k for k in columns[j] if k != -i))
-    for j, column in columns.items():
-        if len(left) > _CRAMER and len(column) == 2:
-            return Pivot(column[0], j, (), column[1])
-    return None
+    changes, i, j = min(units, default=(math.inf, 0, 0))
+    if len(left) > _CRAMER and changes > _FEW:
+        for unknown, column in columns.items():
+            if len(column) == 2:
+                return Pivot(column[0], unknown, (), column[1])
+    return Pivot(-i, j, tuple(k for k in columns[j] if k != -i)) if units else None

@@ -16,7 +16,7 @@ from ..core.planar import ZERO, Vec2
 from .body import Bar, Mass
 from .dyad import meeting
 from .group import Group, SolvedGroup
-from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail, Turn
+from .joints import CrankDrive, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
 
 UPWARD = Vec2(0.0, 1.0)
 
@@ -70,7 +70,7 @@ class Crank(Driver):
         bearing, start = at.pins[self.bar.pin], self.start
         c, s = xp.cos(q), xp.sin(q) * self.sense
         u = Vec2(start.x * c - start.y * s, start.y * c + start.x * s)
-        joints = Hinge(0, base=bearing), Turn(0, int(self.sense))
+        joints = Hinge(0, base=bearing), CrankDrive(0, int(self.sense))
         ends = [] if self.bar.length is None else [(0, u * self.bar.length)]
         return SolvedGroup([(bearing, u)], joints, ends=ends)
 

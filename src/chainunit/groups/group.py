@@ -11,7 +11,7 @@ from itertools import zip_longest
 from typing import Any, ClassVar
 
 from ..core.planar import ZERO, Link, Motion, Vec2
-from .block import Block
+from .block import GroupMatrix
 from .body import Bar, Load
 from .joints import UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Seat, Third
 
@@ -20,7 +20,7 @@ class SolvedGroup:
     """A group at one position: its `links` in the order of the group's bars, the `pins` that it adds, the `margin`,
     which is 0 in a dead position, and the `slides` in its sliding joints, in the order of the group's `guides`."""
 
-    __slots__ = ("_block", "_joints", "_rates", "_seats", "links", "margin", "pins", "slides")
+    __slots__ = ("_joints", "_matrix", "_rates", "_seats", "links", "margin", "pins", "slides")
 
     def __init__(
         self,
@@ -38,16 +38,18 @@ class SolvedGroup:
         ends : pins that the group adds besides those between its links
         """
         self._joints = joints
-        block = self._block = Block(UNKNOWNS * len(poses), [row for joint in joints for row in joint.rows()])
+        matrix = self._matrix = GroupMatrix(
+            UNKNOWNS * len(poses), [row for joint in joints for row in joint.rows()]
+        )
         self._rates: list[list[Any]] = []
-        self._rates += [self._next_rates()]
-        self._rates += [self._next_rates()]
+        for _ in range(2):
+            self._rates.append(self._next_rates())
         first, second = ([_rate(z, k) for k in range(len(poses))] for z in self._rates)
         self.links = tuple(
             Link(start if isinstance(start, Motion) else Motion(start, p1, p2), u, t1, t2)
             for (start, u), (p1, t1), (p2, t2) in zip(poses, first, second, strict=True)
         )
-        self.margin = block.det / size if margin is None else margin
+        self.margin = matrix.det / size if margin is None else margin
         self.slides = tuple(slide for joint in joints if (slide := joint.slide(self._rates)))
         self._seats = [*(seat for joint in joints if (seat := joint.seat)), *ends]
         self.pins = tuple(
@@ -57,7 +59,7 @@ class SolvedGroup:
     def _next_rates(self, before: Sequence[Third | None] = ()) -> list[Any]:
         """The unknowns of the next order."""
         joints = zip_longest(self._joints, before)
-        return self._block.solve([b for joint, third in joints for b in joint.right(self._rates, third)])
+        return self._matrix.solve([b for joint, third in joints for b in joint.right(self._rates, third)])
 
     def third_derivatives(self, before: Sequence[Third | None]) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """Third derivatives by q of each link and of each pin that the group adds, from those of the pins and lines
@@ -70,7 +72,7 @@ class SolvedGroup:
         """Forces in the group's joints, in their order [N], from the load of each link; that of a sliding joint is a
         `GuideForce`. Of a driver also the torque, or the force, along q that holds against the loads [N m, N]."""
         right = [x for force, moment in loads for x in (-force.x, -force.y, -moment, 0.0)]
-        multipliers = iter(self._block.solve_transposed(right))
+        multipliers = iter(self._matrix.solve_transposed(right))
         forces, efforts = zip(*(joint.force(multipliers) for joint in self._joints), strict=True)
         effort = next((effort for effort in efforts if effort is not None), None)
         return [force for force in forces if force is not None], effort

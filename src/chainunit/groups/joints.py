@@ -265,7 +265,7 @@ def _bent(e: Vec2, arm: Vec2, rates: Rates, link: int, sign: float) -> Vec2:
     return e.plus(arm.turned(), sign * (t1 * t1 * t1)).plus(arm, 3.0 * sign * (t1 * rates[1][turn]))
 
 
-class Turn(Placed):
+class CrankDrive(Placed):
     """The drive of a crank: its angle changes by `sense`, 1 or -1, with q."""
 
     __slots__ = ("_link", "_sense")
