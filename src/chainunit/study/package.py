@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, RunError, printable
+from ..core.files import scratch
 from ..core.inputs import TOML, file_text
 from ..core.model import About, Model
 from ..core.quantities import Layout
-from ..core.temporary_folders import scratch
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..fmu.script import Names

@@ -43,7 +43,7 @@ from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
-from chainunit.work.job import CHECKS, DECLARATION
+from chainunit.work.job import CHECKS
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 RUNS = 50
@@ -113,7 +113,7 @@ def vanish(process):
 def opened(folder):
     """The results in a folder."""
     (store,) = folder.glob("monte_carlo_*.nc")
-    dataset = xr.open_dataset(store).drop_vars([CHECKS, DECLARATION])
+    dataset = xr.open_dataset(store).drop_vars(CHECKS)
     return monte_carlo.MonteCarloResult(dataset.load(), store, "cs")
 
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from ...core.brief import briefly_shown
 from ...core.errors import Faults, InputError
+from ...core.files import scratch
 from ...core.inputs import JSON, file_bytes, json_of
 from ...core.quantities import Layout
-from ...core.temporary_folders import scratch
 from ...drives.terminal_signals import terminal_signals
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
