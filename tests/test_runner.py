@@ -240,7 +240,11 @@ def test_results_of_another_digest_or_declaration_are_not_mixed_in(unbroken, tmp
     [
         (1, {"fails": 32}, r"batch 2 \(point 32 to 47\) failed: ValueError\('no such point'\)"),
         (2, {"fails": 32, "slow": [48], "seconds": 60}, r"batch 2 \(point 32 to 47\) failed: ValueError"),
-        (2, {"dies": 32, "slow": [48], "seconds": 60}, r"batch [23] \(point .*\) was lost, as a worker"),
+        (
+            2,
+            {"dies": 32, "slow": [48], "seconds": 60},
+            r"batch [23] \(point .*\) was lost, as a worker ended",
+        ),
     ],
 )
 def test_a_batch_that_fails_is_named_and_the_others_are_kept(workers, wrong, words, unbroken, tmp_path):
@@ -347,7 +351,7 @@ def test_a_scheduler_with_two_workers_makes_the_same_store(unbroken, tmp_path):
         assert made.file.read_bytes() == unbroken.file.read_bytes()
         processes = {int(p.name.split("_")[1]) for p in (tmp_path / "seen").iterdir()}
         assert processes <= {process.pid for process in started[1:]}
-        with pytest.raises(RunError, match=r"batch \d+ \(point .*\) was lost, as its worker"):
+        with pytest.raises(RunError, match=r"batch \d+ \(point .*\) was lost, as a worker ended"):
             runner.run(batches.job(400, dies=144), tmp_path, quiet, scheduler=address)
     finally:
         for process in started:

@@ -308,7 +308,7 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
 def test_an_old_result_does_not_survive_a_new_run(tmp_path, done):
     (tmp_path / "out" / "result.nc").mkdir(parents=True)
     refusal = chainunit("study", "-o", "out", cwd=tmp_path)
-    assert refusal.returncode == 2 and "is not a regular file" in refusal.stderr
+    assert refusal.returncode == 2 and "out/result.nc: would be lost" in refusal.stderr
     _, out = done
     assert (out / "reactions.png").read_bytes()[:4] == b"\x89PNG"
 

@@ -182,7 +182,7 @@ FILES = [
         [(2, "no valid TOML", "[motor] is a table, and line 1 sets motor to a value; [system] has the key motor")],
     ),
     ("title = 'a", [(1, "no valid TOML", "a quotation mark is missing")]),
-    ("title =\n", [(1, "no valid TOML", "its value is missing")]),
+    ("title =\n", [(1, "no valid TOML: title =", "invalid value")]),
     ("[machine\nr = 1", [(1, "no valid TOML: [machine", "']'")]),
     (f"[machine]\nr = 1{5000 * '0'}", [(2, "no valid TOML", "more than 4300 digits")]),
     # characters that no XML has, in a text, a list, a name and a raw text

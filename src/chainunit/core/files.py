@@ -202,16 +202,8 @@ def _list_of(file: Path) -> FileList | None:
 
 
 def clear(folder: Path, *names: str) -> None:
-    """Remove the files of an earlier run; files that no run wrote stay.
-
-    Raises
-    ------
-    InputError
-        where one of the names is no file.
-    """
-    for stale in (folder / name for name in names if (folder / name).exists()):
-        if not stale.is_file():
-            raise InputError(f"{stale}: is not a regular file; name another folder")
+    """Remove the files of an earlier run; files that no run wrote stay."""
+    for stale in (folder / name for name in names if (folder / name).is_file()):
         listed = _list_of(stale)
         if listed is None or listed.has(stale):
             stale.unlink()
@@ -247,7 +239,7 @@ def claim(path: Path, *names: str) -> Iterator[Path]:
         listed = FileList(path)
         faults = Faults()
         for file in (path / name for name in dict.fromkeys(names)):
-            if file.is_file() and not listed.has(file):
+            if file.exists() and not (file.is_file() and listed.has(file)):
                 faults.add([InputError(f"{file}: would be lost, {_FOREIGN}")])
         faults.refuse()
         _lists.append(listed)

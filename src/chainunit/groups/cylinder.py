@@ -54,13 +54,11 @@ class Cylinder(Driver):
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """Pin and link of the reactions, in their order."""
         barrel, rod, lever = (bar.name for bar in self.bars)
         return (self.bar.pin, barrel), (self.guide, rod), (self.end, rod), (self.lever.pin, lever)
 
     @property
     def guides(self) -> Mapping[Joint, str | None]:
-        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {(self.guide, self.rod.name): self.bar.name}
 
     @property
@@ -116,7 +114,6 @@ class SolvedCylinder(SolvedDriver):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         barrel, _, lever = self.links
         e, r, d = self._e, self._r, barrel.u
         t1, t2, turn1, turn2 = barrel.t1, barrel.t2, lever.t1, lever.t2

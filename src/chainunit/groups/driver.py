@@ -122,7 +122,6 @@ class SolvedDriver(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (link,) = self.links
         return [(ZERO, 0.0)], [link.third_derivative(end.p - link.pin.p, ZERO, 0.0) for end in self.pins]
 

@@ -105,7 +105,6 @@ class SolvedDyad(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p, q), (first, second) = outer, self.links
         (r1, s1, x), (r2, s2, y) = (self.r1, first.t1, first.t2), (self.r2, second.t1, second.t2)
         h = p - q - r1.turned() * (s1 * s1 * s1) + r2.turned() * (s2 * s2 * s2)

@@ -116,11 +116,9 @@ class RodLeg(Leg):
 
     @property
     def joints(self) -> tuple[Joint, Joint]:
-        """Pin and link of the outer and of the inner reaction."""
         return (self.bar.pin, self.bar.name), (self.pin, self.bar.name)
 
     def at_position(self, at: PlacedLinkage) -> PlacedLeg:
-        """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         return partial(RodAt, at.pins[self.bar.pin], self.bar.length, self.arm)
 
 
@@ -144,20 +142,16 @@ class RodAt(LegAt):
         self._per_square = 1.0 / square
 
     def misfit(self, xp: Any) -> Any:
-        """The size of the gap, in parts of the length, or of the unit for a block [1]."""
         return xp.abs(xp.sqrt(self._r.squared()) / self.size - 1.0)
 
     def first(self) -> Any:
-        """Right side for the first derivatives of the pose."""
         return self._r.dot(self._outer.p1)
 
     def second(self, origin1: Vec2, t1: Any) -> Any:
-        """Right side for the second derivatives of the pose, from the first derivatives."""
         a, p = self.spot, self._outer
         return self._r.dot(p.p2 + a * (t1 * t1)) - (origin1 + a.turned() * t1 - p.p1).squared()
 
     def third_right_side(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         a, p, t1 = self.spot, self._outer, ternary.t1
         k = ternary.carried(a)
         centripetal = 3.0 * (k.p1 - p.p1).dot(k.p2 - p.p2)
@@ -166,14 +160,12 @@ class RodAt(LegAt):
         )
 
     def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
         end = ternary.third_derivative(self.spot, *ternary_third)
         p, k = self._outer, ternary.carried(self.spot)
         t1 = self._r.cross(k.p1 - p.p1) * self._per_square
         return (outer[0], self._r.cross(end - outer[0]) * self._per_square + t1 * t1 * t1), end
 
     def solution(self, ternary: Link) -> SolvedLeg:
-        """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, k, r = self._outer, ternary.carried(self.spot), self._r
         k = Motion(p.p + r, k.p1, k.p2)
         rates = rod_rates(r, k.p1 - p.p1, k.p2 - p.p2, self._per_square)
@@ -185,7 +177,6 @@ class RodAt(LegAt):
         return across, self.spot.cross(across)
 
     def reactions(self, load: Load, known: Vec2, pull: Any) -> tuple[Vec2, Vec2]:
-        """Outer and inner reaction [N], from the known part of the inner one and the factor of the row."""
         inner = known + self._r * pull
         return -(load[0] + inner), inner
 
@@ -213,7 +204,6 @@ class BlockLeg(Leg):
 
     @property
     def joints(self) -> tuple[Joint, Joint]:
-        """Pin and link of the outer and of the inner reaction."""
         return (self.guide, self.bar.name), (self.pin, self.bar.name)
 
     @property
@@ -222,7 +212,6 @@ class BlockLeg(Leg):
         return self.on
 
     def at_position(self, at: PlacedLinkage) -> PlacedLeg:
-        """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         return partial(BlockAt, self.on.at_position(at.links), self.arm)
 
 
@@ -241,15 +230,12 @@ class BlockAt(LegAt):
         self.gap = -self._way.dot(n)
 
     def misfit(self, xp: Any) -> Any:
-        """The size of the gap, in parts of the length, or of the unit for a block [1]."""
         return xp.abs(self.gap)
 
     def first(self) -> Any:
-        """Right side for the first derivatives of the pose."""
         return self._rail.carried(self._way).p1.dot(self._n)
 
     def second(self, origin1: Vec2, t1: Any) -> Any:
-        """Right side for the second derivatives of the pose, from the first derivatives."""
         a, rail, carried = self.spot, self._rail, self._rail.carried(self._way)
         rate = (origin1 + a.turned() * t1 - carried.p1).dot(rail.u)
         return (coriolis(rail, carried, rail.u * rate) + a * (t1 * t1)).dot(self._n)
@@ -262,19 +248,16 @@ class BlockAt(LegAt):
         return Slide(rail.u, self._way.dot(rail.u), s1, s2)
 
     def third_right_side(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         a, t1, slide, rail = self.spot, ternary.t1, self._slide(ternary), self._rail
         carried = rail.third_derivative(self._way, *outer)
         moved = coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
         return (moved + a.turned() * (t1 * t1 * t1) + a * (3.0 * (t1 * ternary.t2))).dot(self._n)
 
     def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
         end = ternary.third_derivative(self.spot, *ternary_third)
         return (end, outer[1]), end
 
     def solution(self, ternary: Link) -> SolvedLeg:
-        """The leg as a link, its inner pin, and the motion in its sliding joint."""
         k, rail = ternary.carried(self.spot), self._rail
         return SolvedLeg(Link(k, rail.u, rail.t1, rail.t2), k, self._slide(ternary))
 
@@ -284,7 +267,6 @@ class BlockAt(LegAt):
         return along, self.spot.cross(along)
 
     def reactions(self, load: Load, known: Vec2, pull: Any) -> tuple[Vec2, Vec2]:
-        """Outer and inner reaction [N], from the known part of the inner one and the factor of the row."""
         (force, moment), n = load, self._n
         inner = known + n * pull
         return GuideForce.along(n, -(force + inner).dot(n), -moment), inner
@@ -303,11 +285,9 @@ class SlotLeg(Leg):
 
     @property
     def joints(self) -> tuple[Joint, Joint]:
-        """Pin and link of the outer and of the inner reaction."""
         return (self.bar.pin, self.bar.name), (self.guide, self.bar.name)
 
     def at_position(self, at: PlacedLinkage) -> PlacedLeg:
-        """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         return partial(SlotAt, at.pins[self.bar.pin], self.at, self.along)
 
 
@@ -327,31 +307,25 @@ class SlotAt(LegAt):
         self.gap = (y - self.spot).dot(n)
 
     def misfit(self, xp: Any) -> Any:
-        """The size of the gap, in parts of the length, or of the unit for a block [1]."""
         return xp.abs(self.gap)
 
     def first(self) -> Any:
-        """Right side for the first derivatives of the pose."""
         return self._outer.p1.dot(self._n)
 
     def second(self, origin1: Vec2, t1: Any) -> Any:
-        """Right side for the second derivatives of the pose, from the first derivatives."""
         y1 = self._outer.p1 - origin1
         return self._outer.p2.dot(self._n) - 2.0 * (t1 * y1.dot(self._d)) - t1 * t1 * self._y.dot(self._n)
 
     def third_right_side(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         d, n, y, t1, t2 = self._d, self._n, self._y, ternary.t1, ternary.t2
         y1, y2 = self._outer.p1 - ternary.pin.p1, self._outer.p2 - ternary.pin.p2
         rest = t1 * y2.dot(d) + t2 * y1.dot(d) + t1 * t1 * y1.dot(n) + t1 * t2 * y.dot(n)
         return outer[0].dot(n) - 3.0 * rest + t1 * t1 * t1 * y.dot(d)
 
     def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
         return (outer[0], ternary_third[1]), None
 
     def solution(self, ternary: Link) -> SolvedLeg:
-        """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, d = self._outer, self._d
         carried = ternary.carried(self._y)
         s1 = (p.p1 - carried.p1).dot(d)
@@ -364,7 +338,6 @@ class SlotAt(LegAt):
         return ZERO, -load[1]
 
     def reactions(self, load: Load, known: Vec2, pull: Any) -> tuple[Vec2, Vec2]:
-        """Outer and inner reaction [N], from the known part of the inner one and the factor of the row."""
         force, moment = load
         inner = GuideForce.along(self._n, pull, -moment)
         return -(force + inner), inner

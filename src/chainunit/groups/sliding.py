@@ -40,7 +40,6 @@ class RRP(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """The links of the group, in order."""
         return self.first, self.slider
 
     @property
@@ -50,22 +49,18 @@ class RRP(Group):
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of the reactions, in their order."""
         first, slider = self.first.name, self.slider.name
         return (self.first.pin, first), (self.inner, first), (self.guide, slider)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {(self.guide, self.slider.name): self.rail.of}
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """The lines of earlier links on which the group slides."""
         return (self.rail,)
 
     def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedRRP:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRRP.between(
             xp, at.pins[self.first.pin], self.rail.at_position(at.links), self.first.length, self.side
         )
@@ -114,7 +109,6 @@ class SolvedRRP(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p,), ((base, t3),), (rod, slider), rail = outer, rails, self.links, self._rail
         (slide,), inner = self.slides, slider.pin
         r, r1, r2 = inner.p - rod.pin.p, inner.p1 - rod.pin.p1, inner.p2 - rod.pin.p2
@@ -158,7 +152,6 @@ class RPR(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """The links of the group, in order."""
         return self.first, self.second
 
     @property
@@ -168,17 +161,14 @@ class RPR(Group):
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of the reactions, in their order."""
         first, second = self.first, self.second
         return (first.pin, first.name), (self.guide, first.name), (second.pin, second.name)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {(self.guide, self.first.name): self.second.name}
 
     def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedRPR:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRPR.between(
             xp, at.pins[self.first.pin], at.pins[self.second.pin], self.offset, self.side
         )
@@ -221,7 +211,6 @@ class SolvedRPR(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p, q), (slide,), (link, _) = outer, self.slides, self.links
         n, t1, t2 = slide.d.turned(), link.t1, link.t2
         # the part along n of v''' = (t3 - t1^3) (L n - offset d) - 3 t1 t2 v + 3 t2 L' n - 3 t1^2 L' d

@@ -144,7 +144,6 @@ class Triad(Group):
 
     @property
     def guides(self) -> Mapping[Joint, str | None]:
-        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {
             leg.joints[0] if leg.rail else leg.joints[1]: leg.rail.of if leg.rail else self.name
             for leg in self.legs
@@ -153,7 +152,6 @@ class Triad(Group):
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """The lines of earlier links on which the group slides."""
         return tuple(leg.rail for leg in self.legs if leg.rail)
 
     def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedTriad:
@@ -315,7 +313,6 @@ class SolvedTriad(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         *_, ternary = self.links
         starts, lines = iter(outer), iter(rails)
         before = [next(lines) if leg.on_rail else (next(starts), 0.0) for leg in self.legs]

@@ -29,7 +29,6 @@ class PRP(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """The links of the group, in order."""
         return self.first, self.second
 
     @property
@@ -39,23 +38,19 @@ class PRP(Group):
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of the reactions, in their order."""
         first, second = self.first.name, self.second.name
         return (self.guides_at[0], first), (self.inner, first), (self.guides_at[1], second)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         first, _, second = self.joints
         return {first: self.first_rail.of, second: self.second_rail.of}
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """The lines of earlier links on which the group slides."""
         return self.first_rail, self.second_rail
 
     def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedPRP:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedPRP.between(
             self.first_rail.at_position(at.links), self.second_rail.at_position(at.links)
         )
@@ -96,7 +91,6 @@ class SolvedPRP(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (a, b, per), (one, other), (inner,) = self._rails, self.slides, self.pins
         most = []
         for rail, slide, (base, t3) in ((a, one, rails[0]), (b, other, rails[1])):
@@ -140,7 +134,6 @@ class RPP(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """The links of the group, in order."""
         return self.block, self.yoke
 
     @property
@@ -150,23 +143,19 @@ class RPP(Group):
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of the reactions, in their order."""
         block, yoke = self.block, self.yoke
         return (block.pin, block.name), (self.guides_at[0], block.name), (self.guides_at[1], yoke.name)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         _, slot, rail = self.joints
         return {slot: self.yoke.name, rail: self.rail.of}
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """The lines of earlier links on which the group slides."""
         return (self.rail,)
 
     def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedRPP:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRPP.between(at.pins[self.block.pin], self.rail.at_position(at.links), self.slot)
 
 
@@ -210,7 +199,6 @@ class SolvedRPP(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p,), ((base, t3),), rail, (slot, way) = outer, rails, self._rail, self.slides
         block, yoke = self.links
         d, e = way.d, slot.d

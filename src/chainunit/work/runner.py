@@ -17,11 +17,11 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from concurrent import futures
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any
 
 from .. import __version__
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
@@ -30,7 +30,9 @@ from ..core.files import scratch
 from .job import BatchStore, Job
 from .progress import TaskProgress
 
-Future: TypeAlias = "futures.Future[Any]"
+_Hands = tuple[Callable[[int, int], Future], Callable[[], int]]
+"""Those who make batches: the function that gives them the points from one number to another, and the number of
+batches that they may have."""
 PATIENCE = 3.0
 """Time in which a scheduler and its workers must answer [s]."""
 
@@ -66,21 +68,24 @@ def run(
     gaps = store.missing(lambda complete: progress(job.title, complete, job.points))
     complete = store.earlier_points
     workers = min(workers or os.cpu_count() or 1, len(gaps))
-    hands: contextlib.AbstractContextManager[_Team]
+    team: contextlib.AbstractContextManager[_Hands]
     if not gaps or (scheduler is None and workers == 1):
-        hands = contextlib.nullcontext(_Team(partial(_made_here, job), lambda: 1))
+        team = contextlib.nullcontext((partial(_made_here, job), lambda: 1))
     else:
-        hands = _processes(job, workers) if scheduler is None else _cluster(job, scheduler)
+        team = _processes(job, workers) if scheduler is None else _cluster(job, scheduler)
     try:
-        with hands as team:
-            for batch, future in _finished(store, gaps, team):
+        with team as hands:
+            for batch, future in _finished(store, gaps, hands):
                 try:
                     results = future.result()
                 except InterruptedRunError:
                     raise
                 except Exception as error:
                     begin, end = store.extent(batch)
-                    words = team.loss if isinstance(error, team.lost) else _failure(error)
+                    words = str(error)
+                    if not isinstance(error, RunError):
+                        cause = printable(words or type(error).__name__, 300)
+                        words = f"was lost, as a worker ended ({cause})"
                     raise RunError(
                         f"{job.title}: batch {batch} ({job.dimension} {begin} to {end - 1}) {words}; {complete} of "
                         f"{job.points} are in {store.file}: run it again to go on"
@@ -94,46 +99,35 @@ def run(
     return store
 
 
-class _Team(NamedTuple):
-    """Those who make batches."""
-
-    submit: Callable[[int, int], Future]
-    """hands out the points from one number to another"""
-    count: Callable[[], int]
-    """number of batches that may be handed out"""
-    lost: tuple[type[Exception], ...] = ()
-    """the errors of a batch whose worker has ended"""
-    loss: str = ""
-    """words on these"""
-
-
-def _finished(store: BatchStore, gaps: list[int], team: _Team) -> Iterator[tuple[int, Future]]:
+def _finished(store: BatchStore, gaps: list[int], hands: _Hands) -> Iterator[tuple[int, Future]]:
     """The batches in the order in which they are finished."""
-    waiting, batch_of = iter(gaps), dict[Future, int]()
+    (submit, room), waiting, batch_of = hands, iter(gaps), dict[Future, int]()
     while True:
-        while len(batch_of) < team.count() and (batch := next(waiting, None)) is not None:
-            batch_of[team.submit(*store.extent(batch))] = batch
+        while len(batch_of) < room() and (batch := next(waiting, None)) is not None:
+            batch_of[submit(*store.extent(batch))] = batch
         if not batch_of:
             return
-        done = futures.wait(batch_of, return_when=futures.FIRST_COMPLETED).done
+        done = wait(batch_of, return_when=FIRST_COMPLETED).done
         for future in sorted(done, key=batch_of.__getitem__):
             yield batch_of.pop(future), future
 
 
-class _BatchError(RunError):
-    """A batch failed in its worker; an error of a library need not survive the way between processes."""
-
-
-def _failure(error: Exception) -> str:
-    words = str(error) if isinstance(error, RunError | InputError) else repr(error)
-    return words if isinstance(error, _BatchError) else f"failed: {printable(words, 500)}"
+def _results(work: Any, task: Any, begin: int, end: int) -> Any:
+    try:
+        return work(task, begin, end)
+    except InterruptedRunError:
+        raise
+    except Exception as error:
+        # an error of a library need not survive the way between processes
+        words = str(error) if isinstance(error, RunError | InputError) else repr(error)
+        raise RunError(f"failed: {printable(words, 500)}") from error
 
 
 def _made_here(job: Job, begin: int, end: int) -> Future:
-    future: Future = futures.Future()
+    future: Future = Future()
     try:
-        future.set_result(job.work(job.task, begin, end))
-    except Exception as error:
+        future.set_result(_results(job.work, job.task, begin, end))
+    except RunError as error:
         future.set_exception(error)
     return future
 
@@ -146,26 +140,22 @@ _unpacked = lru_cache(maxsize=1)(pickle.loads)
 
 def _made(version: str, parcel: bytes, begin: int, end: int) -> Any:
     """Make a batch in a worker."""
+    if version != __version__:
+        raise RunError(f"failed: the worker has chainunit {__version__}, and must have {version}")
     with _at_work:
-        if version != __version__:
-            raise RunError(f"the worker has chainunit {__version__}, and must have {version}")
         work, task = _unpacked(parcel)
-        try:
-            return work(task, begin, end)
-        except InterruptedRunError:
-            raise
-        except Exception as error:
-            raise _BatchError(_failure(error)) from error
+        return _results(work, task, begin, end)
 
 
 @contextmanager
-def _processes(job: Job, workers: int) -> Iterator[_Team]:
+def _processes(job: Job, workers: int) -> Iterator[_Hands]:
     """Local processes. Each ends with the pipe, which closes at the end of the work, after Ctrl-C, and at a kill of
     this process; their temporary folders lie in one that goes then, too."""
     context = multiprocessing.get_context("spawn")
     end, wire = context.Pipe(duplex=False)
+    parcel = pickle.dumps((job.work, job.task))
     with scratch() as place, end:
-        pool = futures.ProcessPoolExecutor(workers, context, _begin, (end, str(place)))
+        pool = ProcessPoolExecutor(workers, context, _begin, (end, str(place)))
         try:
             try:
                 for begun in [pool.submit(os.getpid) for _ in range(workers)]:
@@ -175,10 +165,8 @@ def _processes(job: Job, workers: int) -> Iterator[_Team]:
                     f"the local processes cannot be started ({printable(str(error))}); a script must have its calls "
                     'below if __name__ == "__main__":'
                 ) from error
-            submit = partial(pool.submit, _made, __version__, pickle.dumps((job.work, job.task)))
-            words = "was lost, as a worker process ended"
             # one batch waits for the first worker that is free
-            yield _Team(submit, lambda: workers + 1, (futures.BrokenExecutor,), words)
+            yield lambda *extent: pool.submit(_made, __version__, parcel, *extent), lambda: workers + 1
         finally:
             wire.close()
             pool.shutdown()
@@ -200,20 +188,16 @@ def _begin(end: Any, place: str) -> None:
 
 
 @contextmanager
-def _cluster(job: Job, scheduler: str) -> Iterator[_Team]:
+def _cluster(job: Job, scheduler: str) -> Iterator[_Hands]:
     """The workers of a scheduler, by the extra of this name."""
     check_scheduler(scheduler)
     with _silent():
         from distributed import Client
-        from distributed.scheduler import KilledWorker
 
         with Client(scheduler, timeout=PATIENCE, set_as_default=False) as client:
-            parcel = client.scatter(pickle.dumps((job.work, job.task)), broadcast=True, hash=False)
-            submit = partial(client.get_executor(pure=False).submit, _made, __version__, parcel)
-            # a worker that held the data of a batch cancels it, too, when it ends
-            lost = (KilledWorker, futures.CancelledError)
-            words = f"was lost, as its worker or the scheduler {printable(scheduler)} ended"
-            yield _Team(submit, lambda: max(1, len(client.nthreads())), lost, words)
+            sent = client.scatter(pickle.dumps((job.work, job.task)), broadcast=True, hash=False)
+            submit = partial(client.get_executor(pure=False).submit, _made, __version__, sent)
+            yield submit, lambda: max(1, len(client.nthreads()))
 
 
 @contextmanager
@@ -256,7 +240,7 @@ def check_scheduler(scheduler: str) -> None:
         return await asyncio.wait_for(ask(), PATIENCE)
 
     address, answer = printable(scheduler), {}
-    with _silent(), contextlib.suppress(Exception), futures.ThreadPoolExecutor(1) as thread:
+    with _silent(), contextlib.suppress(Exception), ThreadPoolExecutor(1) as thread:
         # in a thread, as the caller may have a loop that runs, such as that of a notebook
         answer = thread.submit(lambda: asyncio.run(ask_in_time())).result()
     if answer.get("type") != "Scheduler":
