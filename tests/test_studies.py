@@ -100,7 +100,7 @@ def test_a_file_that_cannot_be_written_is_a_public_error(result, tmp_path, monke
 
     folder = tmp_path / "out"
     folder.mkdir()
-    monkeypatch.setattr("chainunit.core.files.os.replace", full)
+    monkeypatch.setattr("os.replace", full)
     with pytest.raises(WriteError, match="No space left"):
         result.save(folder)
 

@@ -226,14 +226,16 @@ def claim(path: Path, *names: str) -> Iterator[Path]:
     is_new, is_left = not path.exists(), False
     lock = FileLock(folder(path) / LOCK)
     try:
-        with contextlib.suppress(OSError):  # no locks there; a Timeout is one, too
-            try:
-                lock.acquire(blocking=False)
-            except Timeout as error:
-                raise InputError(
-                    f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder "
-                    "with -o"
-                ) from error
+        try:
+            lock.acquire(blocking=False)
+        except Timeout as error:
+            raise InputError(
+                f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder with -o"
+            ) from error
+        except PermissionError:
+            raise
+        except (OSError, NotImplementedError):  # a file system without locks
+            pass
         for part in filter(lambda file: _PART.fullmatch(file.name), path.iterdir()):
             part.unlink()
         listed = FileList(path)
