@@ -410,7 +410,7 @@ def test_processes_leave_nothing_behind(end, tmp_path):
     scratch.mkdir()
     running = start(tmp_path, 18 if end is None else 10_000, env=os.environ | {"TMPDIR": str(scratch)})
     if end is not None:
-        while not finished(tmp_path) or len(list(scratch.glob("chainunit*"))) < 4:
+        while not finished(tmp_path) or len(list(scratch.rglob("chainunit_fmu_*"))) < 4:
             assert running.poll() is None
             time.sleep(0.02)
         os.killpg(running.pid, end)
