@@ -160,14 +160,15 @@ class FileList:
     def __init__(self, folder: Path) -> None:
         self.folder = folder.absolute()
         self._file, self._lines = self.folder / LIST, set[str]()
-        # a pipe would be waited for, and a link may lead anywhere
         if self._file.exists() or self._file.is_symlink():
+            # a pipe would be waited for, and a link may lead anywhere
             content = None if self._file.is_symlink() else regular_bytes(self._file)
-            self._lines |= set((content or b"?").decode(errors="replace").splitlines())
-        if not all(map(_LINE.fullmatch, self._lines)):
-            raise InputError(
-                f"{self._file}: is no list of files of chainunit; move it, or name another folder"
-            )
+            self._lines.update((content or b"").decode(errors="replace").split("\n"))
+            self._lines.discard("")
+            if content is None or not all(map(_LINE.fullmatch, self._lines)):
+                raise InputError(
+                    f"{self._file}: is no list of files of chainunit; move it, or name another folder"
+                )
 
     def _line(self, file: Path, content: Path) -> str:
         return f"{digest(content)}  {file.absolute().relative_to(self.folder).as_posix()}"
