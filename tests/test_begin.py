@@ -18,7 +18,7 @@ from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.measures import STARTED
 from chainunit.study.run import run_study
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 DIP = event_line("dip", turns=1)
 LINE = """

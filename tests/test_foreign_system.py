@@ -40,7 +40,7 @@ from chainunit.system import (
 )
 from chainunit.system.graph import FmuComponent
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 SCRIPT = Path(__file__).parent / "foreign_motor.py"
 OTHER = MappingProxyType({"w": "rotor_speed", "phi": "rotor_angle", "load.J": "inertia_behind"})

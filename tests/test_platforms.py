@@ -25,7 +25,7 @@ from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import PLATFORMS
 from chainunit.models import MODELS
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 here = pytest.mark.skipif(platforms.host() != "linux64", reason="run on 64-bit Linux")
 zig = pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")
@@ -181,7 +181,6 @@ def run_foreign(tmp_path, name, fmi, target, library_folder, runner):
 
 
 @zig
-@pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "folder"), [(2, "win64"), (3, "x86_64-windows")])
 def test_windows_library_runs_under_wine(tmp_path, fmi, folder):
     wine = shutil.which("wine64") or shutil.which("wine64", path="/usr/lib/wine")
@@ -191,7 +190,6 @@ def test_windows_library_runs_under_wine(tmp_path, fmi, folder):
 
 
 @zig
-@pytest.mark.slow
 def test_arm_library_runs_under_qemu(tmp_path):
     qemu, root = shutil.which("qemu-aarch64"), Path("/usr/aarch64-linux-gnu")
     if qemu is None or not root.exists():

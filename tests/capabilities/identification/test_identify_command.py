@@ -29,7 +29,7 @@ from chainunit.study import config as study_files
 from chainunit.study.choice import choose
 from chainunit.system import Profile
 
-pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 FILE = """
 title = "A mill"
 [motor]

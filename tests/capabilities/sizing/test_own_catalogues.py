@@ -40,7 +40,7 @@ from chainunit.study.config import load, parse
 from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "own_catalogue.toml"
 
@@ -224,7 +224,6 @@ def test_the_thermal_rating_takes_the_power_of_either_direction(tmp_path, monkey
     assert checks["gear_speed"].utilisation == pytest.approx(150.0 / 6000.0)
 
 
-@pytest.mark.second
 def test_with_bearings_of_its_own_the_crank_does_not_load_the_gear(tmp_path):
     text = MACHINE.replace("candidates = 1", "candidates = 1\nseparate_bearing = true")
     weak = GEARS.replace("3000,6000,200", "3000,60,200").replace("6000,9000", "6000,90")
@@ -234,7 +233,6 @@ def test_with_bearings_of_its_own_the_crank_does_not_load_the_gear(tmp_path):
     assert chosen.drive.gear_rating == dataclasses.replace(chosen.sold.rating, overhung_load=0.0)
 
 
-@pytest.mark.second
 def test_an_overhung_load_beyond_the_permitted_one_rejects_a_gear(tmp_path):
     (tmp_path / "a").mkdir()
     weak = GEARS.replace("3000,6000,200", "3000,60,200")
@@ -330,7 +328,6 @@ def test_only_own_motors_need_some(tmp_path):
         sized_by(config, tmp_path)
 
 
-@pytest.mark.second
 def test_the_frequency_of_the_supply_chooses_the_motors(tmp_path):
     """All motors that are tried have it, their supply follows, and so does the ratio."""
     found = {}
@@ -372,7 +369,6 @@ def test_the_cheapest_coupling_that_can_be_set_so_is_taken(tmp_path):
     assert coupling_for(couplings, 70.0, 150.0) is None
 
 
-@pytest.mark.second
 def test_the_example_ends_in_a_list_of_parts(tmp_path):
     """Order number and price stand on the terminal, on the page, on the sheet's answer, in result.json and in the
     candidates as CSV."""
@@ -427,7 +423,6 @@ def test_no_cell_of_a_csv_is_a_formula():
     assert {(each["title"], each["value"]) for each in rows} == {("a-b", "-3.0")}
 
 
-@pytest.mark.second
 def test_a_gear_that_an_overload_breaks_is_told_with_a_stronger_one(tmp_path):
     text = EXAMPLE.read_text("utf-8")
     line = next(each for each in text.splitlines() if each.startswith("gear_torque"))
