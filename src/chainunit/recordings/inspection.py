@@ -145,11 +145,38 @@ def inspect_motion(
     off : the time at which the motor is switched off [s]
     """
     driven = recording if off is None else recording.part(end=off)
+    faults = _faults_of_motion(recording, driven, speeds, ratio)
+    other = _other_speed(driven, speeds, ratio) if faults else None
+    # at another speed the rows are too few or too many, and the machine seems to stand
+    return faults if other is None else [other[0], *_faults_of_motion(recording, driven, (other[1],) * 2, ratio)]
+
+
+def _faults_of_motion(
+    recording: Recording, driven: Recording, speeds: tuple[float, float], ratio: float
+) -> list[InputError]:
     return [
         *_rows(recording, speeds[1]),
         *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
         *_counted(recording),
     ]
+
+
+def _other_speed(
+    recording: Recording, speeds: tuple[float, float], ratio: float
+) -> tuple[InputError, float] | None:
+    """The fault that the stated speed is another one than that of the recording, and the speed of the recording
+    [rad/s]: by the mark, the encoder or the measured speed, if they agree; one of them alone if a column repeats at
+    this speed. None if the stated speed may be right, and if it changes."""
+    named = {name for name in ("mark", "motor.count", speed_column(recording)) if name in recording.columns}
+    alone = {name: replace(recording, columns={name: recording.columns[name]}) for name in sorted(named)}
+    seen = {name: mean_speed(RecordedRun("", part, 0.0), ratio) for name, part in alone.items()}
+    seen = {name: speed for name, speed in seen.items() if speed > 0.0}
+    if not seen or speeds[0] < speeds[1] or max(seen.values()) > SAME * min(seen.values()):
+        return None
+    name, speed = min(seen.items(), key=lambda item: ("mark", "motor.count").count(item[0]) == 0)
+    if speeds[0] / SAME < speed < SAME * speeds[0]:
+        return None
+    return None
 
 
 MOST_DROOP = 0.1

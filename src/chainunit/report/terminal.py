@@ -141,7 +141,7 @@ def _fitted(block: Block, console: Console, units: Units, room: int) -> str:
 def _first_rows(
     table: Table, console: Console, units: Units, size: Callable[[str], int], room: int, fewest: int = 1
 ) -> str:
-    """A table as the console prints it, with as many of its first rows as have room: the `size` of the text is at most
+    """A table as the console prints it, with as many of its first rows as have room: the `size` of the text is up to
     `room`, and a row adds 1 to it at least. Empty if less than `fewest` rows, or than all, have room."""
     rows = [row for row in table.rows if row.form != "long"]
     low, high, best = min(fewest, len(rows)) - 1, min(len(rows), room), ""

@@ -10,12 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.brief import briefly_shown
-from ...core.errors import Faults, InputError
+from ...core.errors import Faults, InputError, InterruptedRunError
 from ...drives.induction_motor import InductionMotor
 from ...recordings.fit import MOST_ROUNDS, Fit, fit
-from ...recordings.inspection import (
-    inspect_runs,
-)
+from ...recordings.inspection import inspect_runs
 from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_offset
 from ...recordings.problem import Comparison, Problem, RecordedRun, Sensor
 from ...recordings.recorded_drive import check_motor_is_known, is_of_shaft, plant_for
@@ -38,7 +36,7 @@ from ...work.progress import TaskProgress, quiet
 from .information import Combination, Information, information
 from .posterior import Posterior, posterior
 from .reading import IdentificationPlan, PlannedRun
-from .suspects import KnownNumbers, known_number_tests, suspect_sets
+from .suspects import KnownNumbers, is_described, known_number_tests, suspect_sets
 
 CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
 """Gains of the control of a motor, of which the course of its current depends."""
@@ -85,6 +83,7 @@ class IdentifiedMachine:
     `information_at_start` is the information of the runs at the start values, with further runs in order;
     `information_at_fit` the same at the fitted values. `best` are the normal equations there, `posterior` is the
     distribution of the sought numbers around them, and `known` has the tests of known numbers with the suspects.
+    There is a `failure` if the search for suspects was interrupted.
     """
 
     config: Config
@@ -96,6 +95,7 @@ class IdentifiedMachine:
     information_at_fit: Information
     residual_tests: tuple[ResidualTest, ...]
     known: KnownNumbers
+    failure: InterruptedRunError | None = None
 
     @property
     def estimates(self) -> dict[str, FittedNumber]:
@@ -130,11 +130,8 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the fit ended, the residuals may be noise, clocks, sensors and known numbers are as they are known,
-        and no bound is active."""
-        if not self.best.is_ended or self.prior_conflicts or self.posterior.active_bounds:
-            return False
-        return not self.known.are_rejected and all(test.is_noise for test in self.residual_tests)
+        """Whether the model describes the recordings, see `suspects.is_described`."""
+        return is_described(self.problem, self.best, self.residual_tests, self.posterior, self.known)
 
     @property
     def prior_conflicts(self) -> list[PriorConflict]:
@@ -227,14 +224,13 @@ def identify(
     machine = IdentifiedMachine(config, plan, problem, before, best, around, after, residuals, known)
     if machine.is_described:
         return machine
-    sets = suspect_sets(
-        problem,
-        best,
-        workers,
-        tuned_gains(config.motor, config.file.given),
-        lambda names: progress(f"other {names}", 0.97, 1.0),
-    )
-    return replace(machine, known=replace(known, sets=sets))
+    assumed = tuned_gains(config.motor, config.file.given)
+    try:
+        return replace(
+            machine, known=replace(known, sets=suspect_sets(problem, best, workers, assumed, progress))
+        )
+    except KeyboardInterrupt:
+        return replace(machine, failure=InterruptedRunError("the search for suspects was interrupted"))
 
 
 def tuned_gains(motor: Any, keys: Set[str]) -> list[str]:

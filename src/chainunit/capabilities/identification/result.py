@@ -164,7 +164,11 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
     return IdentificationSummary(
         heading=Heading.of(machine.config.title, machine.config.file),
         is_described=machine.is_described,
-        status="complete" if machine.is_described else "the model does not describe the recordings",
+        status=(
+            "complete"
+            if machine.is_described
+            else f"the model does not describe the recordings{f'; {machine.failure}' if machine.failure else ''}"
+        ),
         sought=len(estimates),
         told=sum(each.is_determined for each in estimates.values()),
         runs={run.name: _run(machine, k) for k, run in enumerate(machine.plan.runs)},
@@ -314,10 +318,12 @@ def sentences(machine: IdentifiedMachine) -> list[str]:
             f"with residuals of {size:.2g} times its noise; check the unit and the sign of this column, crank_speed "
             "and the gear ratio"
         )
+    is_explained = any(suspects.describes for suspects in machine.known.sets)
     words += [
-        f"{each}: the model does not describe the recordings; check the gear ratio, the units of the columns and the "
-        "data of the sensors"
-        for each in machine.prior_conflicts
+        f"{conflict}: the model does not describe the recordings; check the gear ratio, the units of the columns and "
+        "the data of the sensors"
+        for conflict in machine.prior_conflicts
+        if not is_explained
     ]
     words += [
         f"{name} = {each.fitted:.4g}{unit_behind(each.unknown.unit)} lies at its {each.at_bound} bound"
@@ -327,7 +333,8 @@ def sentences(machine: IdentifiedMachine) -> list[str]:
         if each.at_bound
     ]
     words += _on_known_numbers(machine.known)
-    is_explained = any(each.describes for each in machine.known.sets)
+    if machine.failure is not None:
+        words.append(f"{str(machine.failure).capitalize()}, and none are named; identify again to name them")
     for check in machine.residual_tests:
         unit = MEASURANDS[check.column].unit
         place = f"{check.column} of the run {check.run}"

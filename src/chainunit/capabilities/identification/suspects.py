@@ -28,8 +28,10 @@ from ...reading.results import OWN, part, result
 from ...recordings.fit import Fit, NormalEquations, assemble, fit
 from ...recordings.plant import AnyPlant
 from ...recordings.problem import OUTLIER, Comparison, Problem
-from ...recordings.residuals import prior_conflicts, residual_tests, sensor_conflicts
+from ...recordings.residuals import ResidualTest, describes, residual_tests
 from ...recordings.unknown import Unknown
+from ...work.progress import TaskProgress, quiet
+from .posterior import Posterior
 
 LAW, OTHER_LAWS = "machine.pin.w_smooth", (10.0, 2.0, 1.1)
 """The number by which the law of friction is another one, and factors on it for friction that grows with speed."""
@@ -46,19 +48,19 @@ WRONG, ASSUMED = 0.2, 1.0
 RANGE = 4.0
 """Factor by which a known number may be wrong."""
 FEW, SEARCHES = 3, 3
-"""Number of sets of suspects with which the recordings are fitted again in a search, and most searches."""
+"""Number of sets of suspects with which the recordings are fitted again around a fit, and most fits around which the
+known numbers are freed to find such sets."""
 MOST_ROUNDS = 15
 """Most rounds of a fit with suspects: it begins near its end if they are the right ones."""
 MARGIN = 25.0
 """Sum of squares, in parts of that of noise, by which a set of suspects may be worse than the best one."""
 NEARLY, OTHERS = 40.0, 6
 """Factor on this margin within which the quadratic form is no judge, and number of sets that are fitted there."""
+MOST_FITS = (SEARCHES + 1) * FEW + OTHERS
+MOST_STEPS = MOST_FITS + SEARCHES + 2
+"""Most fits with suspects, and most steps of a search: these fits, and the fits around which numbers are freed."""
 MOST_SETS = 12
 """Most sets of suspects that are named."""
-_CHANGE = 0.05
-"""Change for which the derivatives are integrated, in parts of the number."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,14 @@ class KnownNumbers:
         return tuple(of_name.values())
 
 
+def is_described(
+    problem: Problem, best: Fit, tests: Sequence[ResidualTest], around: Posterior, known: KnownNumbers
+) -> bool:
+    """Whether the model of an identification describes the recordings: the fit does so, no bound is active, and the
+    recordings contradict no known number."""
+    return describes(problem, best, tests) and not around.active_bounds and not known.are_rejected
+
+
 def known_numbers(plant: AnyPlant, sought: Collection[str], assumed: Collection[str] = ()) -> list[Unknown]:
     """The known numbers of a plant that may be wrong, all except the `sought` ones. The study does not state those
     that are `assumed`."""
@@ -167,7 +177,7 @@ def suspect_sets(
     best: NormalEquations,
     workers: int = 2,
     assumed: Collection[str] = (),
-    progress: Progress = lambda _: None,
+    progress: TaskProgress = quiet,
 ) -> tuple[SuspectSet, ...]:
     """The sets of one or two known numbers that, if they are wrong, explain the recordings best.
 
@@ -186,13 +196,14 @@ class _Search:
         best: NormalEquations,
         workers: int,
         assumed: Collection[str],
-        progress: Progress,
+        progress: TaskProgress,
     ) -> None:
         self._problem, self._best, self._workers, self._progress = problem, best, workers, progress
         self._assumed = assumed
         self._more = known_numbers(problem.plant, {u.name for u in problem.sought}, assumed)
         self._fits = dict[frozenset[str], tuple[Problem, Fit]]()
         self._failed = set[frozenset[str]]()
+        self._steps = 0
 
     def sets(self) -> Iterator[SuspectSet]:
         """The sets that explain the recordings about as well as the best one, the best first. If none explains them,
@@ -230,7 +241,7 @@ class _Search:
 
     def _best_freed(self) -> _Freed:
         """The known numbers, freed around the best fit with one or two of them."""
-        first = freed = _Freed.around(self._problem, self._best, self._more, self._workers)
+        first = freed = self._freed_around(self._problem, self._best)
         for k in range(SEARCHES):
             ranked = [names for names, _ in freed.ranked()]
             if self._try(ranked, freed) or not self._fits:
@@ -238,8 +249,13 @@ class _Search:
             if k == 0:
                 # far from straight, the form shows a second number only after the first one is right
                 self._try([names for names in ranked if len(names) == 1], first)
-            freed = _Freed.around(*self._fits[self._winner()], self._more, self._workers)
-        return _Freed.around(*self._fits[self._winner()], self._more, self._workers) if self._fits else freed
+            freed = self._freed_around(*self._fits[self._winner()])
+        return self._freed_around(*self._fits[self._winner()]) if self._fits else freed
+
+    def _freed_around(self, problem: Problem, best: NormalEquations) -> _Freed:
+        """The known numbers, freed around this fit, as a step of the search."""
+        self._progress_of("derivatives")(0, 0.0)
+        return _Freed.around(problem, best, self._more, self._workers)
 
     def _winner(self) -> frozenset[str]:
         return min(self._fits, key=lambda names: _cost(*self._fits[names]))
@@ -258,19 +274,33 @@ class _Search:
         """Fit the recordings with these numbers sought, too, from the values that the quadratic form promises."""
         if names in self._fits or names in self._failed:
             return
-        self._progress(" and ".join(sorted(names)))
         wider, z = _wider(self._problem, self._best.z, [u for u in self._more if u.name in names])
         for name, x in freed.point(names).items():
             if name in wider.place:
                 z[wider.place[name]] = x
         z = np.clip(z, *wider.bounds)
         try:
-            self._fits[names] = wider, fit(wider, z, self._workers, most=MOST_ROUNDS)
+            self._fits[names] = wider, fit(
+                wider, z, self._workers, self._progress_of(" and ".join(sorted(names))), most=MOST_ROUNDS
+            )
         except (RunError, InputError):
             self._failed.add(names)
 
+    def _progress_of(self, step: str) -> Callable[[int, float], None]:
+        """The function for the rounds of the next step. A fit has rounds over the first turns, and over the whole."""
+        complete, self._steps = self._steps, self._steps + 1
+        return lambda rounds, cost: self._progress(
+            f"suspects, at most {MOST_FITS} fits ({step})",
+            complete + min(1.0, 0.5 * rounds / MOST_ROUNDS),
+            MOST_STEPS,
+        )
+
     def _describes(self, names: frozenset[str]) -> bool | None:
-        return _describes(*self._fits[names], names) if names in self._fits else None
+        """Whether the model with these numbers sought describes the recordings; None if no fit was made."""
+        if names not in self._fits:
+            return None
+        problem, best = self._fits[names]
+        return describes(problem, best, residual_tests(best), names)
 
     def _set(self, names: frozenset[str], freed: _Freed, excess: float) -> SuspectSet:
         """The set of these suspects; those that changed most come first."""
@@ -295,14 +325,6 @@ def _smallest(sets: Iterable[frozenset[str]]) -> list[frozenset[str]]:
     """The sets that have none of the others in them."""
     listed = list(sets)
     return [names for names in listed if not any(other < names for other in listed)]
-
-
-def _describes(problem: Problem, best: Fit, suspects: Collection[str]) -> bool:
-    """Whether a fit ended, its residuals are noise, and clocks, sensors and all numbers except the suspects are as
-    they are known."""
-    of_numbers = (each for each in prior_conflicts(problem.sought, best) if each.name not in suspects)
-    conflicts = [*sensor_conflicts(problem, best), *of_numbers]
-    return best.is_ended and not conflicts and all(test.is_noise for test in residual_tests(best))
 
 
 def _wider(problem: Problem, z: Any, more: Sequence[Unknown]) -> tuple[Problem, Any]:
