@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -146,9 +146,11 @@ def inspect_motion(
     """
     driven = recording if off is None else recording.part(end=off)
     faults = _faults_of_motion(recording, driven, speeds, ratio)
-    other = _other_speed(driven, speeds, ratio) if faults else None
-    # at another speed the rows are too few or too many, and the machine seems to stand
-    return faults if other is None else [other[0], *_faults_of_motion(recording, driven, (other[1],) * 2, ratio)]
+    other = _other_speed(driven, speeds[0], ratio) if faults and speeds[0] == speeds[1] else None
+    if other is None:
+        return faults
+    # at a wrong speed the rows look too few, and the machine seems to stand
+    return [_speed_fault(recording, *other, speeds[0]), *_faults_of_motion(recording, driven, other[1:] * 2, ratio)]
 
 
 def _faults_of_motion(
@@ -161,22 +163,39 @@ def _faults_of_motion(
     ]
 
 
-def _other_speed(
-    recording: Recording, speeds: tuple[float, float], ratio: float
-) -> tuple[InputError, float] | None:
-    """The fault that the stated speed is another one than that of the recording, and the speed of the recording
-    [rad/s]: by the mark, the encoder or the measured speed, if they agree; one of them alone if a column repeats at
-    this speed. None if the stated speed may be right, and if it changes."""
-    named = {name for name in ("mark", "motor.count", speed_column(recording)) if name in recording.columns}
-    alone = {name: replace(recording, columns={name: recording.columns[name]}) for name in sorted(named)}
-    seen = {name: mean_speed(RecordedRun("", part, 0.0), ratio) for name, part in alone.items()}
-    seen = {name: speed for name, speed in seen.items() if speed > 0.0}
-    if not seen or speeds[0] < speeds[1] or max(seen.values()) > SAME * min(seen.values()):
+def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str, float] | None:
+    """The column that tells that the crank turns at another speed than the `stated` one, and that speed [rad/s]. It is
+    the mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that
+    repeats after a turn at this speed."""
+    speeds = {}
+    for name in ("mark", "motor.count", speed_column(recording)):
+        if name in recording.columns:
+            alone = replace(recording, columns={name: recording.columns[name]})
+            speeds[name] = mean_speed(RecordedRun("", alone, 0.0), ratio)
+    speeds = {name: speed for name, speed in speeds.items() if speed > 0.0}
+    if not speeds or max(speeds.values()) > SAME * min(speeds.values()):
         return None
-    name, speed = min(seen.items(), key=lambda item: ("mark", "motor.count").count(item[0]) == 0)
-    if speeds[0] / SAME < speed < SAME * speeds[0]:
+    name, speed = next(iter(speeds.items()))
+    is_as_stated = stated / SAME < speed < SAME * stated
+    if is_as_stated or (speed_column(recording) not in speeds and _likely_unit(recording, 2.0 * math.pi / stated)):
         return None
-    return None
+    analog = (other for other in recording.columns if MEASURANDS[other].analog and other != name)
+    turn = 2.0 * math.pi / speed
+    is_confirmed = len(speeds) > 1 or any(_turn(recording, other, turn)[0] > ALIKE for other in analog)
+    return (name, speed) if is_confirmed else None
+
+
+def _speed_fault(recording: Recording, name: str, speed: float, stated: float) -> InputError:
+    """The fault that the crank turns at a `speed`, by the column of this name, and not at the `stated` one."""
+    measured, expected = (f"{x:.5g} rad/s ({_per_minute(x)})" for x in (speed, stated))
+    others = ", or correct machine.ratio" if name in ("motor.w", "motor.count") else ""
+    if not speed_column(recording) and not stated / AROUND < speed < AROUND * stated:
+        others += ", or write the unit of the times into their head"
+    return _fault(
+        recording, name,
+        f"the crank turns at {measured}, and crank_speed is {expected}; write crank_speed = "
+        f'"{_per_minute(speed)}" into the table of this recording{others}',
+    )  # fmt: skip
 
 
 MOST_DROOP = 0.1
@@ -204,13 +223,7 @@ def inspect_speed(run: RecordedRun, response: Response, ratio: float, gain: floa
     droop = min(2.0 * abs(simulated / run.crank_speed - 1.0), MOST_DROOP)
     if abs(speed / run.crank_speed - 1.0) <= error + droop:
         return []
-    measured, stated = (f"{x:.5g} rad/s ({_per_minute(x)})" for x in (speed, run.crank_speed))
-    geared = ", or correct machine.ratio" if name in ("motor.w", "motor.count") else ""
-    text = (
-        f"the crank turns at {measured}, and crank_speed is {stated}; write crank_speed = "
-        f'"{_per_minute(speed)}" into the table of this recording{geared}'
-    )
-    return [_fault(run.recording, name, text)]
+    return [_speed_fault(run.recording, name, speed, run.crank_speed)]
 
 
 def _per_minute(speed: float) -> str:
@@ -420,9 +433,9 @@ def _of_column(
 
 def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
     step, turn = recording.step, 2.0 * math.pi / crank_speed
-    span, longest = float(recording.time[-1] - recording.time[0]), max(LONGEST, LONGEST_TURNS * turn)
+    span, longest = float(recording.time[-1] - recording.time[0]), _longest_span(turn)
     if turn / step < LEAST_ROWS or span < FEWEST_TURNS * turn:
-        likely = _likely_unit(recording, turn, longest)
+        likely = _likely_unit(recording, turn)
         if likely:
             words = f"{span:.4g} s with {turn / step:.2g} rows in a turn of the crank"
             yield _fault(
@@ -439,7 +452,8 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         yield _fault(
             recording, "time",
             f"{1.0 / step:.3g} rows a second are {turn / step:.2g} in a turn of the crank; record >= "
-            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, or write the unit of the times into their head",
+            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, correct crank_speed, or write the unit of the times into "
+            "their head",
         )  # fmt: skip
     if recording.missing > MISSING:
         begin, end = max(recording.gaps, key=lambda gap: gap[1] - gap[0])
@@ -452,17 +466,22 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
     if span < FEWEST_TURNS * turn:
         yield _fault(
             recording, "time",
-            f"{span:.3g} s are {span / turn:.2g} turns of the crank; record >= {FEWEST_TURNS:.0f} turns",
+            f"{span:.3g} s are {math.floor(100.0 * span / turn) / 100.0:.3g} turns of the crank at crank_speed; record "
+            f">= {FEWEST_TURNS:.0f} turns, or correct crank_speed",
         )  # fmt: skip
 
 
-def _likely_unit(recording: Recording, turn: float, longest: float) -> str:
+def _longest_span(turn: float) -> float:
+    return max(LONGEST, LONGEST_TURNS * turn)
+
+
+def _likely_unit(recording: Recording, turn: float) -> str:
     """The unit in which the times would be those of a recording that can be used; empty where there is none."""
     own = scale(name_and_unit(recording.heads["time"])[1], "s")[0]
     span = float(recording.time[-1] - recording.time[0])
     for unit in ("s", "ms", "µs"):
         factor = scale(unit, "s")[0] / own
-        fits = FEWEST_TURNS * turn <= factor * span <= longest
+        fits = FEWEST_TURNS * turn <= factor * span <= _longest_span(turn)
         if factor != 1.0 and fits and LEAST_ROWS * factor * recording.step <= turn:
             return unit
     return ""
