@@ -209,7 +209,9 @@ def test_faults_of_the_rows():
     (fault,) = faults(slow)
     assert "5 rows a second are 10 in a turn of the crank; record >= 19 rows a second" in fault
     (fault,) = faults(GOOD.part(0.0, 2.5))
-    assert "2.5 s are 1.19 turns of the crank at crank_speed; record >= 3 turns, or correct crank_speed" in fault
+    assert (
+        "2.5 s are 1.19 turns of the crank at crank_speed; record >= 3 turns, or correct crank_speed" in fault
+    )
 
 
 @pytest.mark.parametrize(
@@ -277,7 +279,11 @@ def test_a_stated_speed_far_from_that_of_the_recording_is_the_one_cause(stated, 
     recording = replace(GOOD, columns=columns, heads=GOOD.heads | {"motor.count": "motor.count [1]"})
     stated *= SPEED
     (fault,) = map(str, inspect_motion(recording, (stated, stated), RATIO))
-    assert f"column {column}" in fault and "the crank turns at" in fault and f"crank_speed is {stated:.5g} " in fault
+    assert (
+        f"column {column}" in fault
+        and "the crank turns at" in fault
+        and f"crank_speed is {stated:.5g} " in fault
+    )
     (remedy,) = re.findall('crank_speed = "(.*) rev/min"', fault)
     speed = float(remedy) * np.pi / 30.0
     assert speed == pytest.approx(SPEED, rel=0.01) and inspect_motion(recording, (speed, speed), RATIO) == []

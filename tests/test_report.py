@@ -175,7 +175,10 @@ def test_a_long_table_is_printed_a_few_times_to_find_its_room(text_of, monkeypat
 def test_a_notebook_draws_a_figure_once(monkeypatch):
     figure, drawn, draw = ResultFigure(a_figure(), DEFAULT_UNITS), [], ResultFigure.to_matplotlib
     monkeypatch.setattr(ResultFigure, "to_matplotlib", lambda self: drawn.append(self) or draw(self))
-    ways = (getattr(figure, f"_repr_{kind}_", None) for kind in ("html", "png", "svg", "jpeg", "pdf", "mimebundle"))
+    ways = (
+        getattr(figure, f"_repr_{kind}_", None)
+        for kind in ("html", "png", "svg", "jpeg", "pdf", "mimebundle")
+    )
     shown = [way() for way in ways if way is not None]
     assert len(shown) == len(drawn) == 1 and shown[0].startswith(b"\x89PNG")
 

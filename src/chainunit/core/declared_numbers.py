@@ -26,7 +26,7 @@ def kind_words(variable: Variable) -> str:
     if variable.type != "Real":
         return f"{variable.quantity.allowed_range} ({variable.description})"
     if variable.unit == "1":
-        share = ', or a text such as "8 %"' if fitting else ""
+        share = ', or a text such as "8 %"' if may_be_share(variable) else ""
         return f"a pure number{share} ({variable.description})"
     declared = variable.unit.replace(".", " ")
     return f'a number in {declared}, or a text such as "2 {fitting[0]}" ({variable.description})'
@@ -49,8 +49,8 @@ def number_of_text(variable: Variable, text: str) -> float:
             return units.convert(number, written, variable.unit, variable.kind) if written else number
     except ValueError:
         pass
-    counted = variable.type != "Real"
-    hint = "" if counted else units.spelling(text, variable.unit, variable.kind)
+    is_pure = variable.type != "Real" or (variable.unit == "1" and not may_be_share(variable))
+    hint = "" if is_pure else units.spelling(text, variable.unit, variable.kind)
     other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
     other = f"; {printable(other)}" if other else ""
     raise ValueError(f"{variable.name} = {shown(text)}: must be {kind_words(variable)}{other}{hint}")

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..core.declared_numbers import in_declared_unit, number_in
+from ..core.declared_numbers import in_declared_unit, one_number
 from ..core.engines import MATH, numpy_
 from ..core.errors import GeometryError, check_kind
 from ..core.ports import PortSlopes
@@ -34,6 +34,7 @@ from .crank_rocker import rocker_extremes
 from .flexible import ChainedModel, flexible
 from .hanging import Hanging, Modes, modes, rods, split
 from .machine import Machine, admit
+from .paper_ratios import RATIOS, of_ratios
 from .parts import Stop
 
 _XP = numpy_()
@@ -97,12 +98,16 @@ class ChainUnitMachine(Machine):
 
         The ratios are rho = r/l, lam = h/l, mu = e/l1 and zeta = z/z_max with z_max = 2 l1 sqrt(1 - mu); l2 = l1 - e.
         The frame has c = sqrt(l^2 - r^2) and hy = h, so that crank and rocker are parallel at phi = 0.
+
+        Raises
+        ------
+        InputError, GeometryError
+            for a ratio out of its range, and for ratios that make no machine, with the ranges in which one of them
+            would.
         """
-        numbers = {"rho": rho, "lam": lam, "mu": mu, "zeta": zeta}
-        rho, lam, mu, zeta = (number_in("1", name, x, "ratio of lengths") for name, x in numbers.items())
-        l, l1 = number_in("m", "l", l, "coupler"), number_in("m", "l1", l1, "wall")
-        lengths = ratios(rho, lam, mu, zeta, l, l1)
-        return cls({**lengths, **(parameters or {}), **values})
+        ratios = {"rho": rho, "lam": lam, "mu": mu, "zeta": zeta, "l": l, "l1": l1}
+        numbers = {name: admit(RATIOS[name], one_number(RATIOS[name], x)) for name, x in ratios.items()}
+        return of_ratios(lambda lengths: cls({**lengths, **(parameters or {}), **values}), numbers)
 
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
@@ -354,26 +359,6 @@ def _first_loss(pull: Callable[[Any], Any], highest: float) -> float:
             return float(brentq(pull, speeds[i - 1], speeds[i], xtol=1e-9))
         low, high = high, 2.0 * high
     return math.inf
-
-
-def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) -> dict[str, float]:
-    """Lengths [m] from the papers' ratios, by parameter name; see `ChainUnitMachine.from_ratios`."""
-    r, h, e = rho * l, lam * l, mu * l1
-    if not abs(rho) < 1.0 or not mu < 1.0:
-        raise GeometryError(
-            f"rho = {rho:g}, mu = {mu:g}: the papers' frame needs rho = r/l < 1 and mu = e/l1 < 1"
-        )
-    return {
-        "r": r,
-        "l": l,
-        "h": h,
-        "c": math.sqrt(l * l - r * r),
-        "hy": h,
-        "e": e,
-        "l1": l1,
-        "l2": l1 - e,
-        "z": zeta * 2.0 * l1 * math.sqrt(1.0 - mu),
-    }
 
 
 class ChainedUnit(Machine):

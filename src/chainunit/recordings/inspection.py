@@ -150,7 +150,10 @@ def inspect_motion(
     if other is None:
         return faults
     # at a wrong speed the rows look too few, and the machine seems to stand
-    return [_speed_fault(recording, *other, speeds[0]), *_faults_of_motion(recording, driven, other[1:] * 2, ratio)]
+    return [
+        _speed_fault(recording, *other, speeds[0]),
+        *_faults_of_motion(recording, driven, other[1:] * 2, ratio),
+    ]
 
 
 def _faults_of_motion(
@@ -164,9 +167,9 @@ def _faults_of_motion(
 
 
 def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str, float] | None:
-    """The column that tells that the crank turns at another speed than the `stated` one, and that speed [rad/s]. It is
-    the mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that
-    repeats after a turn at this speed."""
+    """The column that tells that the crank turns at another speed than the `stated` one, and that speed [rad/s]: the
+    mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that repeats
+    after a turn at this speed."""
     speeds = {}
     for name in ("mark", "motor.count", speed_column(recording)):
         if name in recording.columns:
@@ -177,7 +180,9 @@ def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str
         return None
     name, speed = next(iter(speeds.items()))
     is_as_stated = stated / SAME < speed < SAME * stated
-    if is_as_stated or (speed_column(recording) not in speeds and _likely_unit(recording, 2.0 * math.pi / stated)):
+    if is_as_stated or (
+        speed_column(recording) not in speeds and _likely_unit(recording, 2.0 * math.pi / stated)
+    ):
         return None
     analog = (other for other in recording.columns if MEASURANDS[other].analog and other != name)
     turn = 2.0 * math.pi / speed
@@ -452,8 +457,8 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         yield _fault(
             recording, "time",
             f"{1.0 / step:.3g} rows a second are {turn / step:.2g} in a turn of the crank; record >= "
-            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, correct crank_speed, or write the unit of the times into "
-            "their head",
+            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, correct crank_speed, or write the unit of the times "
+            "into their head",
         )  # fmt: skip
     if recording.missing > MISSING:
         begin, end = max(recording.gaps, key=lambda gap: gap[1] - gap[0])
@@ -466,8 +471,8 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
     if span < FEWEST_TURNS * turn:
         yield _fault(
             recording, "time",
-            f"{span:.3g} s are {math.floor(100.0 * span / turn) / 100.0:.3g} turns of the crank at crank_speed; record "
-            f">= {FEWEST_TURNS:.0f} turns, or correct crank_speed",
+            f"{span:.3g} s are {math.floor(100.0 * span / turn) / 100.0:.3g} turns of the crank at crank_speed; "
+            f"record >= {FEWEST_TURNS:.0f} turns, or correct crank_speed",
         )  # fmt: skip
 
 

@@ -280,8 +280,11 @@ class _Search:
                 z[wider.place[name]] = x
         z = np.clip(z, *wider.bounds)
         try:
-            self._fits[names] = wider, fit(
-                wider, z, self._workers, self._progress_of(" and ".join(sorted(names))), most=MOST_ROUNDS
+            self._fits[names] = (
+                wider,
+                fit(
+                    wider, z, self._workers, self._progress_of(" and ".join(sorted(names))), most=MOST_ROUNDS
+                ),
             )
         except (RunError, InputError):
             self._failed.add(names)
