@@ -473,7 +473,7 @@ def test_a_study_file_that_does_not_fit_is_refused_in_a_line(change, said, folde
     [
         (
             ["study", "--check", "foreign.toml", "-o", "check"],
-            r"--check: the equations of ForeignMotor\.fmu are not",
+            r"check: the equations of ForeignMotor\.fmu are not",
         ),
         (
             ["export", "DcMotor", "--config", "foreign.toml"],

@@ -10,9 +10,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..core.declared_numbers import in_declared_unit, one_number
+from ..core.declared_numbers import in_declared_unit, number_in, one_number
 from ..core.engines import MATH, numpy_
-from ..core.errors import GeometryError, check_kind
+from ..core.errors import GeometryError, InputError, check_kind, one_of, shown
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, Quantity, Variable
 from ..mechanism.models import InverseMachine
@@ -33,7 +33,7 @@ from .chain_unit import (
 from .crank_rocker import rocker_extremes
 from .flexible import ChainedModel, flexible
 from .hanging import Hanging, Modes, modes, rods, split
-from .machine import Machine, admit
+from .machine import Machine, admit, check_shapes
 from .paper_ratios import RATIOS, of_ratios
 from .parts import Stop
 
@@ -167,6 +167,7 @@ class ChainUnitMachine(Machine):
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of one kilogram of material on the `side` ("left" or "right") [J/kg]: dE/dm,
         the factor of the feed in an energy balance (the energy is linear in the mass)."""
+        _check_side(side)
         kilogram = SideLoads(material_mass=1.0, processing_force=0.0)
 
         def energy(**loads: Any) -> Any:
@@ -199,12 +200,20 @@ class ChainUnitMachine(Machine):
         InputError
             see the class.
         """
-        loads = self._inputs(0.0, 0.0, 0.0, left, right)
-        psi, w, a = (admit(_ROCKER[n], x) for n, x in (("psi", psi), ("w", w), ("a", a)))
+        loads, psi, w, a = self._at_rocker(psi, w, a, left, right)
         if np.ndim(psi) == 0:
             self._check_assembly(float(psi))
         with np.errstate(invalid="ignore"):
             return chain_unit.chamber(_XP, self.p, loads, psi, w, a)
+
+    def _at_rocker(
+        self, psi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads
+    ) -> tuple[Inputs, Any, Any, Any]:
+        """The loads and the motion of the rocker, checked."""
+        loads = self._inputs(0.0, 0.0, 0.0, left, right)
+        motion = {name: admit(_ROCKER[name], x) for name, x in (("psi", psi), ("w", w), ("a", a))}
+        check_shapes(ChamberForces.input_layout.by_name(loads) | motion)
+        return loads, motion["psi"], motion["w"], motion["a"]
 
     def _check_assembly(self, psi: float) -> None:
         p = self.p
@@ -220,6 +229,7 @@ class ChainUnitMachine(Machine):
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
+        _check_side(side)
         p, own = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
         on_web = p.web_share * loads.material_mass
@@ -238,7 +248,7 @@ class ChainUnitMachine(Machine):
             where the organ does not hang.
         """
         lengths, masses = self.organ_rods(side, loads, number)
-        return rods(lengths, masses * self.p.g, self._reach(side, psi))
+        return rods(lengths, masses * self.p.g, self._reach(side, one_number(_ROCKER["psi"], psi)))
 
     def _reach(self, side: str, psi: float) -> Any:
         """The vector from A1 to A2 of a left organ, or of the mirrored right one [m]."""
@@ -275,7 +285,7 @@ class ChainUnitMachine(Machine):
     ) -> Pulls:
         """Axial pull in the rods just inside their pins [N] at a rocker angle `psi` [rad], with speed `w` and
         acceleration `a` of the rocker; see `chain_unit.organ_pulls`."""
-        return chain_unit.organ_pulls(_XP, self.p, self._inputs(0.0, 0.0, 0.0, left, right), psi, w, a)
+        return chain_unit.organ_pulls(_XP, self.p, *self._at_rocker(psi, w, a, left, right))
 
     def mean_pulls(
         self, crank_speed: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
@@ -305,9 +315,9 @@ class ChainUnitMachine(Machine):
 
     def loaded_sides(self, feed: Feed) -> tuple[str, ...]:
         """The sides whose organ has any mass or load: an organ without both is absent, and cannot go slack."""
-        present = []
+        present, numbers = [], self._inputs(0.0, 0.0, 0.0, feed.left, feed.right)
         for side in SIDES:
-            masses, loads = getattr(self.p, side), getattr(feed, side)
+            masses, loads = getattr(self.p, side), getattr(numbers, side)
             if np.any(
                 masses.wall_mass + masses.web_mass + loads.material_mass + loads.processing_force > 0.0
             ):
@@ -320,7 +330,6 @@ class ChainUnitMachine(Machine):
         """Lowest crank speed [rad/s] at which a web goes slack somewhere in the turn, as its mean pull falls below
         zero: 0 if a web is slack at rest, infinity if no web is up to `highest`. Above this speed two rigid bars are
         no model of a chain. An end of a web may be pushed at a lower speed: there a chain sags."""
-        _check_loads(left, right)
         webs = len(self.loaded_sides(Feed(left=left, right=right)))
 
         def pull(crank_speed: Any) -> Any:
@@ -343,11 +352,16 @@ def _check_loads(left: Any, right: Any) -> None:
         check_kind(name, loads, SideLoads)
 
 
-def _first_loss(pull: Callable[[Any], Any], highest: float) -> float:
+def _check_side(side: Any) -> None:
+    if side not in SIDES:
+        raise InputError(f"side = {shown(side)}: must be {one_of(side, SIDES)}")
+
+
+def _first_loss(pull: Callable[[Any], Any], highest: Any) -> float:
     """The lowest crank speed [rad/s] at which a least pull [N] falls to zero, see `ChainUnitMachine.slack_speed`."""
     from scipy.optimize import brentq
 
-    low, high = 0.0, 1.0
+    low, high, highest = 0.0, 1.0, number_in("rad/s", "highest", highest, "highest speed of the crank")
     if pull(low) <= 0.0:
         return 0.0
     while low < highest:

@@ -168,8 +168,8 @@ def _faults_of_motion(
 
 def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str, float] | None:
     """The column that tells that the crank turns at another speed than the `stated` one, and that speed [rad/s]: the
-    mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that repeats
-    after a turn at this speed."""
+    mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that
+    repeats after a turn at this speed."""
     speeds = {}
     for name in ("mark", "motor.count", speed_column(recording)):
         if name in recording.columns:

@@ -16,9 +16,8 @@ from command import chainunit
 from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError, Study
-from chainunit.capabilities.identification import identification
+from chainunit.capabilities.identification import identification, suspects
 from chainunit.capabilities.identification import page as report
-from chainunit.capabilities.identification import suspects
 from chainunit.capabilities.identification.result import _number, identified_tables, sentences
 from chainunit.capabilities.identification.study_method import IdentificationResult
 from chainunit.capabilities.watch.false_loads import false_loads

@@ -164,7 +164,7 @@ def earlier(tmp_path_factory):
         (["DcMotor", "--at", "w=3 kg"], "--at: w"),
         (["nothing.toml"], "nothing.toml: cannot be read"),
         (["Motor"], "Motor: no such model"),
-        (["DcMotor", "--inverse"], "--inverse: is of linkage files"),
+        (["DcMotor", "--inverse"], "inverse: is of linkage files"),
     ],
 )
 def test_a_refusal_has_status_2_and_leaves_the_files(earlier, arguments, words):
