@@ -321,7 +321,7 @@ def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, 
             lambda: batch(reduce={"tau": Histogram("3 N m", "1 N m", 4)}),
             "low = 3.0, high = 1.0: must be finite",
         ),
-        (lambda: Beyond(None), "Beyond: limit = None: must be a finite number"),
+        (lambda: batch(reduce={"tau": Beyond(None)}), "Beyond: limit = None: must be a number in N m"),
         (lambda: Histogram(1.0, 2.0, "4"), 'Histogram: bins = "4": must be a whole number'),
         (
             lambda: batch(over=["phi"], reduce={"tau": "rms"}),

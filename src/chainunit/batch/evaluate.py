@@ -6,14 +6,14 @@ import math
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.declared_numbers import in_declared_unit, magnitude_and_unit
+from ..core.declared_numbers import in_declared_unit, magnitude_and_unit, number_in
 from ..core.errors import InputError, RemarkWarning, RunError, check_kind, texts_in
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
@@ -164,11 +164,7 @@ def _reduced(reduce: Mapping[str, Request | Sequence[Request]], results: Sequenc
     """The requests with the places of their outputs, whose `results` have units, checked; one request is a list of
     one."""
     requests = [
-        (
-            place,
-            output,
-            request.in_unit(results[place].unit) if isinstance(request, Beyond | Histogram) else request,
-        )
+        (place, output, _in_unit(request, results[place].unit))
         for place, (output, listed) in enumerate(reduce.items())
         for request in (listed if isinstance(listed, list | tuple) else [listed])
     ]
@@ -177,6 +173,18 @@ def _reduced(reduce: Mapping[str, Request | Sequence[Request]], results: Sequenc
         if histograms.count(output) > 1:
             raise InputError(f"{output}: has {histograms.count(output)} histograms; give one, with more bins")
     return tuple((column_of(place, request, output), request) for place, output, request in requests)
+
+
+def _in_unit(request: Any, unit: str) -> Any:
+    """A request whose limit or ends are numbers in the `unit` of its column."""
+    if not isinstance(request, Beyond | Histogram):
+        return request
+    ends: Any = {
+        name: number_in(unit, f"{type(request).__name__}: {name}", x, "limit")
+        for name, x in vars(request).items()
+        if name != "bins"
+    }
+    return replace(request, **ends)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core.declared_numbers import has_own_unit, number_in
 from ..core.errors import InputError, shown
 
 MOST_BINS = 1024
@@ -68,13 +67,9 @@ _COUNT = Reduction(
 )
 
 
-def _is_finite(x: Any) -> bool:
-    return isinstance(x, numbers.Real) and math.isfinite(x)
-
-
 @dataclass(frozen=True)
 class Beyond:
-    """The number of states in which a column is larger in size than a `limit`, in the unit of the column, or a text
+    """The number of states in which a column is larger in size than a `limit`, in the unit of the column or a text
     such as "30 N m".
 
     Raises
@@ -86,20 +81,15 @@ class Beyond:
     limit: float
 
     def __post_init__(self) -> None:
-        if has_own_unit(self.limit):
-            return
-        if not (_is_finite(self.limit) and self.limit >= 0.0):
-            raise InputError(f"Beyond: limit = {shown(self.limit)}: must be a finite number >= 0, a size")
-
-    def in_unit(self, unit: str) -> Beyond:
-        """The same with its limit as a number in the `unit` of its column."""
-        return Beyond(number_in(unit, "Beyond: limit", self.limit, "size"))
+        # a limit with a unit becomes a number when the unit of its column is known
+        if isinstance(self.limit, numbers.Real) and not (math.isfinite(self.limit) and self.limit >= 0.0):
+            raise InputError(f"Beyond: limit = {self.limit}: must be a finite number >= 0, a size")
 
 
 @dataclass(frozen=True)
 class Histogram:
     """The numbers of states by the value of a column: `bins` of equal width from `low` to `high`, in the unit of the
-    column, or texts such as "30 N m". The first bin has all states below it, too, and the last one all above it.
+    column or texts such as "30 N m". The first bin has all states below it, too, and the last one all above it.
 
     Raises
     ------
@@ -112,23 +102,15 @@ class Histogram:
     bins: int
 
     def __post_init__(self) -> None:
+        are_numbers = isinstance(self.low, numbers.Real) and isinstance(self.high, numbers.Real)
+        if are_numbers and not (
+            math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high
+        ):
+            raise InputError(f"Histogram: low = {self.low}, high = {self.high}: must be finite, low < high")
         if not (isinstance(self.bins, int) and 2 <= self.bins <= MOST_BINS):
             raise InputError(
                 f"Histogram: bins = {shown(self.bins)}: must be a whole number from 2 to {MOST_BINS}"
             )
-        if has_own_unit(self.low) or has_own_unit(self.high):
-            return
-        if not (_is_finite(self.low) and _is_finite(self.high) and self.low < self.high):
-            ends = f"low = {shown(self.low)}, high = {shown(self.high)}"
-            raise InputError(f"Histogram: {ends}: must be finite, low < high")
-
-    def in_unit(self, unit: str) -> Histogram:
-        """The same with its ends as numbers in the `unit` of its column."""
-        low, high = (
-            number_in(unit, f"Histogram: {name}", x, "end")
-            for name, x in (("low", self.low), ("high", self.high))
-        )
-        return Histogram(low, high, self.bins)
 
     @property
     def middles(self) -> Any:

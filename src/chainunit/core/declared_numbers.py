@@ -57,9 +57,9 @@ def number_of_text(variable: Variable, text: str) -> float:
 
 
 def magnitude_and_unit(value: Any) -> tuple[Any, str] | None:
-    """The number, or the array of numbers, of a quantity of a library such as pint, or of a DataArray with the attribute
-    ``units``, and its unit as a text that is read here, "1" without a dimension; None for another value. The library
-    need not be installed."""
+    """The number, or the array of numbers, of a quantity of a library such as pint, or of a DataArray with ``units``,
+    and its unit as a text that is read here, "1" without a dimension; None for another value. The library need not be
+    installed."""
     if isinstance(value, type):
         return None
     if hasattr(value, "dims") and "units" in (attributes := getattr(value, "attrs", {})):

@@ -112,7 +112,8 @@ class ChainUnitMachine(Machine):
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
-        _check_loads(left, right)
+        for name, loads in (("left", left), ("right", right)):
+            check_kind(name, loads, SideLoads)
         values = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
         inputs: Inputs = self.inputs(ChamberForces.input_layout.by_name(values))
         return inputs
@@ -344,12 +345,6 @@ class ChainUnitMachine(Machine):
         """Lowest crank speed [rad/s] at which an end of a web is pushed somewhere in the turn, as `slack_speed`;
         there a chain sags."""
         return _first_loss(lambda w: self.least_web_pull(w * self.p.ratio, left, right), highest)
-
-
-def _check_loads(left: Any, right: Any) -> None:
-    """Refuse loads of the sides that are of another type."""
-    for name, loads in (("left", left), ("right", right)):
-        check_kind(name, loads, SideLoads)
 
 
 def _check_side(side: Any) -> None:

@@ -34,11 +34,12 @@ _TRIALS = np.geomspace(0.02, 50.0, 40)
 
 def lengths(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) -> dict[str, float]:
     """Lengths [m] from the papers' ratios, by parameter name; see `ChainUnitMachine.from_ratios`."""
+    r = rho * l
     return {
-        "r": rho * l,
+        "r": r,
         "l": l,
         "h": lam * l,
-        "c": l * math.sqrt(1.0 - rho**2),
+        "c": math.sqrt(l * l - r * r),
         "hy": lam * l,
         "e": mu * l1,
         "l1": l1,
@@ -47,14 +48,13 @@ def lengths(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float)
     }
 
 
-def of_ratios(make: Callable[[Mapping[str, float]], M], ratios: Mapping[str, float]) -> M:
+def of_ratios(make: Callable[[dict[str, float]], M], ratios: Mapping[str, float]) -> M:
     """What `make` makes of the lengths by these ratios.
 
     Raises
     ------
     GeometryError
-        for ratios that make no machine, with the range of each that would mend it alone; its key is the first of
-        these.
+        for ratios that make no machine, with the range of each that would mend it alone.
     """
     try:
         return make(lengths(**ratios))
@@ -62,13 +62,12 @@ def of_ratios(make: Callable[[Mapping[str, float]], M], ratios: Mapping[str, flo
         reason = error
 
     def admitted(trial: Mapping[str, float]) -> bool:
-        if not all(RATIOS[name].quantity.admits(x) for name, x in trial.items()):
-            return False
         try:
-            make(lengths(**trial))
+            return all(RATIOS[name].quantity.admits(x) for name, x in trial.items()) and bool(
+                make(lengths(**trial))
+            )
         except InputError:
             return False
-        return True
 
     usual, layout = Ratios(), Layout(Ratios)
     spoil = causes(admitted, ratios, layout, usual)
@@ -80,10 +79,9 @@ def of_ratios(make: Callable[[Mapping[str, float]], M], ratios: Mapping[str, flo
         spoil = causes(admitted, ratios, layout, Ratios(**starts))
     remedy = f"with all other values as they are, {', or '.join(spoil.values())}"
     if not spoil:
-        values, start = (_listed(x) for x in (ratios, layout.by_name(usual)))
+        values, start = (
+            ", ".join(f"{name} = {x:.4g}" for name, x in each.items())
+            for each in (ratios, layout.by_name(usual))
+        )
         remedy = f"no other value of one of {values} alone makes a machine; begin with {start}"
-    raise GeometryError(f"{reason}; {remedy}", next(iter(spoil), "")) from reason
-
-
-def _listed(ratios: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {x:.4g}" for name, x in ratios.items())
+    raise GeometryError(f"{reason}; {remedy}", next((f"ratios.{name}" for name in spoil), "")) from reason

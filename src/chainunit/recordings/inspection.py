@@ -145,49 +145,37 @@ def inspect_motion(
     off : the time at which the motor is switched off [s]
     """
     driven = recording if off is None else recording.part(end=off)
-    faults = _faults_of_motion(recording, driven, speeds, ratio)
-    other = _other_speed(driven, speeds[0], ratio) if faults and speeds[0] == speeds[1] else None
-    if other is None:
-        return faults
-    # at a wrong speed the rows look too few, and the machine seems to stand
-    return [
-        _speed_fault(recording, *other, speeds[0]),
-        *_faults_of_motion(recording, driven, other[1:] * 2, ratio),
-    ]
-
-
-def _faults_of_motion(
-    recording: Recording, driven: Recording, speeds: tuple[float, float], ratio: float
-) -> list[InputError]:
-    return [
+    faults = [
         *_rows(recording, speeds[1]),
         *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
         *_counted(recording),
     ]
+    other = _other_speed(driven, speeds[0], ratio) if faults and speeds[0] == speeds[1] else None
+    if other is None:
+        return faults
+    # at a wrong speed the rows look too few, and the machine seems to stand
+    fault = _speed_fault(recording, *other, speeds[0])
+    return [fault, *inspect_motion(recording, (other[1], other[1]), ratio, off)]
 
 
 def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str, float] | None:
     """The column that tells that the crank turns at another speed than the `stated` one, and that speed [rad/s]: the
     mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that
     repeats after a turn at this speed."""
-    speeds = {}
+    seen = list[tuple[float, str]]()
     for name in ("mark", "motor.count", speed_column(recording)):
-        if name in recording.columns:
-            alone = replace(recording, columns={name: recording.columns[name]})
-            speeds[name] = mean_speed(RecordedRun("", alone, 0.0), ratio)
-    speeds = {name: speed for name, speed in speeds.items() if speed > 0.0}
-    if not speeds or max(speeds.values()) > SAME * min(speeds.values()):
+        alone = replace(recording, columns={key: x for key, x in recording.columns.items() if key == name})
+        seen.append((mean_speed(RecordedRun("", alone, 0.0), ratio), name))
+    seen = [each for each in seen if each[0] > 0.0]
+    if not seen or max(seen)[0] > SAME * min(seen)[0] or stated / SAME < seen[0][0] < SAME * stated:
         return None
-    name, speed = next(iter(speeds.items()))
-    is_as_stated = stated / SAME < speed < SAME * stated
-    if is_as_stated or (
-        speed_column(recording) not in speeds and _likely_unit(recording, 2.0 * math.pi / stated)
-    ):
+    speed, name = seen[0]
+    # without a measured speed, the unit of the times may be another one, too
+    if not speed_column(recording) and _likely_unit(recording, 2.0 * math.pi / stated, LONGEST):
         return None
     analog = (other for other in recording.columns if MEASURANDS[other].analog and other != name)
-    turn = 2.0 * math.pi / speed
-    is_confirmed = len(speeds) > 1 or any(_turn(recording, other, turn)[0] > ALIKE for other in analog)
-    return (name, speed) if is_confirmed else None
+    repeats = any(_turn(recording, other, 2.0 * math.pi / speed)[0] > ALIKE for other in analog)
+    return (name, speed) if len(seen) > 1 or repeats else None
 
 
 def _speed_fault(recording: Recording, name: str, speed: float, stated: float) -> InputError:
@@ -438,9 +426,9 @@ def _of_column(
 
 def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
     step, turn = recording.step, 2.0 * math.pi / crank_speed
-    span, longest = float(recording.time[-1] - recording.time[0]), _longest_span(turn)
+    span, longest = float(recording.time[-1] - recording.time[0]), max(LONGEST, LONGEST_TURNS * turn)
     if turn / step < LEAST_ROWS or span < FEWEST_TURNS * turn:
-        likely = _likely_unit(recording, turn)
+        likely = _likely_unit(recording, turn, longest)
         if likely:
             words = f"{span:.4g} s with {turn / step:.2g} rows in a turn of the crank"
             yield _fault(
@@ -476,17 +464,13 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         )  # fmt: skip
 
 
-def _longest_span(turn: float) -> float:
-    return max(LONGEST, LONGEST_TURNS * turn)
-
-
-def _likely_unit(recording: Recording, turn: float) -> str:
+def _likely_unit(recording: Recording, turn: float, longest: float) -> str:
     """The unit in which the times would be those of a recording that can be used; empty where there is none."""
     own = scale(name_and_unit(recording.heads["time"])[1], "s")[0]
     span = float(recording.time[-1] - recording.time[0])
     for unit in ("s", "ms", "µs"):
         factor = scale(unit, "s")[0] / own
-        fits = FEWEST_TURNS * turn <= factor * span <= _longest_span(turn)
+        fits = FEWEST_TURNS * turn <= factor * span <= longest
         if factor != 1.0 and fits and LEAST_ROWS * factor * recording.step <= turn:
             return unit
     return ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from textwrap import shorten
@@ -94,17 +94,19 @@ def screen(report: Report, console: Console, rest: str) -> None:
         rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
     end = [line_of(warning, console.width - 1) + "\n" for warning in warnings]
     end.append(_printed(console, lambda: console.print(rest)))
-    room = _LINES - _count(end)
+    room = _LINES - sum(map(_lines, end))
     title = f"{report.title}\n" if report.title else ""
     for block in blocks:
         if _role(block) in (*_LAST, "remark"):
             continue
-        text = _fitted(block, console, report.units, room - _count([title]))
-        if text:
-            shown = title + text if isinstance(block, Table) else text
-            title = "" if isinstance(block, Table) else title
-            console.file.write(shown)
-            room -= _count([shown])
+        if isinstance(block, Table):
+            text = _first_rows(block, console, report.units, _lines, room - _lines(title), _ROWS)
+            text, title = (title + text, "") if text else ("", title)
+        else:
+            text = _printed(console, partial(console.print, "\n".join(_sentences(block, report.units))))
+        if text.strip() and _lines(text) <= room:
+            console.file.write(text)
+            room -= _lines(text)
     console.file.write("".join(end))
 
 
@@ -126,16 +128,8 @@ def _printed(console: Console, show: Callable[[], None]) -> str:
     return printed.get()
 
 
-def _count(texts: Iterable[str]) -> int:
-    return sum(text.count("\n") for text in texts)
-
-
-def _fitted(block: Block, console: Console, units: Units, room: int) -> str:
-    """A block as the console prints it, a table with its first rows; empty if it has no room."""
-    if not isinstance(block, Table):
-        text = _printed(console, lambda: console.print("\n".join(_sentences(block, units))))
-        return text if text.strip() and _count([text]) <= room else ""
-    return _first_rows(block, console, units, lambda text: _count([text]), room, _ROWS)
+def _lines(text: str) -> int:
+    return text.count("\n")
 
 
 def _first_rows(

@@ -16,7 +16,7 @@ from ..drives.catalogue import CatalogueMotor
 from ..machines.admissible import admits, causes
 from ..machines.api import machine_of
 from ..machines.machine import Machine
-from ..machines.paper_ratios import of_ratios
+from ..machines.paper_ratios import Ratios, of_ratios
 from ..mechanism.models import MachineModel
 from ..reading.tables import (
     UnusualValue,
@@ -57,7 +57,6 @@ from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
-    Ratios,
     Run,
     all_choices,
 )
@@ -438,14 +437,12 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
 
 def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
+    make: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
     if of_papers:
-        with each_refusal(lambda fault: InputError(f"ratios: {fault}", f"ratios.{fault.key}".rstrip("."))):
-            return of_ratios(
-                lambda lengths: machine_of(parts.machine, {**given, **lengths}), filled(Ratios, of_papers)
-            )
+        with refusal_prefix("ratios: ", "ratios"):
+            return of_ratios(lambda lengths: make(parts.machine, given | lengths), filled(Ratios, of_papers))
     try:
-        of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
-        return of(parts.machine, given)
+        return make(parts.machine, given)
     except InputError as error:
         names = error.names if isinstance(error, GeometryError) else ()
         model = parts.machine

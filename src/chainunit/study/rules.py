@@ -10,7 +10,7 @@ from typing import Any
 
 from ..core.errors import InputError, shown
 from ..drives.motors import MOTORS
-from ..machines.paper_ratios import lengths
+from ..machines.paper_ratios import Ratios, lengths
 from ..models import MACHINES
 from ..reading.tables import filled
 from .conditions import (
@@ -26,7 +26,6 @@ from .conditions import (
 from .foreign_machine import ForeignModel
 from .parts import FMU, Parts, parts_of
 from .registry import registered
-from .sections import Ratios
 
 
 @dataclass(frozen=True)

@@ -226,9 +226,8 @@ def identify(
         return machine
     assumed = tuned_gains(config.motor, config.file.given)
     try:
-        return replace(
-            machine, known=replace(known, sets=suspect_sets(problem, best, workers, assumed, progress))
-        )
+        sets = suspect_sets(problem, best, workers, assumed, progress)
+        return replace(machine, known=replace(known, sets=sets))
     except KeyboardInterrupt:
         return replace(machine, failure=InterruptedRunError("the search for suspects was interrupted"))
 

@@ -164,11 +164,8 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
     return IdentificationSummary(
         heading=Heading.of(machine.config.title, machine.config.file),
         is_described=machine.is_described,
-        status=(
-            "complete"
-            if machine.is_described
-            else f"the model does not describe the recordings{f'; {machine.failure}' if machine.failure else ''}"
-        ),
+        status=("complete" if machine.is_described else "the model does not describe the recordings")
+        + (f"; {machine.failure}" if machine.failure else ""),
         sought=len(estimates),
         told=sum(each.is_determined for each in estimates.values()),
         runs={run.name: _run(machine, k) for k, run in enumerate(machine.plan.runs)},

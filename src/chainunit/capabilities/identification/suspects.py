@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -57,8 +57,7 @@ MARGIN = 25.0
 NEARLY, OTHERS = 40.0, 6
 """Factor on this margin within which the quadratic form is no judge, and number of sets that are fitted there."""
 MOST_FITS = (SEARCHES + 1) * FEW + OTHERS
-MOST_STEPS = MOST_FITS + SEARCHES + 2
-"""Most fits with suspects, and most steps of a search: these fits, and the fits around which numbers are freed."""
+"""Most fits with suspects."""
 MOST_SETS = 12
 """Most sets of suspects that are named."""
 
@@ -133,15 +132,6 @@ class KnownNumbers:
         """Whether the recordings contradict the law of friction."""
         return self.law is not None and self.law.is_rejected
 
-    @property
-    def suspects(self) -> tuple[Suspect, ...]:
-        """All suspects, those of the best set first."""
-        of_name = dict[str, Suspect]()
-        for each in self.sets:
-            for suspect in each.suspects:
-                of_name.setdefault(suspect.name, suspect)
-        return tuple(of_name.values())
-
 
 def is_described(
     problem: Problem, best: Fit, tests: Sequence[ResidualTest], around: Posterior, known: KnownNumbers
@@ -203,7 +193,6 @@ class _Search:
         self._more = known_numbers(problem.plant, {u.name for u in problem.sought}, assumed)
         self._fits = dict[frozenset[str], tuple[Problem, Fit]]()
         self._failed = set[frozenset[str]]()
-        self._steps = 0
 
     def sets(self) -> Iterator[SuspectSet]:
         """The sets that explain the recordings about as well as the best one, the best first. If none explains them,
@@ -241,7 +230,8 @@ class _Search:
 
     def _best_freed(self) -> _Freed:
         """The known numbers, freed around the best fit with one or two of them."""
-        first = freed = self._freed_around(self._problem, self._best)
+        self._progress("suspects", 0.0, MOST_FITS)
+        first = freed = _Freed.around(self._problem, self._best, self._more, self._workers)
         for k in range(SEARCHES):
             ranked = [names for names, _ in freed.ranked()]
             if self._try(ranked, freed) or not self._fits:
@@ -249,13 +239,8 @@ class _Search:
             if k == 0:
                 # far from straight, the form shows a second number only after the first one is right
                 self._try([names for names in ranked if len(names) == 1], first)
-            freed = self._freed_around(*self._fits[self._winner()])
-        return self._freed_around(*self._fits[self._winner()]) if self._fits else freed
-
-    def _freed_around(self, problem: Problem, best: NormalEquations) -> _Freed:
-        """The known numbers, freed around this fit, as a step of the search."""
-        self._progress_of("derivatives")(0, 0.0)
-        return _Freed.around(problem, best, self._more, self._workers)
+            freed = _Freed.around(*self._fits[self._winner()], self._more, self._workers)
+        return _Freed.around(*self._fits[self._winner()], self._more, self._workers) if self._fits else freed
 
     def _winner(self) -> frozenset[str]:
         return min(self._fits, key=lambda names: _cost(*self._fits[names]))
@@ -279,24 +264,17 @@ class _Search:
             if name in wider.place:
                 z[wider.place[name]] = x
         z = np.clip(z, *wider.bounds)
+        words = f"suspects, at most {MOST_FITS} fits ({' and '.join(sorted(names))})"
+        tried = len(self._fits) + len(self._failed)
+
+        def progress(rounds: int, _: float) -> None:
+            # a fit has its rounds over the first turns, and over the whole
+            self._progress(words, tried + min(1.0, 0.5 * rounds / MOST_ROUNDS), MOST_FITS)
+
         try:
-            self._fits[names] = (
-                wider,
-                fit(
-                    wider, z, self._workers, self._progress_of(" and ".join(sorted(names))), most=MOST_ROUNDS
-                ),
-            )
+            self._fits[names] = wider, fit(wider, z, self._workers, progress, most=MOST_ROUNDS)
         except (RunError, InputError):
             self._failed.add(names)
-
-    def _progress_of(self, step: str) -> Callable[[int, float], None]:
-        """The function for the rounds of the next step. A fit has rounds over the first turns, and over the whole."""
-        complete, self._steps = self._steps, self._steps + 1
-        return lambda rounds, cost: self._progress(
-            f"suspects, at most {MOST_FITS} fits ({step})",
-            complete + min(1.0, 0.5 * rounds / MOST_ROUNDS),
-            MOST_STEPS,
-        )
 
     def _describes(self, names: frozenset[str]) -> bool | None:
         """Whether the model with these numbers sought describes the recordings; None if no fit was made."""
