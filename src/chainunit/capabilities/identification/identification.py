@@ -103,21 +103,21 @@ class IdentifiedMachine:
         marginals = zip(self.plan.sought, self.best.z, self.posterior.marginals, strict=False)
         if not self.is_described:
             return {
-                own.name: FittedNumber(own, float(x), own.start, own.prior_deviation, *own.interval, False)
-                for own, x, _ in marginals
+                u.name: FittedNumber(u, float(x), u.start, u.prior_deviation, *u.interval, False)
+                for u, x, _ in marginals
             }
-        determined = {each.name: each.is_determined for each in self.information_at_fit.determinations}
+        determined = {d.name: d.is_determined for d in self.information_at_fit.determinations}
         return {
-            own.name: FittedNumber(
-                own,
+            u.name: FittedNumber(
+                u,
                 float(x),
-                each.value,
-                each.deviation,
-                each.low,
-                each.high,
-                determined[each.name] and not _bound_of(own, float(x)),
+                m.value,
+                m.deviation,
+                m.low,
+                m.high,
+                determined[m.name] and not _bound_of(u, float(x)),
             )
-            for own, x, each in marginals
+            for u, x, m in marginals
         }
 
     @property
@@ -220,14 +220,14 @@ def identify(
     progress("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False, at=best)
     around = posterior(problem, best, workers, plan.seed)
-    known, residuals = known_number_tests(problem, best, workers), tuple(residual_tests(best))
-    machine = IdentifiedMachine(config, plan, problem, before, best, around, after, residuals, known)
+    numbers, residuals = known_number_tests(problem, best, workers), tuple(residual_tests(best))
+    machine = IdentifiedMachine(config, plan, problem, before, best, around, after, residuals, numbers)
     if machine.is_described:
         return machine
     assumed = tuned_gains(config.motor, config.file.given)
     try:
         sets = suspect_sets(problem, best, workers, assumed, progress)
-        return replace(machine, known=replace(known, sets=sets))
+        return replace(machine, known=replace(numbers, sets=sets))
     except KeyboardInterrupt:
         return replace(machine, failure=InterruptedRunError("the search for suspects was interrupted"))
 

@@ -134,11 +134,11 @@ class KnownNumbers:
 
 
 def is_described(
-    problem: Problem, best: Fit, tests: Sequence[ResidualTest], around: Posterior, known: KnownNumbers
+    problem: Problem, best: Fit, tests: Sequence[ResidualTest], around: Posterior, numbers: KnownNumbers
 ) -> bool:
     """Whether the model of an identification describes the recordings: the fit does so, no bound is active, and the
     recordings contradict no known number."""
-    return describes(problem, best, tests) and not around.active_bounds and not known.are_rejected
+    return describes(problem, best, tests) and not around.active_bounds and not numbers.are_rejected
 
 
 def known_numbers(plant: AnyPlant, sought: Collection[str], assumed: Collection[str] = ()) -> list[Unknown]:
@@ -264,12 +264,12 @@ class _Search:
             if name in wider.place:
                 z[wider.place[name]] = x
         z = np.clip(z, *wider.bounds)
-        words = f"suspects, at most {MOST_FITS} fits ({' and '.join(sorted(names))})"
+        title = f"suspects, at most {MOST_FITS} fits ({' and '.join(sorted(names))})"
         tried = len(self._fits) + len(self._failed)
 
         def progress(rounds: int, _: float) -> None:
             # a fit has its rounds over the first turns, and over the whole
-            self._progress(words, tried + min(1.0, 0.5 * rounds / MOST_ROUNDS), MOST_FITS)
+            self._progress(title, tried + min(1.0, 0.5 * rounds / MOST_ROUNDS), MOST_FITS)
 
         try:
             self._fits[names] = wider, fit(wider, z, self._workers, progress, most=MOST_ROUNDS)
@@ -289,17 +289,19 @@ class _Search:
         if names in self._fits:
             wider, best = self._fits[names]
             values = {name: float(best.z[wider.place[name]]) for name in names}
-        known = {u.name: u for u in self._more}
+        numbers = {u.name: u for u in self._more}
         kinds = {v.name: v.kind for v, _ in self._problem.plant.parameters()}
         suspects = (
-            Suspect(name, known[name].unit, kinds[name], known[name].start, x, name not in self._assumed)
-            for name, x in sorted(values.items(), key=lambda each: -abs(each[1] / known[each[0]].start - 1.0))
+            Suspect(name, numbers[name].unit, kinds[name], numbers[name].start, x, name not in self._assumed)
+            for name, x in sorted(
+                values.items(), key=lambda item: -abs(item[1] / numbers[item[0]].start - 1.0)
+            )
         )
         return SuspectSet(tuple(suspects), excess, self._describes(names))
 
 
 def _sorted(costs: Mapping[frozenset[str], float]) -> list[tuple[frozenset[str], float]]:
-    return sorted(costs.items(), key=lambda each: each[1])
+    return sorted(costs.items(), key=lambda item: item[1])
 
 
 def _smallest(sets: Iterable[frozenset[str]]) -> list[frozenset[str]]:
@@ -328,30 +330,30 @@ class _Freed:
     """The sum of squares around a fit as a quadratic form in the changes of further numbers from their known values,
     with all sought numbers free."""
 
-    def __init__(self, problem: Problem, at: NormalEquations, more: Sequence[Unknown]) -> None:
+    def __init__(self, problem: Problem, best: NormalEquations, more: Sequence[Unknown]) -> None:
         self._more, self._names = more, [u.name for u in more]
         places = [problem.place[name] for name in self._names]
-        free = [k for k in range(len(at.z)) if k not in set(places)]
-        self._now = at.z[places] - np.array([u.start for u in more])
+        free = [k for k in range(len(best.z)) if k not in set(places)]
+        self._now = best.z[places] - np.array([u.start for u in more])
         self._prior = np.array([u.prior_deviation for u in more]) ** -2.0
-        self._free = {u.name: float(at.z[k]) for k, u in enumerate(problem.unknowns) if k in set(free)}
-        scale = 1.0 / np.sqrt(np.diag(at.matrix)[free])
-        inner = at.matrix[np.ix_(free, free)] * np.outer(scale, scale)
-        cross = scale[:, None] * at.fisher[np.ix_(free, places)]
-        own: Any = np.linalg.solve(inner, np.column_stack([cross, scale * at.gradient[free]]))
+        self._free = {u.name: float(best.z[k]) for k, u in enumerate(problem.unknowns) if k in set(free)}
+        scale = 1.0 / np.sqrt(np.diag(best.matrix)[free])
+        inner = best.matrix[np.ix_(free, free)] * np.outer(scale, scale)
+        cross = scale[:, None] * best.fisher[np.ix_(free, places)]
+        solution: Any = np.linalg.solve(inner, np.column_stack([cross, scale * best.gradient[free]]))
         # the steps of all others, and how they follow these numbers
-        self._others = scale * own[:, -1], scale[:, None] * own[:, :-1]
-        self._alone = np.diag(at.fisher)[places]
-        self._form = at.fisher[np.ix_(places, places)] - cross.T @ own[:, :-1]
+        self._others = scale * solution[:, -1], scale[:, None] * solution[:, :-1]
+        self._alone = np.diag(best.fisher)[places]
+        self._form = best.fisher[np.ix_(places, places)] - cross.T @ solution[:, :-1]
         # of the recordings alone: the weights of these numbers are counted by themselves
-        gradient = at.gradient[places] + self._prior * self._now
-        self._pull = gradient - cross.T @ own[:, -1]
+        gradient = best.gradient[places] + self._prior * self._now
+        self._pull = gradient - cross.T @ solution[:, -1]
 
     @classmethod
-    def around(cls, problem: Problem, at: NormalEquations, more: Sequence[Unknown], workers: int) -> _Freed:
-        """Around the fit `at` of a problem, in which some of the further numbers may be sought."""
-        wider, z = _wider(problem, at.z, more)
-        scales = {key: 1.0 / weight for key, weight in at.weights.items()}
+    def around(cls, problem: Problem, best: NormalEquations, more: Sequence[Unknown], workers: int) -> _Freed:
+        """Around the fit `best` of a problem, in which some of the further numbers may be sought."""
+        wider, z = _wider(problem, best.z, more)
+        scales = {key: 1.0 / weight for key, weight in best.weights.items()}
         return cls(wider, assemble(wider, z, tuple(wider.comparisons(z, workers)), scales), more)
 
     def tests(self) -> Iterator[ScoreTest]:
@@ -373,19 +375,19 @@ class _Freed:
     def point(self, names: Collection[str]) -> dict[str, float]:
         """The same with the values of all other unknowns that follow."""
         values = self.values(names)
-        known = zip(self._more, self._now, strict=True)
-        steps = [values.get(u.name, u.start) - u.start - now for u, now in known]
-        own, following = self._others
-        changes = own - following @ np.array(steps)
+        pairs = zip(self._more, self._now, strict=True)
+        steps = [values.get(u.name, u.start) - u.start - now for u, now in pairs]
+        alone, following = self._others
+        changes = alone - following @ np.array(steps)
         others = zip(self._free.items(), changes, strict=True)
         return {name: x + float(change) for (name, x), change in others} | values
 
     def ranked(self) -> list[tuple[frozenset[str], float]]:
         """The sets of one and of two numbers with their sums of squares, the best first."""
-        told = [k for k in range(len(self._more)) if self._form[k, k] > ROUNDING * self._alone[k]]
-        sets = [(k,) for k in told] + list(itertools.combinations(told, 2))
+        determined = [k for k in range(len(self._more)) if self._form[k, k] > ROUNDING * self._alone[k]]
+        sets = [(k,) for k in determined] + list(itertools.combinations(determined, 2))
         costs = [(frozenset(self._names[k] for k in places), self._solution(places)[1]) for places in sets]
-        return sorted(costs, key=lambda each: each[1])
+        return sorted(costs, key=lambda item: item[1])
 
     def _places(self, names: Collection[str]) -> tuple[int, ...]:
         return tuple(k for k, name in enumerate(self._names) if name in names)
@@ -434,11 +436,11 @@ def _law_test(problem: Problem, best: NormalEquations, workers: int) -> ScoreTes
         alone += weight * float(slope @ slope)
         pull += weight * float(slope @ (root * here.residuals))
     scale = 1.0 / np.sqrt(np.diag(best.matrix))
-    own: Any = np.linalg.solve(best.matrix * np.outer(scale, scale), scale * cross)
-    information = alone - float(scale * cross @ own)
+    solution: Any = np.linalg.solve(best.matrix * np.outer(scale, scale), scale * cross)
+    information = alone - float(scale * cross @ solution)
     if information <= ROUNDING * alone:
         return ScoreTest(LAW, v.unit, x, 0.0, math.inf)
-    change = (pull - float(own @ (scale * best.gradient))) / information
+    change = (pull - float(solution @ (scale * best.gradient))) / information
     return ScoreTest(LAW, v.unit, x, change, 1.0 / math.sqrt(information))
 
 
