@@ -207,9 +207,7 @@ class ChainUnitMachine(Machine):
         with np.errstate(invalid="ignore"):
             return chain_unit.chamber(_XP, self.p, loads, psi, w, a)
 
-    def _at_rocker(
-        self, psi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads
-    ) -> tuple[Inputs, Any, Any, Any]:
+    def _at_rocker(self, psi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads) -> tuple[Any, ...]:
         """The loads and the motion of the rocker, checked."""
         loads = self._inputs(0.0, 0.0, 0.0, left, right)
         motion = {name: admit(_ROCKER[name], x) for name, x in (("psi", psi), ("w", w), ("a", a))}

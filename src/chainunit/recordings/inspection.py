@@ -162,20 +162,28 @@ def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str
     """The column that tells that the crank turns at another speed than the `stated` one, and that speed [rad/s]: the
     mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that
     repeats after a turn at this speed."""
-    seen = list[tuple[float, str]]()
-    for name in ("mark", "motor.count", speed_column(recording)):
-        alone = replace(recording, columns={key: x for key, x in recording.columns.items() if key == name})
-        seen.append((mean_speed(RecordedRun("", alone, 0.0), ratio), name))
-    seen = [each for each in seen if each[0] > 0.0]
-    if not seen or max(seen)[0] > SAME * min(seen)[0] or stated / SAME < seen[0][0] < SAME * stated:
+    speeds = _mean_speeds(recording, ratio)
+    low, high = min(speeds.values(), default=0.0), max(speeds.values(), default=0.0)
+    if high > SAME * low or stated / SAME < high < SAME * stated or not speeds:
         return None
-    speed, name = seen[0]
+    name, speed = next(iter(speeds.items()))
     # without a measured speed, the unit of the times may be another one, too
     if not speed_column(recording) and _likely_unit(recording, 2.0 * math.pi / stated, LONGEST):
         return None
     analog = (other for other in recording.columns if MEASURANDS[other].analog and other != name)
     repeats = any(_turn(recording, other, 2.0 * math.pi / speed)[0] > ALIKE for other in analog)
-    return (name, speed) if len(seen) > 1 or repeats else None
+    return (name, speed) if len(speeds) > 1 or repeats else None
+
+
+def _mean_speeds(recording: Recording, ratio: float) -> dict[str, float]:
+    """The mean speed of the crank [rad/s] by each column that tells it: the mark, the count of an encoder, and the
+    measured speed."""
+    speeds = {}
+    for name in ("mark", "motor.count", speed_column(recording)):
+        if name in recording.columns and (name != "mark" or len(mark_times(recording)) > FEWEST_TURNS):
+            alone = replace(recording, columns={name: recording.columns[name]})
+            speeds[name] = mean_speed(RecordedRun("", alone, 0.0), ratio)
+    return {name: speed for name, speed in speeds.items() if speed > 0.0}
 
 
 def _speed_fault(recording: Recording, name: str, speed: float, stated: float) -> InputError:
@@ -231,12 +239,10 @@ def _turning_speed(
     without one."""
     span = float(recording.time[-1] - recording.time[0])
     clock = CLOCK + recording.step / span
-    for name, is_there in (
-        ("mark", len(mark_times(recording)) > FEWEST_TURNS),
-        ("motor.count", "motor.count" in recording.columns),
-    ):
-        if is_there:
-            return name, mean_speed(RecordedRun("", recording, crank_speed), ratio), clock
+    speeds = _mean_speeds(recording, ratio)
+    for name, speed in speeds.items():
+        if name != speed_column(recording):
+            return name, speed, clock
     turns = [
         (like, name, turn)
         for name in recording.columns
@@ -247,8 +253,7 @@ def _turning_speed(
     if turns:
         _, name, turn = max(turns)
         return name, 2.0 * math.pi / turn, 2.0 * clock
-    speed = measured_speed(recording, ratio)
-    return None if speed is None else (speed_column(recording), float(np.mean(speed)), clock + GAINS * gain)
+    return next(((name, speed, clock + GAINS * gain) for name, speed in speeds.items()), None)
 
 
 def _turn(recording: Recording, name: str, stated: float) -> tuple[float, float]:
