@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -50,14 +50,14 @@ RANGE = 4.0
 FEW, SEARCHES = 3, 3
 """Number of sets of suspects with which the recordings are fitted again around a fit, and most fits around which the
 known numbers are freed to find such sets."""
-MOST_ROUNDS = 15
-"""Most rounds of a fit with suspects: it begins near its end if they are the right ones."""
+MOST_ROUNDS, USUAL_ROUNDS = 15, 5
+"""Most and usual rounds of a fit with suspects: it begins near its end if they are the right ones."""
 MARGIN = 25.0
 """Sum of squares, in parts of that of noise, by which a set of suspects may be worse than the best one."""
 NEARLY, OTHERS = 40.0, 6
 """Factor on this margin within which the quadratic form is no judge, and number of sets that are fitted there."""
-MOST_FITS = (SEARCHES + 1) * FEW + OTHERS
-"""Most fits with suspects."""
+MOST_STEPS = (SEARCHES + 1) * FEW + OTHERS + SEARCHES + 2
+"""Most steps of a search: fits with suspects, and fits around which known numbers are freed."""
 MOST_SETS = 12
 """Most sets of suspects that are named."""
 
@@ -193,6 +193,7 @@ class _Search:
         self._more = known_numbers(problem.plant, {u.name for u in problem.sought}, assumed)
         self._fits = dict[frozenset[str], tuple[Problem, Fit]]()
         self._failed = set[frozenset[str]]()
+        self._steps = 0
 
     def sets(self) -> Iterator[SuspectSet]:
         """The sets that explain the recordings about as well as the best one, the best first. If none explains them,
@@ -230,8 +231,7 @@ class _Search:
 
     def _best_freed(self) -> _Freed:
         """The known numbers, freed around the best fit with one or two of them."""
-        self._progress("suspects", 0.0, MOST_FITS)
-        first = freed = _Freed.around(self._problem, self._best, self._more, self._workers)
+        first = freed = self._freed_around(self._problem, self._best)
         for k in range(SEARCHES):
             ranked = [names for names, _ in freed.ranked()]
             if self._try(ranked, freed) or not self._fits:
@@ -239,8 +239,23 @@ class _Search:
             if k == 0:
                 # far from straight, the form shows a second number only after the first one is right
                 self._try([names for names in ranked if len(names) == 1], first)
-            freed = _Freed.around(*self._fits[self._winner()], self._more, self._workers)
-        return _Freed.around(*self._fits[self._winner()], self._more, self._workers) if self._fits else freed
+            freed = self._freed_around(*self._fits[self._winner()])
+        return self._freed_around(*self._fits[self._winner()]) if self._fits else freed
+
+    def _freed_around(self, problem: Problem, best: NormalEquations) -> _Freed:
+        self._step("derivatives")
+        return _Freed.around(problem, best, self._more, self._workers)
+
+    def _step(self, title: str) -> Callable[[int, float], None]:
+        """Begin a step; the function reports the rounds of a fit."""
+        complete, self._steps = self._steps, self._steps + 1
+
+        def report(rounds: int, _: float) -> None:
+            share = complete + rounds / (rounds + USUAL_ROUNDS)
+            self._progress(f"suspects, at most {MOST_STEPS} steps ({title})", share, MOST_STEPS)
+
+        report(0, 0.0)
+        return report
 
     def _winner(self) -> frozenset[str]:
         return min(self._fits, key=lambda names: _cost(*self._fits[names]))
@@ -264,13 +279,7 @@ class _Search:
             if name in wider.place:
                 z[wider.place[name]] = x
         z = np.clip(z, *wider.bounds)
-        title = f"suspects, at most {MOST_FITS} fits ({' and '.join(sorted(names))})"
-        tried = len(self._fits) + len(self._failed)
-
-        def progress(rounds: int, _: float) -> None:
-            # a fit has its rounds over the first turns, and over the whole
-            self._progress(title, tried + min(1.0, 0.5 * rounds / MOST_ROUNDS), MOST_FITS)
-
+        progress = self._step(" and ".join(sorted(names)))
         try:
             self._fits[names] = wider, fit(wider, z, self._workers, progress, most=MOST_ROUNDS)
         except (RunError, InputError):
