@@ -494,7 +494,7 @@ def test_a_direct_model_has_the_torque_that_holds_its_speed():
             'give the number of one, as in "equilibrium:1", or a place, "phi=.., w=0"',
         ),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam:2 s"}, "there is no run"),
-        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, "--at"),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, 'at = "2 kg"'),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, 'at = "start_up": must be RUN:TIME'),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "steady:1 s"}, "steady running begins at "),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam_left:1 s"}, "the run of jam_left goes from"),
