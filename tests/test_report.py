@@ -23,6 +23,7 @@ from chainunit.report import html, print_figures, terminal
 from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
+from chainunit.report.result_figures import ResultFigure
 from chainunit.study.config import Run
 
 RESULT = {
@@ -156,6 +157,30 @@ def test_one_screen_counts_the_rows_that_it_leaves_out(count):
     shown = sum("row " in line for line in lines if line.startswith("│"))
     left = sum(int(number) for line in lines for number in re.findall(r"^[.]{3} and (\d+) more rows$", line))
     assert shown + left == count and len(lines) <= 45 and "of the page" not in "".join(lines)
+
+
+@pytest.mark.parametrize("text_of", [screen_of, lambda report: terminal.brief(report, 0).splitlines()])
+def test_a_long_table_is_printed_a_few_times_to_find_its_room(text_of, monkeypatch):
+    """On one screen and in a notebook alike, and not once for each row that is left out."""
+    printed, show = [], terminal._show_table
+    monkeypatch.setattr(terminal, "_show_table", lambda *args: printed.append(args) or show(*args))
+    rows = tuple(b.TableRow((f"row {k}", S.number("power"))) for k in range(1000))
+    table = b.Table(rows, (b.Column("row"), b.Column("power")))
+    lines = text_of(b.Report("A title", "kind", RESULT, (), (b.Section("answer", "", (table,)),)))
+    (left,) = (int(line.split()[2]) for line in lines if re.fullmatch(r"[.]{3} and \d+ more rows", line))
+    assert sum("row " in line for line in lines if line.startswith("│")) + left == 1000 and left < 990
+    assert len(printed) <= 12
+
+
+def test_a_notebook_draws_a_figure_once(monkeypatch):
+    figure, drawn, draw = ResultFigure(a_figure(), DEFAULT_UNITS), [], ResultFigure.to_matplotlib
+    monkeypatch.setattr(ResultFigure, "to_matplotlib", lambda self: drawn.append(self) or draw(self))
+    ways = (
+        getattr(figure, f"_repr_{kind}_", None)
+        for kind in ("html", "png", "svg", "jpeg", "pdf", "mimebundle")
+    )
+    shown = [way() for way in ways if way is not None]
+    assert len(shown) == len(drawn) == 1 and shown[0].startswith(b"\x89PNG")
 
 
 def test_the_chosen_units_are_everywhere():

@@ -14,8 +14,9 @@ from ..core.errors import Faults, GeometryError, InputError, each_refusal, refus
 from ..core.quantities import Layout, variables
 from ..drives.catalogue import CatalogueMotor
 from ..machines.admissible import admits, causes
-from ..machines.api import machine_of, ratios
+from ..machines.api import machine_of
 from ..machines.machine import Machine
+from ..machines.paper_ratios import Ratios, of_ratios
 from ..mechanism.models import MachineModel
 from ..reading.tables import (
     UnusualValue,
@@ -56,7 +57,6 @@ from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
-    Ratios,
     Run,
     all_choices,
 )
@@ -437,11 +437,12 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
 
 def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
+    make: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
     if of_papers:
-        return _machine_of_papers(parts.machine, given, filled(Ratios, of_papers))
+        with refusal_prefix("ratios: ", "ratios"):
+            return of_ratios(lambda lengths: make(parts.machine, given | lengths), filled(Ratios, of_papers))
     try:
-        of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
-        return of(parts.machine, given)
+        return make(parts.machine, given)
     except InputError as error:
         names = error.names if isinstance(error, GeometryError) else ()
         model = parts.machine
@@ -450,33 +451,9 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
             spoil = causes(admits(model), given, model.parameter_layout, model.Parameters())
         # the value that spoils the machine, and not one whose range that value sets
         key = next((f"machine.{name}" for name in (*spoil, *names) if name in given), "machine")
-        line = f"machine: {error}{_taken_over(error, model, given)}{_remedy(spoil)}"
+        ranges = f"; with all other values as they are, {', or '.join(spoil.values())}" if spoil else ""
+        line = f"machine: {error}{_taken_over(error, model, given)}{ranges}"
         raise InputError(line, key=key) from error
-
-
-def _machine_of_papers(model: Any, given: Mapping[str, float], of_papers: Mapping[str, float]) -> Machine:
-    """The machine whose lengths follow from ratios."""
-    admitted = admits(model)
-
-    def holds(values: Mapping[str, float]) -> bool:
-        try:
-            return admitted({**given, **ratios(**values)})
-        except GeometryError:
-            return False
-
-    with refusal_prefix("ratios: ", "ratios"):
-        lengths = ratios(**of_papers)
-    try:
-        return machine_of(model, {**given, **lengths})
-    except GeometryError as error:
-        spoil = causes(holds, of_papers, Layout(Ratios), Ratios())
-        key = f"ratios.{next(iter(spoil))}" if spoil else "ratios"
-        raise InputError(f"ratios: {error}{_remedy(spoil)}", key=key) from error
-
-
-def _remedy(spoil: Mapping[str, str]) -> str:
-    """Words to follow a refusal: the ranges of the values that spoil the machine."""
-    return f"; with all other values as they are, {', or '.join(spoil.values())}" if spoil else ""
 
 
 def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[str, float]) -> str:

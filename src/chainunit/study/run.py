@@ -85,7 +85,7 @@ def run_study(
         drive = with_parts_beside(choice.drive, config.plans, config.feed, turn)
         if check and drive.foreign_titles:
             titles = " and ".join(drive.foreign_titles)
-            raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
+            raise InputError(f"check: the equations of {titles} are not known; leave it out")
         study = StudyRecord(config, drive, statics(drive, turns, config.run.step), choice.proposal)
         if choice.proposal is not None:
             study.findings[choice.proposal.name] = choice.proposal.findings
