@@ -3,8 +3,8 @@
 A run without named files and without ``-m`` is the first stage. It leaves out the second, which is marked `second`:
 FMUs in other clients; processes that are stopped, killed or spread; the structure of the package; the examples, the
 papers, the tables of the standard; and studies whose cases the first stage has in parts. ``.ci/run`` runs both.
-``.ci/full`` runs what is marked `slow`: importers, other programs, platforms, browsers, sheets, the longest studies. A
-named file runs with all of its tests, except the slow ones.
+``.ci/full`` runs what is marked `slow`: importers, other programs, platforms, browsers, sheets, long studies. A named
+file runs with all of its tests, except the slow ones.
 
 An FMU costs a test little: what exports compile is kept by its content, whichever worker, test or process asks, and
 for later runs of the tests, too (see `chainunit.core.native.cache`). Beyond that,

@@ -19,7 +19,7 @@ from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
 _BRACKETS = re.compile(r" ?\([^()]*\)")
-_CLAUSE_END = re.compile(r"(?<=.{20})(?:[:;.] |, (?=(?:which|where|as|so that) ))")
+_CLAUSE_END = re.compile(r"(?<=.{30})(?:[:;.] |, (?=(?:which|where|as|so that) ))")
 
 
 def plain_line(line: Line, units: Units = DEFAULT_UNITS) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..core.brief import briefly_shown
 from ..core.errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
-from ..core.quantities import Layout, variables
+from ..core.quantities import USUAL, Layout, variables
 from ..drives.catalogue import CatalogueMotor
 from ..machines.admissible import admits, causes
 from ..machines.api import machine_of
@@ -272,7 +272,8 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
     replaced = {f"parameters.{name}" for name in named_table(data, "machine")}
     replaced |= {f"inputs.{name}" for name in named_table(data, "feed")}
     unusual = tuple(value for value in parts.unusual if value.name not in replaced)
-    unusual += tuple(unusual_values(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
+    usual = {"run.crank_speed": parts.machine.usual_speed, **_usual_lengths(parts.machine, form)}
+    unusual += tuple(unusual_values(declared, data, usual))
     with each_refusal(lambda fault: _with_hints(fault, unusual)):
         events = read_events(form.event, parts.machine)
         if "event" in data:
@@ -293,6 +294,16 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             labels=form.report.labels,
         )
         return _config(form, parts, events, contents)
+
+
+def _usual_lengths(machine: type[MachineModel], form: Any) -> dict[str, tuple[float, float]]:
+    """The usual sizes of lengths that another length of the file limits; see `InverseMachine.within`."""
+    low, high = USUAL["m"]
+    return {
+        f"machine.{name}": (low, min(most, high))
+        for name, longer in machine.within.items()
+        if (most := getattr(form.machine, longer, None)) is not None
+    }
 
 
 def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputError:

@@ -37,7 +37,9 @@ def checked_dimension(text: str, known: Dimensions, unit: str | None) -> Dimensi
     if not (of.names or of.extremes or of.tables):
         return None
     if unit is not None and result is not None and result != dimension_of_unit(unit):
-        remedy = "" if result else ": multiply by a parameter that has it, as a number in a product has no unit"
+        remedy = (
+            "" if result else ": multiply by a parameter that has it, as a number in a product has no unit"
+        )
         raise InputError(f"is {shown(text)}, in {_unit(result)}; must be in {unit.replace('.', ' ')}{remedy}")
     return result
 
