@@ -391,7 +391,7 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
             "Warning: Crank speed too high for the rocker torque of two bars.",
         ),
         (
-            "Warning: Steady running: the crank makes 0.283 of a turn in the 9.69 s that are evaluated; means are so.",
+            "Warning: Steady running: the crank makes 0.283 of a turn in the 9.69 s that are evaluated; so.",
             "Warning: Steady running: the crank makes 0.283 of a turn in the 9.69 s that ...",
         ),
         ("Warning: " + "word " * 20, "Warning: " + "word " * 13 + "..."),

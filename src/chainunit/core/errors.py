@@ -174,10 +174,11 @@ def texts_in(name: str, value: Any) -> tuple[str, ...]:
 
 
 def near_name(given: str, known: Iterable[str]) -> str:
-    """Words to add to the refusal of a name that is similar to one of the `known` names, or of several words one of
-    which is such a name; else empty."""
+    """Words to add to the refusal of a name that is similar to one of the `known` names or begins it, or of several
+    words one of which is such a name; else empty."""
     names = {name.lower(): name for name in known}
     near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=0.75)
+    near = near or [name for name in names if name.startswith(f"{given.lower()}_")]
     near = near or [word for word in given.lower().split() if word in names and " " in given]
     return f'; was "{names[near[0]]}" meant?' if near else ""
 
