@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-LOAD_CLASSES = ("uniform", "moderate", "heavy")
-"""The classes of loads I, II and III: uniform, moderate shocks, heavy shocks."""
-LOAD_WORDS = dict(zip(LOAD_CLASSES, ("uniform load", "moderate shocks", "heavy shocks"), strict=True))
+_WORDS = ("uniform load", "moderate shocks", "heavy shocks", "very heavy shocks")
+LOAD_CLASSES = ("uniform", "moderate", "heavy", "very heavy")
+"""The classes of loads I, II and III of gears: uniform, moderate shocks, heavy shocks; these are light, medium and heavy
+drives by belts, for which crushers and calenders are very heavy. A gear has no heavier class than III."""
+LOAD_WORDS = dict(zip(LOAD_CLASSES, _WORDS, strict=True))
 INERTIA_FACTORS = (0.2, 3.0, 10.0)
 """Largest inertia factor of each class; above the last one makers of gears want to be asked."""
 
@@ -22,6 +24,7 @@ _GEAR: Mapping[str, tuple[float, ...]] = {
     "uniform": (1.0, 1.1, 1.2),
     "moderate": (1.2, 1.3, 1.4),
     "heavy": (1.4, 1.5, 1.6),
+    "very heavy": (1.4, 1.5, 1.6),
 }
 _STARTS, _MORE = 300.0, 0.2
 """Starts an hour from which on the factor does not rise any more, and its rise up to there."""
@@ -30,24 +33,26 @@ _BELT: Mapping[str, tuple[float, ...]] = {
     "uniform": (1.1, 1.1, 1.2),
     "moderate": (1.1, 1.2, 1.3),
     "heavy": (1.2, 1.3, 1.4),
+    "very heavy": (1.3, 1.4, 1.5),
 }
 _BELT_ON_LINE: Mapping[str, tuple[float, ...]] = {
     "uniform": (1.1, 1.2, 1.3),
     "moderate": (1.2, 1.3, 1.4),
     "heavy": (1.4, 1.5, 1.6),
+    "very heavy": (1.5, 1.6, 1.8),
 }
 
 
 def load_class(inertia_factor: float) -> str:
     """The class of a load by its inertia factor."""
-    steps = zip(INERTIA_FACTORS, LOAD_CLASSES, strict=True)
-    return next((name for most, name in steps if inertia_factor <= most), LOAD_CLASSES[-1])
+    steps = zip(INERTIA_FACTORS, LOAD_CLASSES, strict=False)
+    return next((name for most, name in steps if inertia_factor <= most), "heavy")
 
 
 def gear_factor(load: str, hours: float, starts: float) -> float:
     """Service factor fB of a gear for that class of `load`, one of `LOAD_CLASSES`, by `hours` a day and `starts` an
-    hour."""
-    return _in_hours(_GEAR[load], _STEPS, hours) + _MORE * min(1.0, starts / _STARTS)
+    hour, with the two decimals of makers."""
+    return round(_in_hours(_GEAR[load], _STEPS, hours) + _MORE * min(1.0, starts / _STARTS), 2)
 
 
 def belt_factor(load: str, hours: float, *, is_on_line: bool) -> float:

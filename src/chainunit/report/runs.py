@@ -111,7 +111,7 @@ def _beside_the_worst(s: b.Source, study: StudyRecord, whole: b.Table) -> b.Tabl
     title = whole.title
     if peaks:
         shown.append(max(peaks, key=lambda run: abs(peaks[run])))
-        bare = " (without torque limiter)" if study.proposal is not None else ""
+        bare = " (without torque limiter)" if study.proposal is not None and study.config.coupling is None else ""
         title = f"Steady running beside the worst overload{bare}: {run_names.title(study, shown[-1])}{_doubt(study)}"
     places = [0, *(1 + runs.index(run) for run in shown)]
     rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)

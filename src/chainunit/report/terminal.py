@@ -13,12 +13,16 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Styled
 
+from ..core.unit_table import UNITS
 from ..reading.text import DEFAULT_UNITS, Units, number
 from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
 _BRACKETS = re.compile(r" ?\([^()]*\)")
+_UNIT = re.compile(r"(?<=\d) ([^\s,;()]+(?: m[²³]?(?![\w/]))?)")
+_KEPT = "\ue000"
+"""The mark of a blank at which no line may end."""
 _CLAUSE_END = re.compile(r"(?<=.{20})(?:[:;.] |, (?=(?:which|where|as|so that) ))")
 
 
@@ -120,6 +124,16 @@ def line_of(text: str, width: int) -> str:
     return shorten(text, width, placeholder=" ...")
 
 
+def _with_units(text: str) -> str:
+    """The text with a mark in place of each blank between a number and its unit."""
+
+    def kept(match: re.Match[str]) -> str:
+        name = re.split(r"[ /.:²³]", match[1])[0]
+        return match[0].replace(" ", _KEPT) if name in UNITS else match[0]
+
+    return _UNIT.sub(kept, text)
+
+
 def _printed(console: Console, show: Callable[[], None]) -> str:
     with console.capture() as printed:
         show()
@@ -133,7 +147,8 @@ def _count(texts: Iterable[str]) -> int:
 def _fitted(block: Block, console: Console, units: Units, room: int) -> str:
     """A block as the console prints it, a table with its first rows; empty if it has no room."""
     if not isinstance(block, Table):
-        text = _printed(console, lambda: console.print("\n".join(_sentences(block, units))))
+        words = _with_units("\n".join(_sentences(block, units)))
+        text = _printed(console, lambda: console.print(words)).replace(_KEPT, " ")
         return text if text.strip() and _count([text]) <= room else ""
     rows = [row for row in block.rows if row.form != "long"]
     # a row takes a line at least

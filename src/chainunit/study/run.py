@@ -148,8 +148,7 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
         return
     least, of = max(found.start_class, study.relay_class), plate.nameplate
     before, stall = study.answers[verdict.STEADY].current_rms, of.rated_current * of.locked_current_ratio
-    seconds = found.start_seconds(of.rated_current, study.drive.switched_until)
-    trip_class = protecting_class(least, seconds, of.rated_current, before, stall, of.locked_time)
+    trip_class = protecting_class(least, found.relay_seconds, of.rated_current, before, stall, of.locked_time)
     if trip_class == study.relay_class:
         return
     study.relay_class = trip_class

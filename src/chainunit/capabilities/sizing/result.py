@@ -12,8 +12,8 @@ from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import number
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
-from ...study.relay import class_words
-from ...study.starts import transient_words
+from ...study.relay import HEAVIEST, MORE_CURRENT, QUICK, class_holding, class_words
+from ...study.starts import StartFindings, transient_words
 from .candidate import TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
 from .gear_order import gear_order
@@ -176,9 +176,11 @@ class DriveProtection:
     normal_torque: float = quantity("N.m", "largest torque of normal duty on the coupling, at the {driver}")
     running_torque: float = quantity("N.m", "largest torque of running on the coupling")
     start_torque: float = quantity(
-        "N.m", "largest torque of a start on the coupling by load and acceleration"
+        "N.m", "largest torque of a start of the cold motor on the coupling by load and acceleration"
     )
-    breakdown_torque: float = quantity("N.m", "most that the motor gives at the {driver}")
+    breakdown_torque: float = quantity(
+        "N.m", "pull-out torque of the warm motor at the {driver}, the most that it gives in steady running"
+    )
     effects: Mapping[str, Mapping[str, InUnit]] = part("peak at the output of the gear, by overload")
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")
     disturbances: Mapping[str, InUnit] = part("peak of each disturbance on the coupling")
@@ -254,8 +256,16 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    words = class_words(study.relay_class)
-    trip_class = {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
+    words, title = class_words(study.relay_class), "thermal relay, trip class of IEC 60947-4-1"
+    found = StartFindings.found_in(study)
+    if found is not None and 0 < found.start_class <= HEAVIEST:
+        more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
+        may_trip = f"may trip in a start with {more} more current, the tolerance of IEC 60034-1"
+        if study.relay_class < class_holding(MORE_CURRENT**2 * found.relay_seconds, QUICK):
+            words += f" ({may_trip})"
+        elif found.start_class < study.relay_class:
+            title += f"; one of {class_words(found.start_class)} {may_trip}"
+    trip_class = {"value": words, "unit": "1", "title": title}
     if study.drive.star_delta is None:
         return MotorProtection(InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay")
     place = (
