@@ -13,8 +13,8 @@ from collections.abc import Mapping
 
 _WORDS = ("uniform load", "moderate shocks", "heavy shocks", "very heavy shocks")
 LOAD_CLASSES = ("uniform", "moderate", "heavy", "very heavy")
-"""The classes of loads I, II and III of gears: uniform, moderate shocks, heavy shocks; these are light, medium and heavy
-drives by belts, for which crushers and calenders are very heavy. A gear has no heavier class than III."""
+"""The classes of loads I, II and III of gears: uniform, moderate shocks, heavy shocks; these are light, medium and
+heavy drives by belts, for which crushers and calenders are very heavy. A gear has no heavier class than III."""
 LOAD_WORDS = dict(zip(LOAD_CLASSES, _WORDS, strict=True))
 INERTIA_FACTORS = (0.2, 3.0, 10.0)
 """Largest inertia factor of each class; above the last one makers of gears want to be asked."""

@@ -59,8 +59,8 @@ def start_class(time: Any, current: Any, rated: float) -> int:
 
 
 def class_holding(seconds: float, least: int = LIGHT) -> int:
-    """The least trip class, from the class `least` on, whose cold relay surely holds for so many `seconds` at `MULTIPLE` times
-    its setting."""
+    """The least trip class, from the class `least` on, whose cold relay surely holds for so many `seconds` at
+    `MULTIPLE` times its setting."""
     usual = [each for each in CLASSES if each.name.isdigit() and int(each.name) >= least]
     return next((int(each.name) for each in usual if seconds <= each.shortest), HEAVIER)
 
@@ -76,22 +76,16 @@ def start_seconds(time: Any, current: Any, setting: float) -> float:
 def protecting_class(
     least: int, seconds: float, setting: float, before: float, stall_current: float, stall_time: float
 ) -> int:
-    """The trip class that is ordered. It is the class `least`; the class `QUICK` in place of the usual one, if that
-    trips too late in a stall and the quick one lets every start through, which heats it for so many `seconds`, see
-    `start_seconds`; or a heavier class that saves the motor in a stall, if a motor with `MORE_CURRENT` may trip the
-    class `least` in its start. Other arguments as of `stall_trip`; the rotor of a warm motor may be locked for the
-    `stall_time` [s]."""
-
-    def saves(of: TripClass) -> bool:
-        trip = stall_trip(of, setting, before, stall_current)
-        return trip is not None and trip <= stall_time
-
-    classes = {int(each.name): each for each in CLASSES if each.name.isdigit()}
-    if least == LIGHT and not saves(classes[LIGHT]):
-        quick = classes[QUICK]
-        return QUICK if seconds <= quick.shortest and saves(quick) else least
-    wanted = max(least, class_holding(MORE_CURRENT**2 * seconds))
-    return wanted if wanted in classes and saves(classes[wanted]) else least
+    """The trip class `least`, or the class `QUICK` in place of the usual one, if that trips too late in a stall and
+    the quick one lets every start through, which heats it as `start_seconds` says. Other arguments as of
+    `stall_trip`; the rotor of a warm motor may be locked for the `stall_time` [s]."""
+    if least != LIGHT:
+        return least
+    usual, quick = (next(each for each in CLASSES if each.name == str(number)) for number in (LIGHT, QUICK))
+    late, early = (stall_trip(each, setting, before, stall_current) for each in (usual, quick))
+    is_late = late is None or late > stall_time
+    saves = seconds <= quick.shortest and early is not None and early <= stall_time
+    return QUICK if is_late and saves else least
 
 
 def stall_trip(of: TripClass, setting: float, before: float, current: float) -> float | None:

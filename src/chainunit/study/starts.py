@@ -15,7 +15,6 @@ from .analysis import Analysis, Findings, Work
 from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
-from .relay import MULTIPLE
 from .rig import Rig
 from .sections import SOFTER
 from .start_runs import StartNumbers, longest_start, starts_from_all

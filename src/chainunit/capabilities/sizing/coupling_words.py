@@ -189,8 +189,8 @@ _WAYS = {
 
 _FAILURES = {
     Way.SOFT_STARTER: "No soft starter that was tried brings the {driver} to its speed from every angle within the "
-    "limits of this motor: its locked-rotor time, the heat of its starts, their number in an hour, each with the margin. A larger "
-    'motor may have one (start = "soft").',
+    "limits of this motor: its locked-rotor time, the heat of its starts, their number in an hour, each with the "
+    'margin. A larger motor may have one (start = "soft").',
     Way.INVERTER: "An inverter does not bring the {driver} to its speed from every angle, within the limits of this "
     "motor, with any ramp and boost (starter.inverter.boost) that were tried.",
     Way.SLIP_CLUTCH: "A slip clutch that running alone permits slips on in the start and does not bring the machine "

@@ -12,7 +12,7 @@ from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import number
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
-from ...study.relay import HEAVIEST, MORE_CURRENT, QUICK, class_holding, class_words
+from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words
 from ...study.starts import StartFindings, transient_words
 from .candidate import TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
@@ -256,16 +256,16 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    words, title = class_words(study.relay_class), "thermal relay, trip class of IEC 60947-4-1"
-    found = StartFindings.found_in(study)
-    if found is not None and 0 < found.start_class <= HEAVIEST:
-        more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
-        may_trip = f"may trip in a start with {more} more current, the tolerance of IEC 60034-1"
-        if study.relay_class < class_holding(MORE_CURRENT**2 * found.relay_seconds, QUICK):
-            words += f" ({may_trip})"
-        elif found.start_class < study.relay_class:
-            title += f"; one of {class_words(found.start_class)} {may_trip}"
-    trip_class = {"value": words, "unit": "1", "title": title}
+    words, found = class_words(study.relay_class), StartFindings.found_in(study)
+    if found is not None and study.relay_class <= HEAVIEST:
+        tolerant = class_holding(MORE_CURRENT**2 * found.relay_seconds, study.relay_class)
+        if tolerant > study.relay_class:
+            more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
+            words += (
+                f" (a motor with {more} more current, the tolerance of IEC 60034-1, may trip it in a start: one "
+                f"{class_words(tolerant) if tolerant > HEAVIEST else f'of {class_words(tolerant)}'} holds)"
+            )
+    trip_class = {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
     if study.drive.star_delta is None:
         return MotorProtection(InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay")
     place = (

@@ -125,7 +125,8 @@ SIZING_KEYS: Mapping[str, Any] = {
         Field(
             None,
             description="class of the load for the service factor: uniform, with moderate, heavy or very heavy "
-            "shocks (crushers on a belt); without it, it follows from the inertia of the machine over that of the motor",
+            "shocks (crushers on a belt); without it, it follows from the inertia of the machine over that of the "
+            "motor",
         ),
     ),
     "ratio_series": (
