@@ -148,6 +148,9 @@ class MotorProtection:
     )
     relay_class: Mapping[str, str] | None = part("trip class of IEC 60947-4-1", unit=GIVEN, optional=True)
     device: str = part("the device")
+    tolerance: str | None = part(
+        "a relay for a motor at the tolerance of its current", default=None, optional=True
+    )
 
 
 @result
@@ -256,18 +259,12 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    words, found = class_words(study.relay_class), StartFindings.found_in(study)
-    if found is not None and study.relay_class <= HEAVIEST:
-        tolerant = class_holding(MORE_CURRENT**2 * found.relay_seconds, study.relay_class)
-        if tolerant > study.relay_class:
-            more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
-            words += (
-                f" (a motor with {more} more current, the tolerance of IEC 60034-1, may trip it in a start: one "
-                f"{class_words(tolerant) if tolerant > HEAVIEST else f'of {class_words(tolerant)}'} holds)"
-            )
-    trip_class = {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
+    words, title = class_words(study.relay_class), "thermal relay, trip class of IEC 60947-4-1"
+    trip_class, caveat = {"value": words, "unit": "1", "title": title}, _tolerance(study)
     if study.drive.star_delta is None:
-        return MotorProtection(InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay")
+        return MotorProtection(
+            InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
+        )
     place = (
         "in the phases of the delta, behind the main contactor, where it usually sits: 1/sqrt(3) of the rated"
     )
@@ -276,4 +273,21 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
         InUnit(rated, "A", title="thermal relay in the supply line in place of that, setting"),
         trip_class,
         "relay in the phases of the delta",
+        caveat,
+    )
+
+
+def _tolerance(study: StudyRecord) -> str | None:
+    """The class whose relay holds in each start of a motor at the tolerance of its current, in words; None if the
+    ordered one does."""
+    found = StartFindings.found_in(study)
+    if found is None or found.stuck or study.relay_class > HEAVIEST:
+        return None
+    holding = class_holding(MORE_CURRENT**2 * found.relay_seconds, study.relay_class)
+    if holding == study.relay_class:
+        return None
+    more, words = number(MORE_CURRENT - 1.0, "1", "percent", full=False), class_words(holding)
+    return (
+        f"a motor with {more} more current, the tolerance of IEC 60034-1, may trip it in a start: one "
+        f"{'of ' if holding <= HEAVIEST else ''}{words} holds"
     )
