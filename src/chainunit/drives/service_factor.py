@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-_WORDS = ("uniform load", "moderate shocks", "heavy shocks", "very heavy shocks")
-LOAD_CLASSES = ("uniform", "moderate", "heavy", "very heavy")
-"""The classes of loads I, II and III of gears: uniform, moderate shocks, heavy shocks; these are light, medium and
-heavy drives by belts, for which crushers and calenders are very heavy. A gear has no heavier class than III."""
-LOAD_WORDS = dict(zip(LOAD_CLASSES, _WORDS, strict=True))
+LOAD_WORDS = {"uniform": "uniform load"} | {x: f"{x} shocks" for x in ("moderate", "heavy", "very heavy")}
+LOAD_CLASSES = tuple(LOAD_WORDS)
+"""The classes of loads I, II and III of gears, of light, medium and heavy drives by belts; crushers and calenders are
+very heavy ones. A gear has no heavier class than III."""
 INERTIA_FACTORS = (0.2, 3.0, 10.0)
 """Largest inertia factor of each class; above the last one makers of gears want to be asked."""
 
@@ -30,17 +29,12 @@ _STARTS, _MORE = 300.0, 0.2
 """Starts an hour from which on the factor does not rise any more, and its rise up to there."""
 _BELT_STEPS = (10.0, 16.0, 24.0)
 _BELT: Mapping[str, tuple[float, ...]] = {
-    "uniform": (1.1, 1.1, 1.2),
-    "moderate": (1.1, 1.2, 1.3),
-    "heavy": (1.2, 1.3, 1.4),
-    "very heavy": (1.3, 1.4, 1.5),
+    "uniform": (1.1, 1.1, 1.2, 1.1, 1.2, 1.3),
+    "moderate": (1.1, 1.2, 1.3, 1.2, 1.3, 1.4),
+    "heavy": (1.2, 1.3, 1.4, 1.4, 1.5, 1.6),
+    "very heavy": (1.3, 1.4, 1.5, 1.5, 1.6, 1.8),
 }
-_BELT_ON_LINE: Mapping[str, tuple[float, ...]] = {
-    "uniform": (1.1, 1.2, 1.3),
-    "moderate": (1.2, 1.3, 1.4),
-    "heavy": (1.4, 1.5, 1.6),
-    "very heavy": (1.5, 1.6, 1.8),
-}
+"""Up to the hours of each step: with a gentle start, and with one direct on line."""
 
 
 def load_class(inertia_factor: float) -> str:
@@ -58,7 +52,7 @@ def gear_factor(load: str, hours: float, starts: float) -> float:
 def belt_factor(load: str, hours: float, *, is_on_line: bool) -> float:
     """Service factor c2 of a V-belt for that class of `load` by `hours` a day; `is_on_line` tells of a motor that
     starts direct on line, with more than twice its rated torque."""
-    return _in_hours((_BELT_ON_LINE if is_on_line else _BELT)[load], _BELT_STEPS, hours)
+    return _in_hours(_BELT[load][3 * is_on_line :][:3], _BELT_STEPS, hours)
 
 
 def _in_hours(factors: tuple[float, ...], steps: tuple[float, ...], hours: float) -> float:

@@ -60,13 +60,6 @@ def permitted_starts(of: StartingData, most: float = math.inf) -> PermittedStart
     )
 
 
-def standard_inertia(plate: Nameplate) -> float:
-    """The inertia beside that of the rotor [kg m2] that a motor of 50 Hz has to bring up to speed by IEC 60034-12,
-    starting requirements of design N: twice from cold or once from hot, at a counter torque that grows with the
-    square of the speed up to the rated torque."""
-    return float(0.04 * (plate.power / 1e3) ** 0.9 * (plate.poles / 2.0) ** 2.5)
-
-
 def starting_data(
     drive: Drive,
     plate: Nameplate,

@@ -66,7 +66,8 @@ def conclude(study: StudyRecord) -> None:
         _on_start(study)
         _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
-        _on_rotor(study)
+        if study.drive.foreign is None:
+            _on_rotor(study)
     of_drive = None if study.proposal is None else study.proposal.findings
     if of_drive is not None:
         of_drive.remark(study)
@@ -332,18 +333,11 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         yield "not recovered", "", {}
 
 
-_BY_ROTOR = 1.05
-"""Peak torque of a motor, over that of its load, from which on a note gives the reason."""
-
-
 def _on_rotor(study: StudyRecord) -> None:
-    """Note that a peak of the motor's torque is not of the load, but of the rotor, whose speed swings."""
-    drive = study.drive
-    if drive.foreign is not None:
-        return
+    """Note a peak of the motor's torque that is not of the load, but of the rotor, whose speed swings."""
     torque, acceleration = (study.steady[f"motor.{name}"].values for name in ("air_gap_tau", "a"))
-    most, load = peak(torque), peak(torque - drive.fmu_parameters.rotor.J * acceleration)
-    if most > _BY_ROTOR * load:
+    most, load = peak(torque), peak(torque - study.drive.fmu_parameters.rotor.J * acceleration)
+    if most > 1.05 * load:
         study.note(
             "rotor accelerates",
             "steady running: load and losses take {load} at the motor's shaft at most, and the motor gives {most}: "

@@ -26,7 +26,7 @@ from ...study.limits import starting
 from ...study.measures import STARTED
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
-from ...study.relay import HEAVIEST, start_class
+from ...study.relay import HEAVIEST
 from ...study.rig import Rig, join
 from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
 from ...study.start_up import start_up
@@ -37,7 +37,6 @@ from ...study.verdict import STEADY
 from ...system import ModelComponent, monolithic
 from ...system.graph import in_line
 from ...work.progress import TaskProgress
-from .candidate import Candidate
 from .coupling import effects
 from .inverter import boosts
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
@@ -128,55 +127,46 @@ def _loaded_starts(study: StudyRecord) -> list[Event]:
 
 
 _Trial = tuple[Rig, float, dict[str, float], DriveTables]
-"""A rig with a starter, the time after which its start-up counts as failed [s], the numbers of the starter, and the
-tables of the drive with it."""
+"""A rig with a starter, the time after which its start-up counts as failed [s], its numbers, and its tables."""
 
 
 def _permits(study: StudyRecord, rig: Rig, tables: DriveTables, starts: Sequence[StartNumbers]) -> bool:
-    """Whether the chosen motor keeps each limit by which it was chosen, with the margin, in a drive with these
-    `starts`; a relay holds in each."""
+    """Whether a relay and the chosen motor, by each limit of its choice with the margin, permit these `starts`."""
     from .findings import SizingFindings
 
     sizing, config = SizingFindings.of_study(study), study.config
-    motor, margin = sizing.best.motor, float(sizing.plan.demands.margin)
     task = SizingTask(sizing.plan, tables, config.machine, rig.operation, config.events)
-    trial = try_motor(task, motor, rig.drive, sizing.duty, rig.files)
+    trial = try_motor(task, sizing.best.motor, rig.drive, sizing.duty, rig.files)
     tried = dataclasses.replace(trial, starts=starts).result()
     has_relay = tried.start_class is None or tried.start_class <= HEAVIEST
-    return has_relay and Candidate(motor, rig.drive, tried, margin).keeps_margin
+    return has_relay and dataclasses.replace(sizing.best, drive=rig.drive, trial=tried).keeps_margin
 
 
 def _gentlest(
     trials: Iterator[_Trial], study: StudyRecord, goal: float, limit: float
 ) -> tuple[Rig, list[StartNumbers], dict[str, float]] | None:
-    """The first of the `trials` that the motor permits whose starts put at most `goal` [N m] on the coupling and take
-    at most the time `limit` [s]; if none does, the one whose hardest start is the gentlest. None if none is
-    permitted."""
+    """The first of the `trials` whose starts take at most the time `limit` [s], are permitted, and put at most `goal`
+    [N m] on the coupling, or else the one with the gentlest starts. None if none is permitted."""
     events = _loaded_starts(study)
     angle, full = _worst(study).angle, []
-    probes: list[tuple[float, int, _Trial]] = []
-
-    def is_permitted(trial: _Trial, starts: Sequence[StartNumbers]) -> bool:
-        in_time = all(start.start_time is not None and start.start_time <= limit for start in starts)
-        return in_time and _permits(study, trial[0], trial[3], starts)
-
+    probes: list[tuple[float, _Trial]] = []
     for trial in trials:
         probe = start_from(trial[0], angle, trial[1])
         if probe.start_time is None or probe.start_time > limit:
             continue
         if probe.coupling_torque > goal:
-            probes.append((probe.coupling_torque, len(probes), trial))
+            probes.append((probe.coupling_torque, trial))
             continue
         starts = starts_from_all(trial[0], trial[1], events)
-        if is_permitted(trial, starts):
+        if _permits(study, trial[0], trial[3], starts):
             full.append((trial[0], starts, trial[2]))
             if hardest(starts) <= goal:
                 return full[-1]
             # the next one is probed at the angle at which this one is hardest
             angle = max(starts, key=lambda start: start.coupling_torque).angle
-    for _, _, trial in sorted(probes, key=lambda probe: probe[:2]):
+    for _, trial in sorted(probes, key=lambda probe: probe[0]):
         starts = starts_from_all(trial[0], trial[1], events)
-        if is_permitted(trial, starts):
+        if _permits(study, trial[0], trial[3], starts):
             full.append((trial[0], starts, trial[2]))
             break
     return min(full, key=lambda trial: hardest(trial[1]), default=None)
@@ -352,9 +342,15 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative 
     if rig.drive.foreign_titles or capacity >= setting.gear:
         return None
     slowest = max(StartFindings.of_study(study).starts, key=lambda start: start.start_time or 0.0)
+    left_out = Alternative(Way.SLIP_CLUTCH, WayNumbers.of(running=setting.running), {})
     run = slip_run(rig, slowest, capacity)
-    if run is None or not _permits(study, rig, study.config.drive, [_as_start(rig, slowest, run)]):
-        return Alternative(Way.SLIP_CLUTCH, WayNumbers.of(running=setting.running), {})
+    if run is None:
+        return left_out
+    time = run["time"].values
+    heat, end = float(np.trapezoid(run["motor.heat"].values, time)), float(time[-1])
+    slipping = dataclasses.replace(slowest, start_time=end, heat=heat, followed=end)
+    if not _permits(study, rig, study.config.drive, [slipping]):
+        return left_out
     numbers = WayNumbers.of(
         setting=capacity,
         running=setting.running,
@@ -364,18 +360,6 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative 
         slip_power=capacity * study.config.run.crank_speed,
     )
     return Alternative(Way.SLIP_CLUTCH, numbers, setting.opened_by(capacity))
-
-
-def _as_start(rig: Rig, start: StartNumbers, run: xr.Dataset) -> StartNumbers:
-    """The numbers of a `start` for the motor if it is the `run` of `slip_run`, which ends with the start."""
-    time, current = run["time"].values, np.abs(run[f"motor.{rig.drive.motor.current}"].values)
-    return dataclasses.replace(
-        start,
-        start_time=float(time[-1]),
-        start_class=start_class(time, current, rig.drive.rated_current or 0.0),
-        heat=float(np.trapezoid(run["motor.heat"].values, time)),
-        followed=float(time[-1]),
-    )
 
 
 def _higher(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:

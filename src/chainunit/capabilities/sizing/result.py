@@ -148,9 +148,7 @@ class MotorProtection:
     )
     relay_class: Mapping[str, str] | None = part("trip class of IEC 60947-4-1", unit=GIVEN, optional=True)
     device: str = part("the device")
-    tolerance: str | None = part(
-        "a relay for a motor at the tolerance of its current", default=None, optional=True
-    )
+    tolerance: str | None = part("the class for a motor with more current", default=None, optional=True)
 
 
 @result
@@ -181,9 +179,7 @@ class DriveProtection:
     start_torque: float = quantity(
         "N.m", "largest torque of a start of the cold motor on the coupling by load and acceleration"
     )
-    breakdown_torque: float = quantity(
-        "N.m", "pull-out torque of the warm motor at the {driver}, the most that it gives in steady running"
-    )
+    breakdown_torque: float = quantity("N.m", "pull-out torque of the warm motor, at the {driver}")
     effects: Mapping[str, Mapping[str, InUnit]] = part("peak at the output of the gear, by overload")
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")
     disturbances: Mapping[str, InUnit] = part("peak of each disturbance on the coupling")
@@ -259,8 +255,8 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    words, title = class_words(study.relay_class), "thermal relay, trip class of IEC 60947-4-1"
-    trip_class, caveat = {"value": words, "unit": "1", "title": title}, _tolerance(study)
+    words, caveat = class_words(study.relay_class), _tolerance(study)
+    trip_class = {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
     if study.drive.star_delta is None:
         return MotorProtection(
             InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
@@ -284,10 +280,7 @@ def _tolerance(study: StudyRecord) -> str | None:
     if found is None or found.stuck or study.relay_class > HEAVIEST:
         return None
     holding = class_holding(MORE_CURRENT**2 * found.relay_seconds, study.relay_class)
-    if holding == study.relay_class:
-        return None
-    more, words = number(MORE_CURRENT - 1.0, "1", "percent", full=False), class_words(holding)
-    return (
-        f"a motor with {more} more current, the tolerance of IEC 60034-1, may trip it in a start: one "
-        f"{'of ' if holding <= HEAVIEST else ''}{words} holds"
-    )
+    words = f"{'of ' if holding <= HEAVIEST else ''}{class_words(holding)}"
+    more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
+    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; one {words} holds"
+    return None if holding == study.relay_class else said
