@@ -25,6 +25,7 @@ from chainunit.capabilities.sizing.alternatives import (
 )
 from chainunit.capabilities.sizing.coupling import effects, recommended_setting
 from chainunit.capabilities.sizing.coupling_words import _bound, coupling_sentence, way_words
+from chainunit.capabilities.sizing.gear_order import gear_order
 from chainunit.capabilities.sizing.page import _best, _relay, _starter
 from chainunit.capabilities.sizing.protection import CouplingEffect, Obstacle, Setting, Way
 from chainunit.capabilities.sizing.result import DriveProtection
@@ -496,6 +497,19 @@ def test_a_way_is_judged_by_the_limits_of_the_motor(on_line, way):
     left_out = make(hot, Rig(on_line.config.operation, on_line.drive, None), sizing.setting)
     assert left_out.numbers.setting is None and left_out.numbers.start is None and not left_out.opens
     assert "limits of this motor" in way_words(hot, left_out, sizing.setting)
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("service", [1.0, 1.31, 9.0])
+def test_the_gear_that_is_ordered_follows_from_the_printed_numbers(on_line, service):
+    """2218 N m of an overload, permitted 2 x rated, were 1240 N m, rounded up and with a margin that was not told."""
+    order = gear_order(on_line, sizing_of(on_line).setting, 0.1, service)
+    rule = order.decides.rule
+    times = float(rule.partition("times the service factor ")[2] or 1.0) if "service factor" in rule else 1.0
+    permitted = 2.0 if "permitted 2 x rated" in rule else 1.0
+    kept = 0.9 if "10 % of the rated torque left free" in rule else 1.0
+    assert order.rated == pytest.approx(order.decides.torque * times / permitted / kept, rel=1e-12)
+    assert (times == service) if service == 9.0 else rule
 
 
 @pytest.mark.second
