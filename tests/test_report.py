@@ -9,6 +9,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ import chainunit.report
 from chainunit.reading.text import DEFAULT_UNITS, chosen_units
 from chainunit.report import blocks as b
 from chainunit.report import figure as fig
-from chainunit.report import html, print_figures, terminal
+from chainunit.report import html, print_figures, runs, terminal
 from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
@@ -434,3 +435,37 @@ def test_an_axis_has_the_unit_of_its_largest_value(largest, label, shown):
     assert fig.in_units(row, DEFAULT_UNITS).panels[0][1].y.label == label.replace("force", "pull")
     chosen = fig.in_units(figure, chosen_units({"force": "N"})).panels[0]
     assert [each.y.label for each in chosen] == ["force [N]", "force [N]"]
+
+
+@pytest.mark.parametrize("width", range(24, 60))
+def test_no_line_of_a_screen_ends_between_a_number_and_its_unit(width):
+    """The line after "heat 82.3" held "%." alone."""
+    words = "Chosen: heat 82.3 %, 4.28 kg m² and 1.25 kN m at 5 A; 29.3 rad/s (280 rev/min)."
+    out = io.StringIO()
+    console = Console(file=out, markup=False, highlight=False, width=width)
+    report = b.Report("", "kind", RESULT, (), (b.Section("answer", "", (b.Text(words, central=True),)),))
+    terminal.screen(report, console, "")
+    printed = out.getvalue()
+    assert printed.split() == words.split()
+    for whole in ("82.3 %", "4.28 kg m²", "1.25 kN m", "5 A", "29.3 rad/s", "280 rev/min"):
+        assert whole in printed
+
+
+@pytest.mark.parametrize("coupling", [None, 1304.0])
+def test_the_worst_overload_is_without_a_limiter_only_if_there_is_none(monkeypatch, coupling):
+    """The column of 1891 N m, with a limiter that trips, stood below "without torque limiter"."""
+    monkeypatch.setattr(runs, "by_side", lambda study, answers: ["steady", "surge"])
+    study = SimpleNamespace(
+        overloads=["surge"],
+        proposal=object(),
+        insufficient="",
+        config=SimpleNamespace(coupling=coupling),
+        title_of=lambda run: run,
+        titles={"surge": "rock rises"},
+    )
+    monkeypatch.setattr(runs.run_names, "title", lambda study, run: study.titles[run])
+    source = b.Source({"answers": {"surge": {"crank_torque_peak": {"value": 1891.0, "unit": "N.m"}}}})
+    table = b.Table((b.TableRow(("peak", "1", "2")),), b.heads("", "steady", "surge"))
+    title = runs._beside_the_worst(source, study, table).title
+    bare = " (without torque limiter)" if coupling is None else ""
+    assert title == f"Steady running beside the worst overload{bare}: rock rises"

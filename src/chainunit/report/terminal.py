@@ -13,12 +13,16 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Styled
 
+from ..core.unit_table import UNITS
 from ..reading.text import DEFAULT_UNITS, Units, number
 from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
 _BRACKETS = re.compile(r" ?\([^()]*\)")
+_UNIT = re.compile(r"(?<=\d) ([^\s,;()]+(?: m[²³]?(?![\w/]))?)")
+_KEPT = "\ue000"
+"""The mark of a blank at which no line may end."""
 _CLAUSE_END = re.compile(r"(?<=.{30})(?:[:;.] |, (?=(?:which|where|as|so that) ))")
 
 
@@ -103,7 +107,8 @@ def screen(report: Report, console: Console, rest: str) -> None:
             text = _first_rows(block, console, report.units, _lines, room - _lines(title), _ROWS)
             text, title = (title + text, "") if text else ("", title)
         else:
-            text = _printed(console, partial(console.print, "\n".join(_sentences(block, report.units))))
+            words = _with_units("\n".join(_sentences(block, report.units)))
+            text = _printed(console, partial(console.print, words)).replace(_KEPT, " ")
         if text.strip() and _lines(text) <= room:
             console.file.write(text)
             room -= _lines(text)
@@ -120,6 +125,12 @@ def line_of(text: str, width: int) -> str:
         if outside := [end for end in ends if not any(low <= end < high for low, high in brackets)]:
             return f"{trial[: outside[-1]]}."
     return shorten(text, width, placeholder=" ...")
+
+
+def _with_units(text: str) -> str:
+    """The text with a mark in place of each blank between a number and its unit."""
+    names = {match[0]: re.split(r"[ /.:²³]", match[1])[0] for match in _UNIT.finditer(text)}
+    return _UNIT.sub(lambda m: m[0].replace(" ", _KEPT) if names[m[0]] in UNITS else m[0], text)
 
 
 def _printed(console: Console, show: Callable[[], None]) -> str:
