@@ -33,6 +33,7 @@ from chainunit.capabilities.identification.posterior import posterior
 from chainunit.capabilities.identification.suspects import (
     REJECTION,
     KnownNumbers,
+    is_described,
     known_number_tests,
     suspect_sets,
 )
@@ -233,20 +234,20 @@ def result(trial: str, k: int) -> dict[str, Any]:
     asked = problem(of)
     began = time.perf_counter()
     best = fit(asked)
-    known = known_number_tests(asked, best)
-    tests = [*known.tests, *([known.law] if known.law else [])]
+    known, around, tests = known_number_tests(asked, best), posterior(asked, best), residual_tests(best)
+    scores = [*known.tests, *([known.law] if known.law else [])]
     figures = {
         "kind": of.kind, "angle": of.angle, "rate": of.rate, "wrong": of.wrong, "rounds": best.rounds,
+        "is_described": is_described(asked, best, tests, around, known),
         "checks": [
             {"run": c.run, "column": c.column, "statistic": c.statistic, "noise": c.noise, "is_noise": c.is_noise}
-            for c in residual_tests(best)
+            for c in tests
         ],
         "strains": [each.name for each in (*sensor_conflicts(asked, best), *prior_conflicts(asked.sought, best))],
-        "suspicions": {each.name: (each.change, each.deviation) for each in tests},
-        "suspicious": [each.name for each in tests if each.is_rejected],
+        "suspicions": {score.name: (score.change, score.deviation) for score in scores},
+        "suspicious": [score.name for score in scores if score.is_rejected],
+        "held": around.active_bounds,
     }  # fmt: skip
-    around = posterior(asked, best)
-    figures["held"] = around.active_bounds
     if trial not in OTHERS:
         figures["numbers"] = [
             {
@@ -339,14 +340,12 @@ def stated_result(trial: str, k: int) -> dict[str, Any]:
     best = fit(asked)
     known, around = known_number_tests(asked, best), posterior(asked, best)
     conflicts = [*sensor_conflicts(asked, best), *prior_conflicts(asked.sought, best)]
-    is_noise = all(test.is_noise for test in residual_tests(best))
-    is_described = (
-        best.is_ended and is_noise and not (conflicts or around.active_bounds or known.are_rejected)
-    )
-    sets = () if is_described else suspect_sets(asked, best)
+    tests = residual_tests(best)
+    described = is_described(asked, best, tests, around, known)
+    sets = () if described else suspect_sets(asked, best)
     return {
         "wrong": of.wrong, "shown": [name for name in of.wrong if is_shown(of, name, known)],
-        "is_described": is_described, "is_ended": best.is_ended, "is_noise": is_noise,
+        "is_described": described, "is_ended": best.is_ended, "is_noise": all(test.is_noise for test in tests),
         "strains": [each.name for each in conflicts], "held": around.active_bounds, "rounds": best.rounds,
         "rejected": [each.name for each in known.tests if each.is_rejected], "law": known.is_law_rejected,
         "sets": [
@@ -425,12 +424,6 @@ def reached(trials: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return rows
 
 
-def is_wrong(trial: Mapping[str, Any]) -> bool:
-    """Whether the model is taken for a wrong one."""
-    doubts = trial["strains"] or trial["suspicious"] or trial["held"]
-    return bool(doubts) or not all(check["is_noise"] for check in trial["checks"])
-
-
 def by_number(trials: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
     """By sought number: coverage, errors in stated deviations, and errors in parts of the value."""
     table = {}
@@ -452,7 +445,7 @@ def summary(trials: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]
     for trial in ("bare", "weighed"):
         own = trials[trial]
         if own:
-            alarms = [is_wrong(each) for each in own]
+            alarms = [not row["is_described"] for row in own]
             figures[trial] = {
                 "machines": len(own),
                 **coverage(own),
@@ -470,7 +463,7 @@ def summary(trials: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]
     for trial, others in OTHERS.items():
         for name in others:
             if own := [each for each in trials[trial] if each["wrong"] == name]:
-                found = float(np.mean([is_wrong(each) for each in own]))
+                found = float(np.mean([not row["is_described"] for row in own]))
                 figures.setdefault(trial, {})[name] = {"machines": len(own), "found": found}
     if own := trials["known"]:
         figures["known"] = {

@@ -11,18 +11,14 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 
-from chainunit.work.job import CHECKS, Coordinate, Job, ResultVariable
+from chainunit.work.job import CHECKS, Job, ResultVariable
 from chainunit.work.runner import run
 
 VARIABLES = (
     ResultVariable("height", "m", "height of a point"),
     ResultVariable("colour", "1", "colour of a point", "int8", flags=("red", "green", "blue")),
-    ResultVariable("curve", "N.m", "torque over the angle", "float32", dims=("angle", "side")),
+    ResultVariable("torque", "N.m", "torque at a point", "float32"),
     ResultVariable("remark", "1", "remark on a point", letters=12),
-)
-COORDINATES = (
-    Coordinate("angle", (0.0, 0.5, 1.0), "rad", "crank angle"),
-    Coordinate("side", (0.0, 1.0), "1", "side"),
 )
 
 
@@ -32,7 +28,7 @@ def results(begin, end):
     return {
         "height": np.where(n % 7 == 3, np.nan, np.sin(n)),
         "colour": n % 3,
-        "curve": np.cos(n[:, None, None] + np.arange(6.0).reshape(3, 2)),
+        "torque": np.cos(n),
         "remark": [f"point {k}" if k % 5 == 0 else "" for k in n],
     }
 
@@ -53,7 +49,7 @@ def work(task, begin, end):
     return results(begin, end)
 
 
-def job(points=100, batch=16, digest="0123456789abcdef", closing=None, **task):
+def job(points=100, batch=16, digest="0123456789abcdef", **task):
     return Job(
         name="demo",
         title="points of a demo",
@@ -63,8 +59,6 @@ def job(points=100, batch=16, digest="0123456789abcdef", closing=None, **task):
         work=work,
         task=task,
         digest=digest,
-        coordinates=COORDINATES,
-        close=closing,
     )
 
 

@@ -1,9 +1,10 @@
 """Fixtures that the tests share, and their stages. A run without named files is parallel.
 
 A run without named files and without ``-m`` is the first stage. It leaves out the second, which is marked `second`:
-other programs, their engines, importers, platforms, and FMUs of somebody else; processes that are stopped, killed or
-spread; the structure of the package; the pages, the papers, the tables of the standard; and studies whose cases
-the first stage has in parts. ``.ci/run`` runs both. A named file runs with all of its tests, except the slow ones.
+FMUs in other clients; processes that are stopped, killed or spread; the structure of the package; the examples, the
+papers, the tables of the standard; and studies whose cases the first stage has in parts. ``.ci/run`` runs both.
+``.ci/full`` runs what is marked `slow`: importers, other programs, platforms, browsers, sheets, long studies. A named
+file runs with all of its tests, except the slow ones.
 
 An FMU costs a test little: what exports compile is kept by its content, whichever worker, test or process asks, and
 for later runs of the tests, too (see `chainunit.core.native.cache`). Beyond that,
@@ -49,11 +50,11 @@ FIRST = "not slow and not second"
 
 
 def pytest_ignore_collect(collection_path, config):
-    """The first stage does not import a file that is of the second as a whole: that alone takes seconds."""
+    """The first stage does not import a file that is of another stage as a whole: that alone takes seconds."""
     if config.option.markexpr != FIRST or not collection_path.match("test_*.py"):
         return None
     text = collection_path.read_text("utf-8")
-    return True if re.search(r"^pytestmark = .*mark[.]second", text, re.MULTILINE) else None
+    return True if re.search(r"^pytestmark = .*mark[.](second|slow)", text, re.MULTILINE) else None
 
 
 @pytest.hookimpl(tryfirst=True)

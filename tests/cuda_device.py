@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from chainunit.core.temporary_folders import scratch
+from chainunit.core.files import scratch
 
 THREADS = Path(__file__).with_name("cuda_threads.h")
 COMPILER = next((path for name in ("c++", "g++", "clang++") if (path := shutil.which(name))), None)

@@ -15,7 +15,7 @@ from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 KNIFE = """
 [system]

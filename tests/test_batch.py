@@ -302,7 +302,7 @@ def test_wrong_requests_are_refused():
         ),
         "no such dimension; there are phi": ({"phi": [0.0, 1.0]}, ["tau"], {"over": "psi"}),
         "needs the dimension": ({"phi": [0.0, 1.0]}, None, {"reduce": {"tau": ["peak"]}}),
-        "no reduction 'peek'": ({"phi": [0.0, 1.0]}, None, {"over": "phi", "reduce": {"tau": ["peek"]}}),
+        'no reduction "peek"': ({"phi": [0.0, 1.0]}, None, {"over": "phi", "reduce": {"tau": ["peek"]}}),
         "has 2 dimensions": ({"phi": np.zeros((2, 2))}, ["tau"], {}),
         "must be one of native, numpy, cuda": ({"phi": 0.0}, ["tau"], {"engine": "jax"}),
     }  # fmt: skip

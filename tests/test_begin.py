@@ -18,7 +18,7 @@ from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.measures import STARTED
 from chainunit.study.run import run_study
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 DIP = event_line("dip", turns=1)
 LINE = """
@@ -88,7 +88,9 @@ def test_every_peak_of_the_run_is_in_a_table(done):
     assert values[0] == pytest.approx(np.max(torque[~fed]), rel=1e-9)
     words = said_of(study)
     assert "Settling under the feed: crank torque, peak" in words
-    assert "Demands of the settling under the feed on the drive" in (folder / "result.md").read_text()
+    # it begins with the end of the start-up: a motor that still speeds up is above the limit of running
+    title = "Demands of the settling under the feed on the drive, and of the end of the start-up, from 95 %"
+    assert title in (folder / "result.md").read_text()
     # and so are those of the bearings
     assert set(result["pins"]) == {"start_up", "settling", "steady", "dip"}
 

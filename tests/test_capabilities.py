@@ -113,7 +113,7 @@ def test_a_type_checker_sees_the_methods_and_results_of_capabilities(tmp_path):
     assert '"Study" has no attribute "optimise"' in errors[0] and "runs" in errors[1]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_rest_works_without(name, tmp_path):
     """A study, an export and the schema; a table of the capability is refused as an unknown key."""

@@ -12,7 +12,7 @@ import pytest
 
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.errors import InputError
-from chainunit.core.quantities import Layout, Quantity, base_units, variables, within_bounds
+from chainunit.core.quantities import Layout, Quantity, base_units, quotient, variables, within_bounds
 from chainunit.fmu.description import Interface, model_description, model_description_3
 from chainunit.models import MODELS
 from chainunit.reading.tables import to_number
@@ -182,3 +182,13 @@ def test_what_is_off_its_bound_by_rounding_counts_as_the_bound():
     assert within_bounds(model.parameter_layout, model.Parameters()) == model.Parameters()
     with pytest.raises(InputError, match=r"web_share = 1\.1: must be >= 0 and <= 1"):
         model.check(model.parameter_layout.from_names({"web_share": 1.1}))
+
+
+def test_the_unit_of_a_rate_is_that_of_an_engineer():
+    """In the description of an FMU as in a linear model."""
+    units = ("1", "m", "rad/s", "A", "Wb", "J")
+    rates = [quotient(unit, "s") for unit in units]
+    assert rates == ["1/s", "m/s", "rad/s2", "A/s", "Wb/s", "W"]
+    for unit, rate in zip(units, rates, strict=True):
+        powers = base_units(unit)
+        assert base_units(rate) == {k: n for k, n in (powers | {"s": powers.get("s", 0) - 1}).items() if n}

@@ -31,7 +31,7 @@ from chainunit.core.engines import MATH, numpy_
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.mechanism.machine import Mechanism
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 exudyn = pytest.importorskip("exudyn")
 item = pytest.importorskip("exudyn.itemInterface")

@@ -58,7 +58,7 @@ from chainunit.core.planar import Motion, Vec2
 from chainunit.groups.chain import Chain, Rods, close, end_motion
 from chainunit.machines import hanging
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 exudyn = pytest.importorskip("exudyn")
 item = pytest.importorskip("exudyn.itemInterface")

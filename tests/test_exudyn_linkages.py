@@ -19,7 +19,7 @@ from linkage_files import MACHINES, model
 
 from chainunit.machines.machine import Machine
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 exudyn = pytest.importorskip("exudyn")
 item = pytest.importorskip("exudyn.itemInterface")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import secrets
 import signal
 import subprocess
 import sys
@@ -15,9 +14,8 @@ from pathlib import Path
 import pytest
 from command import chainunit
 
-from chainunit.core import ledger, temporary_folders
 from chainunit.core.errors import InputError, WriteError
-from chainunit.core.files import LOCK, ResultKind, atomic_file, claim, clear, folder
+from chainunit.core.files import LIST, LOCK, FileList, atomic_file, claim, clear, folder, scratch
 
 pytestmark = pytest.mark.second
 
@@ -62,14 +60,13 @@ def test_two_writers_of_one_file_do_not_disturb_each_other(tmp_path):
 
 
 def test_a_user_s_files_in_the_folder_are_left_alone(tmp_path):
-    for name in (".chainunit", LOCK, "result.json.part"):
+    for name in (".chainunit", "result.json.part"):
         (tmp_path / name).write_text("mine")
     folder(tmp_path)
     with claim(tmp_path):
         pass
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {
         ".chainunit": "mine",
-        LOCK: "mine",
         "result.json.part": "mine",
     }
 
@@ -267,11 +264,8 @@ def test_a_folder_that_was_there_or_holds_a_file_stays(tmp_path):
     assert sorted(p.name for p in tmp_path.rglob("*")) == ["fmu", "full", "old", "result"]
 
 
-KIND = ResultKind("a comparison", "comparison.json")
-
-
 def write(folder, text, *names):
-    with claim(folder, *names, kind=KIND) as place:
+    with claim(folder, *names) as place:
         for name in names:
             with atomic_file(place / name) as part:
                 part.write_text(text)
@@ -284,19 +278,19 @@ def test_a_file_that_no_run_wrote_is_never_overwritten(tmp_path):
     mine = out / "report.html"
     mine.write_text("mine")
     with pytest.raises(InputError, match=r"out/report\.html: would be lost, as chainunit did not write it"):
-        write(out, "first", "comparison.json")
+        write(out, "first", "comparison.json", "report.html")
     assert names(out) == ["report.html"] and mine.read_text() == "mine"
     mine.unlink()
     write(out, "first", "report.html", "comparison.json")
     write(out, "second", "report.html", "comparison.json")
-    assert mine.read_text() == "second" and ledger.NAME in names(out)
+    assert mine.read_text() == "second" and LIST in names(out)
     mine.write_text("mine again")
     (out / "notes.md").write_text("mine, too")
     with pytest.raises(InputError) as refusal:
-        write(out, "third", "comparison.json", "notes.md")
+        write(out, "third", "report.html", "comparison.json", "notes.md")
     assert [str(fault).split(":")[0] for fault in refusal.value.faults] == [str(mine), str(out / "notes.md")]
     mine.unlink()
-    with claim(out, kind=KIND) as place, pytest.raises(WriteError, match=r"notes\.md: stays as it is"):
+    with claim(out) as place, pytest.raises(WriteError, match=r"notes\.md: stays as it is"):
         clear(place, "notes.md")
         with atomic_file(place / "notes.md") as part:
             part.write_text("third")
@@ -305,16 +299,13 @@ def test_a_file_that_no_run_wrote_is_never_overwritten(tmp_path):
 
 def test_the_list_of_files_is_that_of_sha256sum_and_goes_with_them(tmp_path):
     write(tmp_path / "out", "text", "b.csv", "a.png")
-    lines = (tmp_path / "out" / ledger.NAME).read_text().splitlines()
+    lines = (tmp_path / "out" / LIST).read_text().splitlines()
     digest = hashlib.sha256(b"text").hexdigest()
     assert lines == [f"{digest}  a.png", f"{digest}  b.csv"]
-    # a process that was killed leaves the part of a line
-    with (tmp_path / "out" / ledger.NAME).open("a") as out:
-        out.write("0123")
-    with claim(tmp_path / "out", "a.png", "b.csv", kind=KIND) as place:
+    with claim(tmp_path / "out", "a.png", "b.csv") as place:
         clear(place, "a.png", "b.csv")
     assert names(tmp_path / "out") == []
-    (tmp_path / "out" / ledger.NAME).write_text("a list of my own\n")
+    (tmp_path / "out" / LIST).write_text("a list of my own\n")
     with pytest.raises(InputError, match="is no list of files of chainunit"):
         write(tmp_path / "out", "text", "b.csv")
 
@@ -327,15 +318,15 @@ def test_a_run_that_is_killed_while_it_replaces_a_file_leaves_its_own(moment, tm
     out = tmp_path / "out"
     write(out, "first", "a.txt", "b.txt")
     kill = "os.kill(os.getpid(), signal.SIGKILL)"
-    renames = "real(part, file);" if moment == "after" else ""
+    renames = "real(part, file); " if moment == "after" else ""
     code = (
         "import os, signal; from pathlib import Path\n"
-        "from chainunit.core.files import ResultKind, claim, atomic_file\n"
+        "from chainunit.core.files import claim, atomic_file\n"
         "real = Path.replace\n"
         "def replace(part, file):\n"
-        f"    {renames} {kill}\n"
-        f"with claim(Path({str(out)!r}), 'a.txt', kind=ResultKind({KIND.words!r}, {KIND.file!r})) as place, "
-        "atomic_file(place / 'a.txt') as part:\n"
+        "    if file.name != 'a.txt': return real(part, file)\n"
+        f"    {renames}{kill}\n"
+        f"with claim(Path({str(out)!r}), 'a.txt') as place, atomic_file(place / 'a.txt') as part:\n"
         "    part.write_text('second'); Path.replace = replace\n"
     )
     killed = python(code, tmp_path)
@@ -344,7 +335,7 @@ def test_a_run_that_is_killed_while_it_replaces_a_file_leaves_its_own(moment, tm
     assert (out / "a.txt").read_text() == ("second" if moment == "after" else "first")
     write(out, "third", "a.txt", "b.txt")
     assert (out / "a.txt").read_text() == "third"
-    lines = (out / ledger.NAME).read_text().splitlines()
+    lines = (out / LIST).read_text().splitlines()
     assert [line.split()[1] for line in lines] == ["a.txt", "b.txt"]
     (out / "a.txt").write_text("first")  # what the program wrote long ago is changed, too
     with pytest.raises(InputError, match=r"a\.txt: would be lost"):
@@ -360,56 +351,25 @@ def test_a_command_leaves_a_foreign_page_alone(tmp_path):
     assert names(tmp_path / "out") == ["report.html"]
 
 
-KILLED = """
-import os, signal
-from pathlib import Path
-from chainunit.core.temporary_folders import temporary_folder
-print(temporary_folder("chainunit_fmu"), flush=True)
-(Path(os.environ["TMPDIR"]) / "more").mkdir()
-{end}
-"""
+def test_what_a_killed_process_left_of_a_file_goes(tmp_path):
+    part, mine = tmp_path / f"a.txt.{'0' * 16}.part", tmp_path / "a.txt.part"
+    part.touch(), mine.touch()
+    with claim(tmp_path):
+        assert not part.exists()
+    assert names(tmp_path) == ["a.txt.part"]
 
 
-@posix
-def test_folders_of_killed_processes_are_removed_at_the_next_start(tmp_path, monkeypatch):
-    """Those of living processes stay, and those of others."""
-    environment = os.environ | {"TMPDIR": str(tmp_path)}
-    killed = python(KILLED.format(end="os.kill(os.getpid(), signal.SIGKILL)"), tmp_path, env=environment)
-    left = Path(killed.communicate()[0].strip())
-    assert killed.returncode == -signal.SIGKILL and left.is_dir()
-    (tmp_path / "more").rmdir()
-    alive = python(KILLED.format(end="signal.pause()"), tmp_path, env=environment)
-    stays = Path(alive.stdout.readline().strip())
-    old, new, foreign = (tmp_path / f"chainunit_{c * 16}" for c in "abc")
-    for each in (old, new, foreign):
-        each.mkdir()
-    (foreign / "content").touch()
-    for each in (old, foreign):
-        os.utime(each, (1.0, 1.0))
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr(temporary_folders, "_cleaned", set())
-    with temporary_folders.scratch() as own:
-        assert {p.name for p in tmp_path.glob("chainunit*")} == {p.name for p in (stays, new, foreign, own)}
-    assert not own.exists()
-    alive.terminate()
-    alive.communicate()
-
-
-def test_a_pipe_or_a_torn_line_in_place_of_the_list_of_files(tmp_path):
-    """A pipe would be waited for; a process that is killed leaves a part of a line, and so may the next one."""
-    ours = tmp_path / "a.txt"
-    ours.write_text("a")
-    ledger.Ledger(tmp_path).add(ours, ours)
-    file = tmp_path / ledger.NAME
-    for _ in range(2):
-        file.write_bytes(file.read_bytes() + b"0123abc")
-        known = ledger.Ledger(tmp_path)
-        assert known.wrote(ours)
-        other = tmp_path / "b.txt"
-        other.write_text(secrets.token_hex(4))
-        known.add(other, other)
-        assert ledger.Ledger(tmp_path).wrote(other) and ledger.Ledger(tmp_path).wrote(ours)
+def test_a_pipe_or_a_link_in_place_of_the_list_of_files(tmp_path):
+    """A pipe would be waited for, and a link may lead anywhere."""
+    with claim(tmp_path), scratch() as elsewhere:
+        pass
+    assert not elsewhere.exists() and names(tmp_path) == []
+    file = tmp_path / LIST
+    (tmp_path / "other").write_text(f"{'0' * 64}  a.txt\n")
+    file.symlink_to(tmp_path / "other")
+    with pytest.raises(InputError, match="is no list of files of chainunit"):
+        FileList(tmp_path)
     file.unlink()
     os.mkfifo(file)
     with pytest.raises(InputError, match="is no list of files of chainunit"):
-        ledger.Ledger(tmp_path)
+        FileList(tmp_path)

@@ -38,7 +38,7 @@ from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.system import CoSimulation, Profile, certify
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 SCRIPT = Path(__file__).parent / "foreign_machine.py"
 RATIO, SPEED, MASS, PRESSURE, BURST = 25.0, 6.0, 60.0, 3e3, 8e4
@@ -345,7 +345,7 @@ def test_the_least_that_it_needs(left_out, folder, tmp_path):
         assert getattr(study.answers["steady"], name) == pytest.approx(getattr(whole, name), rel=2e-2), name
 
 
-@pytest.mark.parametrize("place", [pytest.param("motor", marks=pytest.mark.slow), "crank"])
+@pytest.mark.parametrize("place", ["motor", "crank"])
 def test_a_cardan_line_before_it(place, folder):
     """Line and gear are parts of the system; its twin with a rigid shaft is there, too."""
     sizes = {"motor": "J4 = 0.02\nc2 = 300\nc3 = 300", "crank": 'J4 = 2\nalpha1 = "10 deg"'}[place]

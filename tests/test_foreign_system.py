@@ -17,7 +17,7 @@ from command import chainunit
 from systems import component, pair
 from test_foreign import changed
 
-from chainunit import InputError
+from chainunit import InputError, RunError
 from chainunit.core.model import Terminal
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
@@ -40,7 +40,7 @@ from chainunit.system import (
 )
 from chainunit.system.graph import FmuComponent
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 SCRIPT = Path(__file__).parent / "foreign_motor.py"
 OTHER = MappingProxyType({"w": "rotor_speed", "phi": "rotor_angle", "load.J": "inertia_behind"})
@@ -473,7 +473,7 @@ def test_a_study_file_that_does_not_fit_is_refused_in_a_line(change, said, folde
     [
         (
             ["study", "--check", "foreign.toml", "-o", "check"],
-            r"--check: the equations of ForeignMotor\.fmu are not",
+            r"check: the equations of ForeignMotor\.fmu are not",
         ),
         (
             ["export", "DcMotor", "--config", "foreign.toml"],
@@ -619,6 +619,41 @@ def test_an_fmu_that_cannot_save_its_state_begins_again(machine, tmp_path):
         assert simulation.time == saved and simulation.signals == {"motor.w_ref": 20.0}
         again = simulation.run(saved + 0.05, 0.002)
     assert again.equals(first) and float(other["motor.w"][-1]) > float(first["motor.w"][-1]) + 1.0
+
+
+@pytest.mark.parametrize("alone", ["false", "true"])
+def test_a_repeated_run_that_fails_leaves_the_simulation_as_it_was(machine, tmp_path, alone):
+    """Time, signals and state, also if the FMU allows one instance alone."""
+    flags = {"canGetAndSetFMUstate": "false", "canBeInstantiatedOnlyOncePerProcess": alone}
+    system = driven(machine, foreign_component(build(tmp_path, **flags), "motor"))
+    is_broken = []
+
+    def fragile(t):
+        if is_broken and t > is_broken[0]:
+            is_broken.clear()
+            raise RunError("the supply is gone")
+        return 60.0
+
+    def last_rows(breaks):
+        with CoSimulation(system, SIGNALS) as simulation:
+            simulation.run(0.05, 0.002)
+            simulation.signals = {"motor.w_ref": fragile}
+            simulation.run(0.1, 0.002)
+            simulation.save()
+            simulation.signals = {"motor.w_ref": 20.0}
+            simulation.run(0.15, 0.002)
+            if breaks:
+                is_broken.append(0.07)
+                with pytest.raises(RunError, match="the supply is gone"):
+                    simulation.restore()
+                assert simulation.time == 0.15 and simulation.signals == {"motor.w_ref": 20.0}
+            rest = simulation.run(0.2, 0.002)
+            simulation.restore()
+            assert simulation.time == 0.1
+            return rest, simulation.run(0.15, 0.002)
+
+    for rows, unbroken in zip(last_rows(True), last_rows(False), strict=True):
+        assert rows.equals(unbroken)
 
 
 def test_it_carries_nothing_of_ours(file):

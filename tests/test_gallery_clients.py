@@ -1,4 +1,4 @@
-"""The gallery of linkage files as FMUs in other importers; one file each time, all of them in .ci/full."""
+"""The gallery of linkage files as FMUs in other importers."""
 
 from __future__ import annotations
 
@@ -19,19 +19,11 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 
-pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 GALLERY = sorted((Path(__file__).parents[1] / "examples" / "linkages").glob("*.toml"))
-OFTEN = ("blake_jaw_crusher", "cylinder_lift")
-FILES = [
-    pytest.param(file, id=file.stem, marks=() if file.stem in OFTEN else pytest.mark.slow) for file in GALLERY
-]
 
 
-def test_the_gallery_is_there():
-    assert len(GALLERY) >= 10 and {file.stem for file in GALLERY} >= {*OFTEN}
-
-
-@pytest.fixture(scope="module", params=FILES)
+@pytest.fixture(scope="module", params=GALLERY, ids=lambda file: file.stem)
 def machine(request):
     return Machine(read_linkage(request.param))
 
@@ -94,7 +86,6 @@ def test_directional_derivatives(machine, alone):
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", ["blake_jaw_crusher", "edge_trimmer", "scotch_yoke_pump"])
-@pytest.mark.slow
 def test_random_calls_under_sanitizers(name, fmi, tmp_path):
     file = next(file for file in GALLERY if file.stem == name)
     fmu = export(read_linkage(file), tmp_path / "unit.fmu", fmi=fmi)

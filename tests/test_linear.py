@@ -479,10 +479,10 @@ def test_a_direct_model_has_the_torque_that_holds_its_speed():
     [
         ("DcMotor", {"at": "steady"}, "must be NAME=VALUE"),
         ("DcMotor", {"at": "speed=3"}, '"speed": no such state or input'),
-        ("DcMotor", {"at": "w=3 kg"}, "--at: w"),
-        ("DcMotor", {"at": {"w": math.inf}}, "--at: w"),
+        ("DcMotor", {"at": "w=3 kg"}, "at: w"),
+        ("DcMotor", {"at": {"w": math.inf}}, "at: w"),
         ("DcMotors", {}, "DcMotors: no such model"),
-        ("DcMotor", {"inverse": True}, "--inverse: is of linkage files"),
+        ("DcMotor", {"inverse": True}, "inverse: is of linkage files"),
         (
             EXAMPLES / "linkages" / "cylinder_lift.toml",
             {"at": "equilibrium"},
@@ -494,14 +494,14 @@ def test_a_direct_model_has_the_torque_that_holds_its_speed():
             'give the number of one, as in "equilibrium:1", or a place, "phi=.., w=0"',
         ),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam:2 s"}, "there is no run"),
-        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, "--at"),
-        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, '--at "start_up": must be RUN:TIME'),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, 'at = "2 kg"'),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, 'at = "start_up": must be RUN:TIME'),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "steady:1 s"}, "steady running begins at "),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam_left:1 s"}, "the run of jam_left goes from"),
         (
             EXAMPLES / "jam_with_driveline.toml",
             {"config": "x.toml"},
-            "--config x.toml: is not of a study file",
+            "config = x.toml: is not of a study file",
         ),
     ],
 )

@@ -110,7 +110,7 @@ def test_export(tmp_path, direct):
     [
         (("export", "nope.toml"), "nope.toml: cannot be read"),
         (("export", "ChamberForce"), 'was "ChamberForces" meant?'),
-        (("export", "ChamberForces", "--direct"), "--direct: is of linkage files"),
+        (("export", "ChamberForces", "--direct"), "direct: is of linkage files"),
         (("linkage", "nope.toml"), "nope.toml: cannot be read"),
         (
             ("linkage", str(PRESS), "--speed", "60 mm"),

@@ -106,7 +106,7 @@ def test_a_turn_of_the_packaged_study_is_that_of_python(packaged):
 
 @pytest.mark.parametrize(
     "file",
-    [pytest.param(f, id=f.stem, marks=() if f.stem in QUICK else pytest.mark.second) for f in LINKAGES],
+    [pytest.param(f, id=f.stem, marks=() if f.stem in QUICK else pytest.mark.slow) for f in LINKAGES],
 )
 def test_a_turn_of_each_linkage_is_that_of_python(file):
     machine = Machine(read_linkage(file))
@@ -177,7 +177,7 @@ def test_runs_that_last_too_long_are_refused(packaged):
     assert refused and words == "these runs last too long for a page: 10004\u00a0s and more"
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [30.0, 80.0], ids=["fast enough", "never fast enough"])
 def test_an_empty_start_is_made_once(ratio, tmp_path):
     """From rest, without the feed until the crank is fast enough: a turn is made twice. Where the crank is never fast
@@ -303,7 +303,7 @@ def study_of(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["chain-unit", *(pytest.param(n, marks=pytest.mark.second) for n in CHANGED if n != "chain-unit")]
+    "name", ["chain-unit", *(pytest.param(n, marks=pytest.mark.slow) for n in CHANGED if n != "chain-unit")]
 )
 def test_runs_and_the_copied_study_file_agree(name, tmp_path):
     """An event in node, and the same event in a study of the file that the page gives."""
@@ -328,7 +328,7 @@ def test_runs_and_the_copied_study_file_agree(name, tmp_path):
     check_event(copied, choice, copied.events[run], found, rel=5e-4 if name == "knife" else 1e-4)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_run_goes_on_until_the_coupling_passes_no_torque(tmp_path):
     """A blocked rocker loads the coupling further while it opens: as in a run without one, up to that time."""
     config = study_of("jam_trips_coupling.toml")
@@ -349,7 +349,7 @@ def test_a_run_goes_on_until_the_coupling_passes_no_torque(tmp_path):
     assert later["crank_torque_peak"] > 1.1 * found["crank_torque_peak"]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_that_turns_slower_than_asked_for_settles(tmp_path):
     """With a longer gear the crank makes a turn less in the time of steady running; that is no stall."""
     config = study_of("knife")
@@ -362,7 +362,7 @@ def test_a_motor_that_turns_slower_than_asked_for_settles(tmp_path):
     check_event(copied, choose(copied, tmp_path), copied.events["dip"], found, rel=1e-3)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_long_start_is_awaited(tmp_path):
     """The flywheel takes the motor longer than the turns in which it should settle."""
     config = study_of("on line")
@@ -377,7 +377,7 @@ def test_a_long_start_is_awaited(tmp_path):
     check_event(copied, choose(copied, tmp_path), copied.events["jam_left"], found, rel=1e-2)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["chain-unit", "knife", "inverter", "jam_with_driveline.toml"])
 def test_every_overload_has_the_peaks_of_the_co_simulation(name, tmp_path):
     """The page integrates one system; a study couples FMUs, with an error of its step, which is halved here: at 1 ms
@@ -415,7 +415,7 @@ def test_the_copied_file_without_a_change_is_the_study(packaged, tmp_path):
     assert copied.feed == config.feed and copied.run == config.run and copied.events == config.events
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_heavy_feed_slows_the_crank_as_in_a_sweep(packaged):
     """With a heavier feed on both sides the crank loses more speed, as in the runs of a sweep, which await a motor
     that comes to its speed late; a crank that creeps has no steady running in either."""
@@ -507,7 +507,7 @@ def test_a_date_in_the_study_file_is_a_text_in_the_page(tmp_path):
     assert json.loads(json.dumps(live.data["file"]))["report"] == {"date": "2026-03-01"}
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["chain-unit", "knife"])
 def test_a_live_page_alone_is_small(name, tmp_path):
     file = tmp_path / "study.toml"

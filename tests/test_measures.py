@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,37 @@ import xarray as xr
 from chainunit import ChainUnitMachine
 from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.study import remarks
 from chainunit.study.drive import Drive
 from chainunit.study.limits import reaches
 from chainunit.study.measures import MEASURES, Answers, measures_of, read_answers, read_measure
 from chainunit.study.window import BURNT, Phase, Trip, Window
+
+
+@pytest.mark.parametrize(("swing", "is_told"), [(100.0, True), (10.0, False)])
+def test_a_peak_of_the_motor_that_is_none_of_the_load_has_its_reason(swing, is_told):
+    """A pump takes 53 N m at the motor's shaft at most, and its sheet said 59 N m without a reason."""
+    time = np.linspace(0.0, 1.0, 1001)
+    load, a = 50.0 + 3.0 * np.sin(94.0 * time), swing * np.cos(94.0 * time)
+    run = xr.Dataset(
+        {"motor.air_gap_tau": ("time", load + 0.085 * a), "motor.a": ("time", a)}, {"time": time}
+    )
+    notes, rotor = [], SimpleNamespace(J=0.085)
+    study = SimpleNamespace(
+        drive=SimpleNamespace(foreign=None, fmu_parameters=SimpleNamespace(rotor=rotor)),
+        steady=run,
+        answers={"steady": SimpleNamespace(speed_ripple=0.012)},
+        note=lambda kind, text, *runs, **parts: notes.append((kind, runs, parts)),
+    )
+    remarks._on_rotor(study)
+    if is_told:
+        ((kind, runs, parts),) = notes
+        assert kind == "rotor accelerates" and runs == ("steady",)
+        assert parts["load"] == (pytest.approx(53.0, rel=1e-3), "N.m")
+        assert parts["most"] == (pytest.approx(50.0 + math.hypot(3.0, 8.5), rel=1e-3), "N.m")
+    else:
+        assert not notes
+
 
 RATIO, SPEED = 10.0, 2.0
 TIME = np.linspace(0.0, 4.0, 4001)

@@ -272,3 +272,18 @@ def test_a_fault_is_told_once():
     other = InputError("start.points.C: is wrong", "start.points.C")
     assert str(InputError.joined([fault, again])) == "start.points.B: is wrong"
     assert len(InputError.joined([fault, other, again]).faults) == 2
+
+
+def test_lengths_of_the_example_beside_a_small_machine_are_named():
+    """A file that gives some lengths of its machine has the others, and the centroids, of the packaged one."""
+    table = '[machine]\nr = "60 mm"\nl = "420 mm"\nh = "380 mm"\nhy = "380 mm"\nc = "416 mm"\n'
+    said = [str(value) for value in config.parse(table + 'coupler = { s = "900 mm" }\n').file.unusual]
+    assert [line.partition(" = ")[0] for line in said] == [
+        "machine.e",
+        "machine.coupler.s",
+        "machine.rocker.s",
+    ]
+    assert "; not in the file; usual: 0.0001 to 0.38 m)" in said[0]
+    assert "900 mm: is unusual" in said[1] and "to 420 mm); check it" in said[1]
+    rest = 'e = "310 mm"\ncoupler = { s = "210 mm" }\nrocker = { s = "190 mm" }\n'
+    assert not config.parse(table + rest).file.unusual

@@ -3,12 +3,16 @@ in one line."""
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pint
 import pytest
 import xarray as xr
 
 from chainunit import ChainUnitMachine, InputError, SideLoads, Study, linearize, linkage
+from chainunit.batch import Beyond, Histogram
+from chainunit.machines.chain_unit import Feed
 from chainunit.machines.crank_rocker import CrankRocker
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.machine import Machine
@@ -63,6 +67,157 @@ def test_a_batch_takes_arrays_with_units():
     np.testing.assert_allclose(states.tau, plain.tau, rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "texts",
+    [["10 deg", "0.5 rad"], np.array(["10 deg", "0.5 rad"]), xr.DataArray(["10 deg", "0.5 rad"], dims="phi")],
+)
+def test_a_list_of_texts_is_a_list_of_numbers(texts):
+    machine, angles = ChainUnitMachine(), [np.radians(10.0), 0.5]
+    plain = machine.forces(np.array(angles), 3.0).tau
+    np.testing.assert_allclose(machine.forces(texts, 3.0).tau, plain, rtol=1e-12)
+    states = machine.batch({"phi": texts, "w": 3.0}, "tau", engine="numpy")
+    plain = machine.batch({"phi": angles, "w": 3.0}, "tau", engine="numpy").tau
+    np.testing.assert_allclose(states.tau, plain, rtol=1e-12)
+    np.testing.assert_allclose(states.phi, angles, rtol=1e-12)
+
+
+def test_an_array_with_units_is_converted_by_every_method():
+    machine = ChainUnitMachine()
+    degrees = xr.DataArray([10.0, 20.0], dims="phi", attrs={"units": "deg"})
+    np.testing.assert_allclose(
+        machine.forces(degrees).tau, machine.forces(np.radians(degrees.values)).tau, rtol=1e-12
+    )
+
+
+def test_loads_and_speeds_with_units_in_every_method():
+    """Texts and quantities of pint give what plain numbers give."""
+    machine, plain = ChainUnitMachine(), SideLoads(material_mass=30.0, processing_force=50.0)
+    methods = [
+        lambda loads, w, psi: machine.slack_speed(loads, loads),
+        lambda loads, w, psi: machine.pushed_speed(loads, loads, highest=w),
+        lambda loads, w, psi: machine.slack_speed(loads, loads, highest=w),
+        lambda loads, w, psi: machine.mean_pulls(w, loads, loads),
+        lambda loads, w, psi: machine.least_web_pull(w, loads, loads),
+        lambda loads, w, psi: machine.loaded_sides(Feed(left=loads, right=loads)),
+        lambda loads, w, psi: machine.hanging("left", psi, loads).theta,
+        lambda loads, w, psi: machine.organ_pulls(psi, w, left=loads)["left"]["web"]["A2"],
+        lambda loads, w, psi: machine.chamber(psi, w, left=loads).rocker.tau,
+    ]
+    texts = SideLoads(material_mass="30 kg", processing_force="0.05 kN")
+    library = SideLoads(material_mass=3e4 * UNITS.gram, processing_force=50 * N)
+    for method in methods:
+        numbers = method(plain, 30.0, np.radians(10.0))
+        for others in ((texts, "30 rad/s", "10 deg"), (library, 30.0 * UNITS.rad / UNITS.s, 10 * DEG)):
+            other = method(*others)
+            assert other == numbers if isinstance(other, tuple) else np.allclose(other, numbers, rtol=1e-9)
+
+
+def test_shares_are_taken_in_percent():
+    assert (
+        ChainUnitMachine(web_share="8 %").p.web_share
+        == ChainUnitMachine(web_share=8 * UNITS.percent).p.web_share
+    )
+    shares = ChainUnitMachine.from_ratios("10 %", 2 / 3, "60 %", "50 %")
+    assert shares.by_name == pytest.approx(
+        ChainUnitMachine.from_ratios(0.1, 2 / 3, 0.6, 0.5).by_name, rel=1e-12
+    )
+    with pytest.raises(InputError) as refusal:
+        ChainUnitMachine(ratio="8 %")
+    assert "%" not in str(refusal.value).partition(":")[2]
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda x: ChainUnitMachine(r=x),
+        lambda x: ChainUnitMachine().forces(0.0, left=SideLoads(material_mass=x)),
+        lambda x: ChainUnitMachine().forces(x * np.ones(3)),
+        lambda x: ChainUnitMachine().batch({"phi": 0.0, "r": x}, engine="numpy"),
+        lambda x: Study(machine={"r": x}),
+        lambda x: Study().with_values({"machine.r": x}),
+    ],
+)
+def test_a_quantity_without_a_dimension_is_no_length(call):
+    with pytest.raises(
+        InputError, match=r' = .*0\.15 1".*: must be a number in .*, or a text such as'
+    ) as refusal:
+        call(0.15 * UNITS.dimensionless)
+    assert "\n" not in str(refusal.value)
+    assert Study(machine={"ratio": 40 * UNITS.dimensionless}).machine.p.ratio == 40.0
+
+
+RATIOS = {"rho": 0.1, "lam": 2 / 3, "mu": 0.6, "zeta": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("rho", 0.99), ("lam", 0.05), ("lam", 0.12), ("mu", 0.99), ("zeta", 0.01), ("zeta", 0.99)],
+)
+def test_a_ratio_that_makes_no_machine_is_refused_with_its_range(name, value):
+    with pytest.raises(InputError, match=rf"as they are, {name} = {value} must be ([<>]=.*)$") as refusal:
+        ChainUnitMachine.from_ratios(**RATIOS | {name: value})
+    limits = re.findall(r"[<>]= ([0-9.]+)", str(refusal.value).rpartition("must be")[2])
+    for limit in limits:
+        ChainUnitMachine.from_ratios(**RATIOS | {name: float(limit)})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "limits"),
+    [
+        ("rho", 0.0, "0.999"),
+        ("rho", 1.0, "0.999"),
+        ("lam", -1.0, "100"),
+        ("mu", 1.0, "0.999"),
+        ("zeta", 1.1, "1"),
+    ],
+)
+def test_a_ratio_beyond_its_bounds_is_refused_by_its_name(name, value, limits):
+    with pytest.raises(InputError, match=rf"^{name} = {value:g}: must be > 0 and <= {limits} \("):
+        ChainUnitMachine.from_ratios(**RATIOS | {name: value})
+
+
+def test_ratios_of_which_none_alone_is_wrong_are_refused_with_a_begin():
+    with pytest.raises(
+        InputError, match=r"no other value of one of rho = 0\.6092, .* alone makes a machine; begin with"
+    ) as refusal:
+        ChainUnitMachine.from_ratios(rho=0.6092, lam=0.3898, mu=0.9872, zeta=0.981)
+    begin = dict(re.findall(r"(\w+) = ([0-9.]+)", str(refusal.value).rpartition("begin with")[2]))
+    ChainUnitMachine.from_ratios(**{name: float(x) for name, x in begin.items()})
+
+
+def test_one_text_is_a_list_of_one():
+    """And not read letter by letter."""
+    machine, turn = ChainUnitMachine(), {"phi": [0.0, 0.5, 1.0]}
+    for one, listed in (
+        ({"outputs": "tau"}, {"outputs": ["tau"]}),
+        ({"outputs": "tau", "by": "crank.m"}, {"outputs": ["tau"], "by": ["crank.m"]}),
+        ({"over": "phi", "reduce": {"tau": "rms"}}, {"over": "phi", "reduce": {"tau": ["rms"]}}),
+        ({"over": "phi", "reduce": {"tau": Beyond(9.0)}}, {"over": "phi", "reduce": {"tau": [Beyond(9.0)]}}),
+    ):
+        assert machine.batch(turn, **one, engine="numpy").identical(
+            machine.batch(turn, **listed, engine="numpy")
+        )
+    model = MODELS["DcMotor"]
+    with CompiledSimulation(System({"motor": ModelComponent(model, model.Parameters())})) as simulation:
+        run = simulation.run(0.01, 0.001, names="motor.w")
+    assert set(run.data_vars) == {"motor.w"}
+
+
+def test_limits_of_a_batch_have_units():
+    machine, turn = ChainUnitMachine(), {"phi": np.linspace(0.0, 300.0, 400)}
+    for limit, ends in (
+        ("0.01 kN m", ("-20 N m", "0.02 kN m")),
+        (10.0 * N * UNITS.m, (-20.0 * N * UNITS.m, 20.0)),
+    ):
+        requests = [Beyond(limit), Histogram(*ends, 4)]
+        plain = [Beyond(10.0), Histogram(-20.0, 20.0, 4)]
+        counts, others = (
+            machine.batch(turn, over="phi", reduce={"tau": some}, engine="numpy")
+            for some in (requests, plain)
+        )
+        assert counts.identical(others) and 0 < int(counts["beyond(tau, 10)"]) < 400
+
+
 def test_a_dimension_of_one_argument_is_a_coordinate_with_its_unit():
     machine, turn = ChainUnitMachine(), np.linspace(0.0, 360.0, 90)
     phi = xr.DataArray(turn, dims="place", attrs={"units": "deg"})
@@ -111,6 +266,11 @@ def test_a_system_takes_them_too():
         simulation.run("3 kg", 0.002)
 
 
+def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, **values):
+    options = {"by": by, "over": over, "reduce": reduce, "out": out, "workers": workers}
+    return ChainUnitMachine().batch({"phi": [0.0, 0.5]} | values, outputs, **options, engine="numpy")
+
+
 @pytest.mark.parametrize(
     ("call", "line"),
     [
@@ -129,6 +289,61 @@ def test_a_system_takes_them_too():
         (lambda: ChainUnitMachine().batch(3), "values = 3: must be a mapping"),
         (lambda: ChainUnitMachine().batch({"phi": object()}), "must be a number in rad"),
         (lambda: ChainUnitMachine.from_ratios("a", 0.6, 0.6, 0.5), 'rho = "a": must be a pure number'),
+        (
+            lambda: ChainUnitMachine().slack_speed(highest="3 kg"),
+            'highest = "3 kg": must be a number in rad/s',
+        ),
+        (lambda: ChainUnitMachine().organ_rods("top"), 'side = "top": must be one of left, right'),
+        (
+            lambda: ChainUnitMachine().energy_per_kg("top", 0.0, 1.0),
+            'side = "top": must be one of left, right',
+        ),
+        (lambda: ChainUnitMachine().forces(np.zeros(3), np.zeros(4)), "shapes do not fit: phi (3,), w (4,)"),
+        (
+            lambda: ChainUnitMachine().evaluate({"phi": np.zeros(3), "w": np.zeros(4)}),
+            "shapes do not fit: phi (3,)",
+        ),
+        (lambda: ChainUnitMachine().chamber(np.zeros(3), np.zeros(4)), "shapes do not fit: w (4,), psi (3,)"),
+        (
+            lambda: ChainUnitMachine().forces(np.zeros(3), left=SideLoads(material_mass=np.zeros(4))),
+            "shapes do not fit: phi (3,), left.material_mass (4,)",
+        ),
+        (lambda: ChainUnitMachine().forces(["1 deg", "2 kg"]), 'phi = "2 kg": must be a number in rad'),
+        (lambda: batch(reduce=["tau"]), 'reduce = ["tau"]: must be a mapping such as {"tau": ["peak"]}'),
+        (lambda: batch(reduce={"tau": 3}), "tau: no reduction 3; there are min"),
+        (lambda: batch(reduce={"tau": [["rms"]]}), 'tau: no reduction ["rms"]; there are min'),
+        (lambda: batch(reduce={"tau": Beyond("3 kg")}), 'Beyond: limit = "3 kg": must be a number in N m'),
+        (
+            lambda: batch(reduce={"tau": Beyond("-3 N m")}),
+            "Beyond: limit = -3.0: must be a finite number >= 0",
+        ),
+        (
+            lambda: batch(reduce={"tau": Histogram("3 N m", "1 N m", 4)}),
+            "low = 3.0, high = 1.0: must be finite",
+        ),
+        (lambda: batch(reduce={"tau": Beyond(None)}), "Beyond: limit = None: must be a number in N m"),
+        (lambda: Histogram(1.0, 2.0, "4"), 'Histogram: bins = "4": must be a whole number'),
+        (
+            lambda: batch(over=["phi"], reduce={"tau": "rms"}),
+            'over = ["phi"]: must be the name of a dimension',
+        ),
+        (lambda: batch(outputs=3), "outputs = 3: must be a text, or a list of texts"),
+        (lambda: batch(outputs=["tau"], by=[3]), "by = 3: must be a text, or a list of texts"),
+        (lambda: batch(outputs="tau", workers="x"), 'workers = "x": must be a number of threads'),
+        (lambda: batch(outputs="tau", out=3), "out = 3: must be the result of an earlier call"),
+        (lambda: batch(w=xr.DataArray(["1 rpm", "2 kg"], dims="x")), 'w = "2 kg": must be a number in rad/s'),
+        (
+            lambda: batch(w=xr.DataArray(np.array([None, 1.0], object), dims="x")),
+            "w = [None, 1.0]: must be a number",
+        ),
+        (
+            lambda: System({}, ("motor.flange", "machine.flange")),
+            'joints = "motor.flange": must be a list of pairs',
+        ),
+        (
+            lambda: Study().export("x.fmu", platforms="linux"),
+            "platforms = linux: no such platform; there are linux64",
+        ),
         (lambda: CrankRocker.for_swing("17 kg", 0.6), "kg is a mass"),
         (lambda: Study(machine={"r": 3 * KG}), 'machine.r = "3.0 kg": must be a number in m'),
         (lambda: Study(machine={"r": object()}), "machine.r = <object"),

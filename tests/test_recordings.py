@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -208,7 +209,9 @@ def test_faults_of_the_rows():
     (fault,) = faults(slow)
     assert "5 rows a second are 10 in a turn of the crank; record >= 19 rows a second" in fault
     (fault,) = faults(GOOD.part(0.0, 2.5))
-    assert "2.5 s are 1.2 turns of the crank; record >= 3 turns" in fault
+    assert (
+        "2.5 s are 1.19 turns of the crank at crank_speed; record >= 3 turns, or correct crank_speed" in fault
+    )
 
 
 @pytest.mark.parametrize(
@@ -255,8 +258,51 @@ def test_a_mark_is_passed_once_in_a_turn():
     )
 
 
+COUNT = np.floor(SPEED * RATIO * 4096.0 / (2.0 * np.pi) * GOOD.time)
+
+
+@pytest.mark.parametrize("stated", [0.03, 0.1, 100.0])
+@pytest.mark.parametrize(
+    ("left_out", "column"),
+    [
+        ((), "mark"),
+        (("mark",), "motor.count"),
+        (("mark", "motor.count"), "motor.w"),
+        (("motor.count", "motor.w"), "mark"),
+        (("mark", "motor.w"), "motor.count"),
+    ],
+)
+def test_a_stated_speed_far_from_that_of_the_recording_is_the_one_cause(stated, left_out, column):
+    """And not that the rows are too few, that marks are missing, or that the machine stands. With the speed that the
+    refusal names there is no fault."""
+    columns = {name: x for name, x in (GOOD.columns | {"motor.count": COUNT}).items() if name not in left_out}
+    recording = replace(GOOD, columns=columns, heads=GOOD.heads | {"motor.count": "motor.count [1]"})
+    stated *= SPEED
+    (fault,) = map(str, inspect_motion(recording, (stated, stated), RATIO))
+    assert (
+        f"column {column}" in fault
+        and "the crank turns at" in fault
+        and f"crank_speed is {stated:.5g} " in fault
+    )
+    (remedy,) = re.findall('crank_speed = "(.*) rev/min"', fault)
+    speed = float(remedy) * np.pi / 30.0
+    assert speed == pytest.approx(SPEED, rel=0.01) and inspect_motion(recording, (speed, speed), RATIO) == []
+
+
+def test_a_stated_speed_is_not_blamed_for_another_fault():
+    """Marks and measured speed contradict each other; a time without its unit slows down the mark alone."""
+    columns = {name: x for name, x in GOOD.columns.items() if name != "motor.w"}
+    six = {"mark": passes(0.0, 1.05, 2.09, 3.14, 4.19, 5.24)}
+    for part in (GOOD.columns, columns):
+        (fault,) = faults(replace(GOOD, columns=part | six))
+        assert "is 1 in" in fault
+        slow = replace(GOOD, time=1e3 * GOOD.time, columns=part)
+        (fault,) = (str(each) for each in inspect_motion(slow, (SPEED, SPEED), RATIO) if "time" in str(each))
+        assert "the values look like ms; write [ms] into its head" in fault
+
+
 def test_an_encoder_counts_up_and_does_not_begin_anew():
-    count = np.floor(SPEED * RATIO * 4096.0 / (2.0 * np.pi) * GOOD.time)
+    count = COUNT
 
     def of_count(x):
         columns = {name: x for name, x in GOOD.columns.items() if name != "mark"} | {"motor.count": x}

@@ -64,7 +64,7 @@ def test_wrong_cells_of_a_catalogue_stand_behind_the_faults_of_the_file(tmp_path
         "catalogue = 'cat.csv'\n[sizing]\n[run]\nstep = 1\n[ratios]\nmu = 1\n"
     )
     output = chainunit("study", "mine.toml", cwd=tmp_path).stderr.splitlines()
-    begins = ["mine.toml:4: run.step", "mine.toml:5: ratios", *(8 * ["cat.csv:1: column"])]
+    begins = ["mine.toml:4: run.step", "mine.toml:6: ratios.mu", *(8 * ["cat.csv:1: column"])]
     begins += ["cat.csv:2: column power", "cat.csv:3: column power"]
     assert len(output) >= len(begins) and output[-1].startswith("chainunit: cat.csv:3: column power")
     for line, begin in zip(output[:10], begins, strict=False):

@@ -9,6 +9,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,10 +20,11 @@ import chainunit.report
 from chainunit.reading.text import DEFAULT_UNITS, chosen_units
 from chainunit.report import blocks as b
 from chainunit.report import figure as fig
-from chainunit.report import html, print_figures, terminal
+from chainunit.report import html, print_figures, runs, terminal
 from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
+from chainunit.report.result_figures import ResultFigure
 from chainunit.study.config import Run
 
 RESULT = {
@@ -156,6 +158,30 @@ def test_one_screen_counts_the_rows_that_it_leaves_out(count):
     shown = sum("row " in line for line in lines if line.startswith("│"))
     left = sum(int(number) for line in lines for number in re.findall(r"^[.]{3} and (\d+) more rows$", line))
     assert shown + left == count and len(lines) <= 45 and "of the page" not in "".join(lines)
+
+
+@pytest.mark.parametrize("text_of", [screen_of, lambda report: terminal.brief(report, 0).splitlines()])
+def test_a_long_table_is_printed_a_few_times_to_find_its_room(text_of, monkeypatch):
+    """On one screen and in a notebook alike, and not once for each row that is left out."""
+    printed, show = [], terminal._show_table
+    monkeypatch.setattr(terminal, "_show_table", lambda *args: printed.append(args) or show(*args))
+    rows = tuple(b.TableRow((f"row {k}", S.number("power"))) for k in range(1000))
+    table = b.Table(rows, (b.Column("row"), b.Column("power")))
+    lines = text_of(b.Report("A title", "kind", RESULT, (), (b.Section("answer", "", (table,)),)))
+    (left,) = (int(line.split()[2]) for line in lines if re.fullmatch(r"[.]{3} and \d+ more rows", line))
+    assert sum("row " in line for line in lines if line.startswith("│")) + left == 1000 and left < 990
+    assert len(printed) <= 12
+
+
+def test_a_notebook_draws_a_figure_once(monkeypatch):
+    figure, drawn, draw = ResultFigure(a_figure(), DEFAULT_UNITS), [], ResultFigure.to_matplotlib
+    monkeypatch.setattr(ResultFigure, "to_matplotlib", lambda self: drawn.append(self) or draw(self))
+    ways = (
+        getattr(figure, f"_repr_{kind}_", None)
+        for kind in ("html", "png", "svg", "jpeg", "pdf", "mimebundle")
+    )
+    shown = [way() for way in ways if way is not None]
+    assert len(shown) == len(drawn) == 1 and shown[0].startswith(b"\x89PNG")
 
 
 def test_the_chosen_units_are_everywhere():
@@ -365,6 +391,10 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
             "Warning: Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %.",
             "Warning: Crank speed too high for the rocker torque of two bars.",
         ),
+        (
+            "Warning: Steady running: the crank makes 0.283 of a turn in the 9.69 s that are evaluated; so.",
+            "Warning: Steady running: the crank makes 0.283 of a turn in the 9.69 s that ...",
+        ),
         ("Warning: " + "word " * 20, "Warning: " + "word " * 13 + "..."),
     ],
 )
@@ -405,3 +435,37 @@ def test_an_axis_has_the_unit_of_its_largest_value(largest, label, shown):
     assert fig.in_units(row, DEFAULT_UNITS).panels[0][1].y.label == label.replace("force", "pull")
     chosen = fig.in_units(figure, chosen_units({"force": "N"})).panels[0]
     assert [each.y.label for each in chosen] == ["force [N]", "force [N]"]
+
+
+@pytest.mark.parametrize("width", range(24, 60))
+def test_no_line_of_a_screen_ends_between_a_number_and_its_unit(width):
+    """The line after "heat 82.3" held "%." alone."""
+    words = "Chosen: heat 82.3 %, 4.28 kg m² and 1.25 kN m at 5 A; 29.3 rad/s (280 rev/min)."
+    out = io.StringIO()
+    console = Console(file=out, markup=False, highlight=False, width=width)
+    report = b.Report("", "kind", RESULT, (), (b.Section("answer", "", (b.Text(words, central=True),)),))
+    terminal.screen(report, console, "")
+    printed = out.getvalue()
+    assert printed.split() == words.split()
+    for whole in ("82.3 %", "4.28 kg m²", "1.25 kN m", "5 A", "29.3 rad/s", "280 rev/min"):
+        assert whole in printed
+
+
+@pytest.mark.parametrize("coupling", [None, 1304.0])
+def test_the_worst_overload_is_without_a_limiter_only_if_there_is_none(monkeypatch, coupling):
+    """The column of 1891 N m, with a limiter that trips, stood below "without torque limiter"."""
+    monkeypatch.setattr(runs, "by_side", lambda study, answers: ["steady", "surge"])
+    study = SimpleNamespace(
+        overloads=["surge"],
+        proposal=object(),
+        insufficient="",
+        config=SimpleNamespace(coupling=coupling),
+        title_of=lambda run: run,
+        titles={"surge": "rock rises"},
+    )
+    monkeypatch.setattr(runs.run_names, "title", lambda study, run: study.titles[run])
+    source = b.Source({"answers": {"surge": {"crank_torque_peak": {"value": 1891.0, "unit": "N.m"}}}})
+    table = b.Table((b.TableRow(("peak", "1", "2")),), b.heads("", "steady", "surge"))
+    title = runs._beside_the_worst(source, study, table).title
+    bare = " (without torque limiter)" if coupling is None else ""
+    assert title == f"Steady running beside the worst overload{bare}: rock rises"

@@ -135,7 +135,6 @@ def test_files_that_name_others_are_not_marked(text):
 
 UNSEEN = {
     "[machine]\nr = 0.9": "lengths of a crank that turns",
-    "[ratios]\nmu = 1.0": "lengths of a crank that turns",
     "[observer]\n[feed]\nleft = { material_mass = 0 }\nright = { material_mass = 0 }": "sum of two values",
     "[run]\ncrank_speed = '3 1/s'": "dimension of a product of units",
     "[driveline]\n[torsion]\nslowest = 3\nfastest = 2": "order of two values",

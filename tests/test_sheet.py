@@ -249,7 +249,7 @@ def pages_of(file):
     return reader, [page.extract_text() for page in reader.pages]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnraisableExceptionWarning"
 )  # the library leaves a file open
@@ -280,7 +280,7 @@ def test_the_pdf_is_two_to_four_pages_and_an_annex_and_has_eight_at_most(study, 
         assert words in first
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_an_annex_that_would_be_too_long_is_set_closer(study, made, tmp_path, monkeypatch):
     try:
@@ -359,7 +359,7 @@ def machine_of(name):
     return ("" if name == "motor_rejected" else NO_OTHER_RUNS) + read[name].replace('"catalogue/', catalogues)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("name", ["heavy_mill", "knife", "own_catalogue", "motor_rejected"])
 def test_the_sheet_of_each_machine_has_at_most_four_pages_with_readable_letters(name, tmp_path):

@@ -260,8 +260,8 @@ FMPY = """
     print("values", json.dumps([[float(row[name]) for name in names] for row in result]))
 """
 TOOLS = [
-    pytest.param(LIBCOSIM, id="libcosim", marks=[here("libcosimpy"), pytest.mark.second]),
-    pytest.param(ECOS, id="ecos", marks=[here("ecospy"), pytest.mark.second]),
+    pytest.param(LIBCOSIM, id="libcosim", marks=[here("libcosimpy"), pytest.mark.slow]),
+    pytest.param(ECOS, id="ecos", marks=[here("ecospy"), pytest.mark.slow]),
 ]
 
 

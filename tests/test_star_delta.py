@@ -25,7 +25,7 @@ from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, ModelExchange, monolithic
 from chainunit.system.compiled_simulation import CompiledSimulation
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 SYSTEM = """
 [system]

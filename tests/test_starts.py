@@ -146,12 +146,12 @@ def test_a_start_with_the_limit_of_an_inverter_of_the_rated_current(tmp_path):
     assert limited[0].start_time > starts[0].start_time
 
 
-def test_the_heat_of_a_relay_is_bounded_with_the_current_of_star():
-    """6 A for 2 s direct on line; in a starter that changes to delta after 3 s up to sqrt(3) 6 A in the windings."""
-    starts = (StartNumbers(**NONE | {"start_time": 2.0, "current": 6.0}),)
-    found = StartFindings(starts, 1.0, math.inf, "steady")
-    assert found.start_seconds(1.0, 0.0) == pytest.approx(2.0 * (6.0 / 7.2) ** 2)
-    assert found.start_seconds(1.0, 3.0) == pytest.approx(3.0 * 3.0 * (6.0 / 7.2) ** 2)
+def test_the_heat_of_a_relay_is_that_of_the_hardest_start():
+    """The time at 7.2 times the rated current; a start that fails heats it for ever."""
+    starts = tuple(StartNumbers(**NONE | {"start_time": 2.0, "relay_seconds": x}) for x in (0.4, 3.4, 1.0))
+    assert StartFindings(starts, 1.0, math.inf, "steady").relay_seconds == 3.4
+    stuck = StartFindings((*starts, StartNumbers(**NONE)), 1.0, math.inf, "steady")
+    assert math.isinf(stuck.relay_seconds)
 
 
 def test_the_inverter_is_ordered_by_all_starts_and_events():

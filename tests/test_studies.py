@@ -15,8 +15,7 @@ from command import chainunit
 
 from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult, WriteError
 from chainunit.app import studies
-from chainunit.core import ledger
-from chainunit.core.files import claim
+from chainunit.core.files import LIST, FileList, claim
 from chainunit.study.record import StudyRecord
 
 FILE = """
@@ -61,7 +60,7 @@ def command(tmp_path_factory):
 @pytest.mark.second
 def test_python_and_the_command_find_the_same(result, command, tmp_path):
     written = result.save(tmp_path / "out", png=True)
-    assert {file.name for file in written} == {p.name for p in command.iterdir()} - {"fmu", ledger.NAME}
+    assert {file.name for file in written} == {p.name for p in command.iterdir()} - {"fmu", LIST}
     assert {p.name for p in (tmp_path / "out").iterdir()} == {p.name for p in command.iterdir()}
     for name in ("ChamberForces.fmu", "DcMotor.fmu"):
         assert (tmp_path / "out" / "fmu" / name).stat().st_size > 1000
@@ -77,7 +76,7 @@ def test_a_foreign_fmu_is_seen_before_earlier_results_are_removed(tmp_path):
     (tmp_path / "fmu").mkdir()
     (tmp_path / "fmu" / "DcMotor.fmu").write_text("mine")
     (tmp_path / "torque.png").write_text("of an earlier run")
-    ledger.Ledger(tmp_path).add(tmp_path / "torque.png", tmp_path / "torque.png")
+    FileList(tmp_path).add(tmp_path / "torque.png", tmp_path / "torque.png")
     with pytest.raises(InputError, match=r"fmu/DcMotor\.fmu: would be lost, as chainunit did not write it"):
         Study(**TABLES).run(tmp_path)
     assert (tmp_path / "torque.png").exists() and (tmp_path / "fmu" / "DcMotor.fmu").read_text() == "mine"
@@ -101,7 +100,7 @@ def test_a_file_that_cannot_be_written_is_a_public_error(result, tmp_path, monke
 
     folder = tmp_path / "out"
     folder.mkdir()
-    monkeypatch.setattr("chainunit.core.files.os.replace", full)
+    monkeypatch.setattr("os.replace", full)
     with pytest.raises(WriteError, match="No space left"):
         result.save(folder)
 

@@ -19,7 +19,7 @@ from reports import write
 
 from chainunit import EMPTY, ChainUnitMachine, SideLoads
 from chainunit.capabilities.sides.analysis import factors_for, sides_over_speed
-from chainunit.core.ledger import NAME, Ledger
+from chainunit.core.files import LIST, FileList
 from chainunit.machines.chain_unit import Feed
 from chainunit.reading.results import as_data
 from chainunit.report import series
@@ -50,7 +50,7 @@ def done(tmp_path_factory):
     (folder / "out dir").mkdir()
     old = folder / "out dir" / "reactions.png"
     old.write_text("old")
-    Ledger(old.parent).add(old, old)
+    FileList(old.parent).add(old, old)
     result = chainunit("study", "short.toml", "-o", "out dir", "--check", cwd=folder)
     assert result.returncode == 0, result.stderr
     return result, folder / "out dir"
@@ -68,7 +68,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "result.md",
         "provenance.json",
         "study_copy.toml",
-        NAME,
+        LIST,
         *study_report.pictures(),
     } - {
         "driveline.png",
@@ -308,7 +308,7 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
 def test_an_old_result_does_not_survive_a_new_run(tmp_path, done):
     (tmp_path / "out" / "result.nc").mkdir(parents=True)
     refusal = chainunit("study", "-o", "out", cwd=tmp_path)
-    assert refusal.returncode == 2 and "is not a regular file" in refusal.stderr
+    assert refusal.returncode == 2 and "out/result.nc: would be lost" in refusal.stderr
     _, out = done
     assert (out / "reactions.png").read_bytes()[:4] == b"\x89PNG"
 

@@ -435,7 +435,7 @@ def test_a_study_names_what_serves_instead(tmp_path):
     for more in ("", "[sizing]\ncandidates = 3\n", '[sweep]\nparameters = { "machine.g" = [9.0, 10.0] }\n'):
         with pytest.raises(InputError, match=r"has a driver that swings from 20 deg to 75 deg") as caught:
             config.parse(f'[machine]\nlinkage = "gripper.toml"\n{more}', str(tmp_path / "mine.toml"))
-        assert "chainunit linkage --speed shows its forces there and back" in str(caught.value)
+        assert "the report on the linkage shows its forces there and back" in str(caught.value)
 
 
 # the direct model

@@ -166,6 +166,11 @@ def test_a_shorter_step_is_no_advice_for_a_crank_that_stalls():
     assert stalled.holds == "false" and "the energy balance is not kept" in stalled.text
 
 
+def test_the_model_of_a_machine_that_stands_is_not_called_valid():
+    assert ": would be valid if the crank turned." in rigid_links(3.0, {"steady": 1e-6}, actual=0.05).text
+    assert "would be" not in rigid_links(3.0, {"steady": 1e-6}, actual=2.0).text
+
+
 def test_of_a_machine_that_is_not_known_only_the_energy_balance_is_judged():
     kept, lost = (foreign_machine(3.0, {"steady": share}) for share in (1e-6, 1.0))
     assert (kept.holds, kept.caveat) == ("true", None) and as_data(kept)["model"] is None

@@ -162,6 +162,7 @@ CHANGES = [
      [(5, "parameters.l", "the one is in m, the other in kg")]),
     # dimensions
     (crank('"r * l"'), [(18, "links.crank.points.A", "in m2; must be in m")]),
+    (crank('"0.04 * cos(r / l)"'), [(18, "links.crank.points.A", "multiply by a parameter that has it")]),
     (crank('"r + l * l"'), [(18, "links.crank.points.A", "the one is in m, the other in m2")]),
     (crank('"sin(r)"'), [(18, "links.crank.points.A", "takes an angle or a ratio, not m")]),
     ([("press_force * share", "press_force * r")],

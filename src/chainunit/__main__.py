@@ -6,6 +6,7 @@ Signals are handled before the command line is imported, and until the process h
 from __future__ import annotations
 
 import os
+import signal
 
 
 def main() -> None:
@@ -17,7 +18,6 @@ def main() -> None:
         interrupts.begin()
         try:
             from .app import cli
-            from .core import temporary_folders
             from .report import console
         except Exception:
             # a library may turn the interrupt of its import into another error
@@ -28,8 +28,8 @@ def main() -> None:
         try:
             cli.main()
         finally:
-            temporary_folders.remove_folders()
-            interrupts.ignore()
+            # at the end of a process Python takes its handlers away
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
         if "interrupts" in locals():
             status = interrupts.status()

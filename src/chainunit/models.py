@@ -50,6 +50,6 @@ def model_named(name: str, direct: bool = False) -> type[Model]:
         raise InputError(f"{name}: no such model{near_name(name, MODELS) or ';'} {there}")
     if direct:
         raise InputError(
-            "--direct: is of linkage files; the direct model of a machine has a name, as ChainUnit"
+            "direct: is of linkage files; the direct model of a machine has a name, as ChainUnit"
         )
     return MODELS[name]

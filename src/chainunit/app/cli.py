@@ -285,8 +285,7 @@ def live(
 
     Makes no run: the page computes by itself, in any browser, without a network.
     """
-    from ..core.files import write_file
-    from ..core.temporary_folders import scratch
+    from ..core.files import scratch, write_file
     from ..report.html import render
     from ..report.live.page import live_page
 

@@ -14,10 +14,9 @@ import numpy as np
 
 from ..core.declared_numbers import as_text
 from ..core.errors import InputError, RemarkWarning, check_kind, near_name, shown
-from ..core.files import named_file, write_file
+from ..core.files import named_file, scratch, write_file
 from ..core.named import Named
 from ..core.quantities import Layout
-from ..core.temporary_folders import scratch
 from ..fmu.backends import Backend
 from ..fmu.backends import export as write_fmu
 from ..fmu.script import Names

@@ -6,15 +6,15 @@ import math
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.declared_numbers import in_declared_unit, magnitude_and_unit
-from ..core.errors import InputError, RemarkWarning, RunError, check_kind
+from ..core.declared_numbers import in_declared_unit, magnitude_and_unit, number_in
+from ..core.errors import InputError, RemarkWarning, RunError, check_kind, texts_in
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from ..core.printing.operations import ARGUMENT
@@ -75,7 +75,7 @@ def evaluate(
     *,
     by: Sequence[str] = (),
     over: str | None = None,
-    reduce: Mapping[str, Sequence[Request]] | None = None,
+    reduce: Mapping[str, Request | Sequence[Request]] | None = None,
     parameters: Any = None,
     engine: str = "native",
     workers: int | None = None,
@@ -120,15 +120,21 @@ def evaluate(
     RunError
         for results that do not fit into the memory.
     """
+    import xarray as xr
+
     check_kind("values", values, Mapping, "a mapping of names to values")
+    check_kind("over", over, str | None, "the name of a dimension")
+    check_kind("workers", workers, int | None, "a number of threads")
+    check_kind("out", out, xr.Dataset | None, "the result of an earlier call")
     check_engine(engine)
-    reduced: Reduced = ()
     if reduce is not None:
+        check_kind("reduce", reduce, Mapping, 'a mapping such as {"tau": ["peak"]}')
         if over is None or outputs is not None or by:
             raise InputError("reduce: needs the dimension `over`, and takes the place of `outputs` and `by`")
-        outputs, reduced = list(reduce), _reduced(reduce)
-    names = tuple(outputs if outputs is not None else (v.name for v in outputs_of(model)))
-    own = equations(model, names, tuple(by))
+        outputs = list(reduce)
+    names = texts_in("outputs", outputs) if outputs is not None else tuple(v.name for v in outputs_of(model))
+    own = equations(model, names, texts_in("by", by))
+    reduced = _reduced(reduce or {}, own.results)
     grid = Grid(own, values, parameters, over, engine, reduced)
     try:
         memory = grid.memory(out)
@@ -154,14 +160,31 @@ def check_engine(engine: str) -> None:
         cupy_()
 
 
-def _reduced(reduce: Mapping[str, Sequence[Request]]) -> Reduced:
-    """The requests with the places of their outputs, checked."""
-    requests = [(place, output, each) for place, (output, of) in enumerate(reduce.items()) for each in of]
+def _reduced(reduce: Mapping[str, Request | Sequence[Request]], results: Sequence[Result]) -> Reduced:
+    """The requests with the places of their outputs, whose `results` have units, checked; one request is a list of
+    one."""
+    requests = [
+        (place, output, _in_unit(request, results[place].unit))
+        for place, (output, listed) in enumerate(reduce.items())
+        for request in (listed if isinstance(listed, list | tuple) else [listed])
+    ]
     histograms = [output for _, output, request in requests if isinstance(request, Histogram)]
     for output in histograms:
         if histograms.count(output) > 1:
             raise InputError(f"{output}: has {histograms.count(output)} histograms; give one, with more bins")
     return tuple((column_of(place, request, output), request) for place, output, request in requests)
+
+
+def _in_unit(request: Any, unit: str) -> Any:
+    """A request whose limit or ends are numbers in the `unit` of its column."""
+    if not isinstance(request, Beyond | Histogram):
+        return request
+    ends: Any = {
+        name: number_in(unit, f"{type(request).__name__}: {name}", x, "limit")
+        for name, x in vars(request).items()
+        if name != "bins"
+    }
+    return replace(request, **ends)
 
 
 @dataclass(frozen=True)
@@ -208,7 +231,7 @@ class Grid:
     ) -> None:
         model = equations.model
         self._equations, self._engine, self._reduced = equations, engine, reduced
-        places = find(values, names_of(equations.arguments), "parameter, input or state")
+        places = find(texts_in("values", values), names_of(equations.arguments), "parameter, input or state")
         given = {
             name: _array(equations.arguments[k], x)
             for k, (name, x) in zip(places, values.items(), strict=True)
@@ -487,6 +510,8 @@ def _array(variable: Variable, x: Any) -> xr.DataArray:
         parts = magnitude_and_unit(x.data)
         unit = x.attrs.get("units") if parts is None else parts[1]
         values = (x.data if on_device(x.data) else x.values) if parts is None else parts[0]
+        if values.dtype.kind not in "fiub":
+            values, unit = in_declared_unit(variable, values), None
         if unit is not None and unit != variable.unit:
             try:
                 factor, offset = scale(str(unit), variable.unit, variable.kind)

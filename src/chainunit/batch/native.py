@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from ..core.files import scratch
 from ..core.native.compilers import Compiler, compile_code, compiler, flags_for_this_processor
 from ..core.printing.c_forms import c_file
 from ..core.printing.vector_code import VectorCode, header
-from ..core.temporary_folders import scratch
 from .equations import Equations
 from .reductions import Reductions, loop_text
 

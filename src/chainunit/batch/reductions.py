@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError
+from ..core.errors import InputError, shown
 
 MOST_BINS = 1024
 """Largest number of bins of a histogram."""
@@ -68,7 +69,8 @@ _COUNT = Reduction(
 
 @dataclass(frozen=True)
 class Beyond:
-    """The number of states in which a column is larger in size than a `limit`, in the unit of the column.
+    """The number of states in which a column is larger in size than a `limit`, in the unit of the column or a text
+    such as "30 N m".
 
     Raises
     ------
@@ -79,14 +81,15 @@ class Beyond:
     limit: float
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.limit) and self.limit >= 0.0):
+        # a limit with a unit becomes a number when the unit of its column is known
+        if isinstance(self.limit, numbers.Real) and not (math.isfinite(self.limit) and self.limit >= 0.0):
             raise InputError(f"Beyond: limit = {self.limit}: must be a finite number >= 0, a size")
 
 
 @dataclass(frozen=True)
 class Histogram:
     """The numbers of states by the value of a column: `bins` of equal width from `low` to `high`, in the unit of the
-    column. The first bin has all states below it, too, and the last one all above it.
+    column or texts such as "30 N m". The first bin has all states below it, too, and the last one all above it.
 
     Raises
     ------
@@ -99,10 +102,15 @@ class Histogram:
     bins: int
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+        are_numbers = isinstance(self.low, numbers.Real) and isinstance(self.high, numbers.Real)
+        if are_numbers and not (
+            math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high
+        ):
             raise InputError(f"Histogram: low = {self.low}, high = {self.high}: must be finite, low < high")
         if not (isinstance(self.bins, int) and 2 <= self.bins <= MOST_BINS):
-            raise InputError(f"Histogram: bins = {self.bins}: must be a whole number from 2 to {MOST_BINS}")
+            raise InputError(
+                f"Histogram: bins = {shown(self.bins)}: must be a whole number from 2 to {MOST_BINS}"
+            )
 
     @property
     def middles(self) -> Any:
@@ -149,9 +157,9 @@ def column_of(place: int, request: str | Beyond | Histogram, output: str) -> Red
         return ReducedColumn(place, "histogram", request.bins)
     if isinstance(request, Beyond):
         return ReducedColumn(place, "beyond")
-    if request not in REDUCTIONS:
+    if not isinstance(request, str) or request not in REDUCTIONS:
         raise InputError(
-            f"{output}: no reduction {request!r}; there are {', '.join(REDUCTIONS)}, Beyond(limit) and "
+            f"{output}: no reduction {shown(request)}; there are {', '.join(REDUCTIONS)}, Beyond(limit) and "
             "Histogram(low, high, bins)"
         )
     return ReducedColumn(place, request)

@@ -26,7 +26,7 @@ def kind_words(variable: Variable) -> str:
     if variable.type != "Real":
         return f"{variable.quantity.allowed_range} ({variable.description})"
     if variable.unit == "1":
-        share = ', or a text such as "8 %"' if fitting else ""
+        share = ', or a text such as "8 %"' if may_be_share(variable) else ""
         return f"a pure number{share} ({variable.description})"
     declared = variable.unit.replace(".", " ")
     return f'a number in {declared}, or a text such as "2 {fitting[0]}" ({variable.description})'
@@ -49,20 +49,25 @@ def number_of_text(variable: Variable, text: str) -> float:
             return units.convert(number, written, variable.unit, variable.kind) if written else number
     except ValueError:
         pass
-    counted = variable.type != "Real"
-    hint = "" if counted else units.spelling(text, variable.unit, variable.kind)
+    is_pure = variable.type != "Real" or (variable.unit == "1" and not may_be_share(variable))
+    hint = "" if is_pure else units.spelling(text, variable.unit, variable.kind)
     other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
     other = f"; {printable(other)}" if other else ""
     raise ValueError(f"{variable.name} = {shown(text)}: must be {kind_words(variable)}{other}{hint}")
 
 
 def magnitude_and_unit(value: Any) -> tuple[Any, str] | None:
-    """The number, or the array of numbers, of a quantity of a library such as pint, and its unit as a text that is
-    read here; None for another value. The library need not be installed."""
-    if isinstance(value, type) or not all(hasattr(value, name) for name in ("magnitude", "units", "to")):
+    """The number, or the array of numbers, of a quantity of a library such as pint, or of a DataArray with ``units``,
+    and its unit as a text that is read here, "1" without a dimension; None for another value. The library need not be
+    installed."""
+    if isinstance(value, type):
+        return None
+    if hasattr(value, "dims") and "units" in (attributes := getattr(value, "attrs", {})):
+        return value.values, str(attributes["units"])
+    if not all(hasattr(value, name) for name in ("magnitude", "units", "to")):
         return None
     for quantity in (value, value.to_base_units()):
-        unit = f"{quantity.units:~C}"
+        unit = f"{quantity.units:~C}" or "1"
         if _is_unit(unit):
             return quantity.magnitude, unit
     return value.magnitude, f"{value.units:~C}"
@@ -94,7 +99,7 @@ def as_text(value: Any) -> Any:
 def _texts(numbers: Any, unit: str) -> Any:
     if isinstance(numbers, list):
         return [_texts(number, unit) for number in numbers]
-    return f"{float(numbers)!r} {unit}" if unit else float(numbers)
+    return f"{float(numbers)!r} {unit}"
 
 
 def in_declared_unit(variable: Variable, value: Any) -> Any:
@@ -102,8 +107,8 @@ def in_declared_unit(variable: Variable, value: Any) -> Any:
 
     Parameters
     ----------
-    value : a number, an array or a list of numbers; a text with a unit, such as "150 mm"; or a quantity of a library
-        such as pint, whose number may be an array
+    value : a number, or a text with a unit, such as "150 mm"; an array or a list of them; or a quantity of a library
+        such as pint, or a DataArray with ``units``, whose number may be an array
 
     Raises
     ------
@@ -114,21 +119,30 @@ def in_declared_unit(variable: Variable, value: Any) -> Any:
         return value
     numbers, unit = magnitude_and_unit(value) or (value, "")
     if isinstance(numbers, str) or (unit and np.ndim(numbers) == 0):
-        try:
-            return number_of_text(variable, as_text(value))
-        except ValueError as error:
-            raise InputError(str(error), variable.name) from None
+        return _read(variable, as_text(value))
     try:
         # numpy takes None for a number that is not finite, and true for 1
         array = np.asarray(numbers)
+        if array.dtype.kind == "U":
+            unit, array = "", np.array([_read(variable, str(x)) for x in array.flat]).reshape(array.shape)
         if array.dtype.kind not in ("fiub" if variable.type == "Boolean" else "fiu"):
             raise TypeError
         factor, offset = units.scale(unit, variable.unit, variable.kind) if unit else (1.0, 0.0)
+    except InputError:
+        raise
     except (TypeError, ValueError):
-        line = f"{variable.name} = {shown(value)}: must be {kind_words(variable)}"
+        line = f"{variable.name} = {shown(as_text(value))}: must be {kind_words(variable)}"
         raise InputError(line, variable.name) from None
     array = array.astype(float) * factor + offset if unit else array.astype(float, copy=False)
     return float(array) if array.ndim == 0 else array
+
+
+def _read(variable: Variable, text: str) -> float:
+    """The number of a text; see `number_of_text`, whose error it raises as an InputError."""
+    try:
+        return number_of_text(variable, text)
+    except ValueError as error:
+        raise InputError(str(error), variable.name) from None
 
 
 def one_number(variable: Variable, value: Any) -> float:

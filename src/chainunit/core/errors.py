@@ -159,11 +159,26 @@ def check_kind(name: str, value: Any, kind: Any, words: str = "") -> None:
         raise InputError(f"{name} = {shown(value)}: must be {words or kind.__qualname__}", name)
 
 
+def texts_in(name: str, value: Any) -> tuple[str, ...]:
+    """The texts of an argument of a script that is a sequence of them; one text alone is a sequence of one.
+
+    Raises
+    ------
+    InputError
+        in one line.
+    """
+    listed = (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    for text in listed:
+        check_kind(name, text, str, "a text, or a list of texts")
+    return listed
+
+
 def near_name(given: str, known: Iterable[str]) -> str:
-    """Words to add to the refusal of a name that is similar to one of the `known` names, or of several words one of
-    which is such a name; else empty."""
+    """Words to add to the refusal of a name that is similar to one of the `known` names or begins it, or of several
+    words one of which is such a name; else empty."""
     names = {name.lower(): name for name in known}
     near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=0.75)
+    near = near or [name for name in names if name.startswith(f"{given.lower()}_")]
     near = near or [word for word in given.lower().split() if word in names and " " in given]
     return f'; was "{names[near[0]]}" meant?' if near else ""
 
@@ -209,7 +224,7 @@ def shown(given: Any, depth: int = 0) -> str:
         return quoted if rest <= 0 else f"{quoted}... ({rest} more characters)"
     if isinstance(given, bool):
         return "true" if given else "false"
-    if given and depth > _DEPTH and isinstance(given, Mapping | list | tuple):
+    if isinstance(given, Mapping | list | tuple) and given and depth > _DEPTH:
         # before anything inside is written out: it may be nested without end
         return "{ ... }" if isinstance(given, Mapping) else "[...]"
     if isinstance(given, Mapping):
@@ -217,6 +232,8 @@ def shown(given: Any, depth: int = 0) -> str:
         return _bracketed("{ ", entries, len(given), " }")
     if isinstance(given, list | tuple):
         return _bracketed("[", [shown(x, depth + 1) for x in _first(given)], len(given), "]")
+    if hasattr(given, "tolist"):  # of numpy
+        return shown(given.tolist(), depth)
     if isinstance(given, date | time):
         return given.isoformat()
     return printable(_brief(given), 100)

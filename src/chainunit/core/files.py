@@ -1,53 +1,40 @@
-"""Files that appear whole or not at all, and folders that one process at a time writes to."""
+"""Files that appear whole or not at all, temporary folders, and folders that one process at a time writes to."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import os
+import hashlib
 import re
 import secrets
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import tempfile
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 from .errors import Faults, InputError, WriteError, check_kind, shown
-from .inputs import JSON, file_bytes, json_of
-from .ledger import Ledger
+from .inputs import regular_bytes
 
 LOCK = ".chainunit-lock"
 """Name of the file that stands in a folder while a process writes there."""
-
-
-class ResultKind(NamedTuple):
-    """A kind of result: its words, the file that has its numbers, and a key that only this kind has there; without a
-    key the name of the file tells the kind."""
-
-    words: str
-    file: str = "result.json"
-    key: str = ""
-
-    def is_in(self, folder: Path) -> bool:
-        """Whether a folder has a result of this kind."""
-        if not (folder / self.file).is_file():
-            return False
-        if not self.key:
-            return True
-        try:
-            result = json_of(file_bytes(folder / self.file, JSON), self.file)
-        except InputError:
-            return False
-        return isinstance(result, dict) and self.key in result
-
-
-PAGE = "report.html"
+LIST = ".chainunit-files"
+"""Name of the list of the files that the program wrote into a folder."""
 written: list[Path] = []
 """The results that this process wrote by `atomic_file`, in order."""
-_ledgers: list[Ledger] = []
-"""The lists of files of the folders that this process has claimed for a command."""
+_lists: list[FileList] = []
+"""The lists of files of the folders that this process has claimed."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+_LINE = re.compile(r"[0-9a-f]{64}  \S.*")
+_NAME = 66  # place of the name in a line
+_PART = re.compile(r".+\.[0-9a-f]{16}\.part")
+_FOREIGN = "as chainunit did not write it, or it was changed since; move it, or name another folder"
+
+
+@contextmanager
+def scratch() -> Iterator[Path]:
+    """A temporary folder for as long as the context lasts."""
+    with tempfile.TemporaryDirectory(prefix="chainunit_", ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
 
 
 @contextmanager
@@ -66,15 +53,15 @@ def atomic_file(file: Path, *, is_result: bool = True) -> Iterator[Path]:
     """
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: is not a regular file; name another")
-    ledger = _ledger_of(file) if is_result else None
-    if ledger is not None and file.exists() and not ledger.wrote(file):
+    listed = _list_of(file) if is_result else None
+    if listed is not None and file.exists() and not listed.has(file):
         raise WriteError(f"{file}: stays as it is, {_FOREIGN}")
     part = file.with_name(f"{file.name}.{secrets.token_hex(8)}.part")
     try:
         with writing(file):
             yield part
-            if ledger is not None:
-                ledger.add(file, part)
+            if listed is not None:
+                listed.add(file, part)
             part.replace(file)
             if is_result:
                 written.append(file)
@@ -97,19 +84,11 @@ def named_file(file: str | Path, *endings: str) -> Path:
 
 
 def write_file(file: Path, content: str | bytes) -> list[Path]:
-    """Write a text, in UTF-8, or bytes into a file, whole or not at all; returns the file, as a writer of `write_all`
-    does. Errors are those of `atomic_file`."""
+    """Write a text, in UTF-8, or bytes into a file, whole or not at all; returns the file. Errors are those of
+    `atomic_file`."""
     with atomic_file(file) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
     return [file]
-
-
-_FOREIGN = "as chainunit did not write it, or it was changed since; move it, or name another folder"
-
-
-def _ledger_of(file: Path) -> Ledger | None:
-    """The list of the claimed folder in which a file lies."""
-    return next((ledger for ledger in reversed(_ledgers) if ledger.has(file)), None)
 
 
 @contextmanager
@@ -129,25 +108,11 @@ def writing(file: Path) -> Iterator[None]:
 
 @contextmanager
 def netcdf() -> Iterator[None]:
-    """Raise an OSError in place of the error of the NetCDF library, which does not say that the disk is
-    full."""
+    """Raise an OSError in place of the error of the NetCDF library, which does not say that the disk is full."""
     try:
         yield
     except RuntimeError as error:
         raise OSError(errno.EIO, f"{error}; is the disk full?") from error
-
-
-def write_all(writers: Iterable[Callable[[], list[Path]]]) -> tuple[list[Path], WriteError | None]:
-    """Call every writer, also after one that failed. Returns the files that were written, and the first
-    `WriteError`, or None."""
-    paths: list[Path] = []
-    failure = None
-    for write in writers:
-        try:
-            paths += write()
-        except WriteError as error:
-            failure = failure or error
-    return paths, failure
 
 
 def full(error: OSError) -> bool:
@@ -155,28 +120,10 @@ def full(error: OSError) -> bool:
     return error.errno in _FULL
 
 
-def leftovers(file: Path) -> list[Path]:
-    """Temporary files beside `file`, from processes that were killed while they wrote it."""
-    name = re.compile(re.escape(file.name) + r"\.[0-9a-f]{16}\.part")
-    return [path for path in file.parent.iterdir() if name.fullmatch(path.name)]
-
-
-def clear(folder: Path, *names: str) -> None:
-    """Remove the files of an earlier run; files that no run wrote stay.
-
-    Raises
-    ------
-    InputError
-        where one of the names is no file.
-    """
-    for stale in (folder / name for name in names):
-        if stale.exists() and not stale.is_file():
-            raise InputError(f"{stale}: is not a regular file; name another folder")
-        ledger = _ledger_of(stale)
-        if ledger is None or (stale.exists() and ledger.wrote(stale)):
-            stale.unlink(missing_ok=True)
-        for part in leftovers(stale):
-            part.unlink(missing_ok=True)
+def digest(file: Path) -> str:
+    """The SHA-256 of a file, in hexadecimal digits."""
+    with file.open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 def folder(path: Path) -> Path:
@@ -191,112 +138,128 @@ def folder(path: Path) -> Path:
         raise InputError(f"{path}: is a file; must be a folder")
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = path / f".{secrets.token_hex(8)}.part"
-        probe.touch(exist_ok=False)
-        probe.unlink()
+        with tempfile.TemporaryFile(dir=path):
+            return path
     except OSError as error:
         kind = WriteError if full(error) else InputError
         raise kind(f"{path}: cannot be written to ({error.strerror or error})") from error
-    return path
 
 
-@contextmanager
-def claim(
-    path: Path, *names: str, kind: ResultKind | None = None, others: Iterable[ResultKind] = ()
-) -> Iterator[Path]:
-    """The `folder` at `path`, for this process alone as long as the context lasts; for a result of that `kind` it
-    must not have one of the `others`, nor files that no earlier run wrote and that would be written: the numbers, the
-    same as text, and the page, and of the further `names`.
+class FileList:
+    """The files that the program wrote into a `folder`, by which it tells them from the files of others.
 
-    A lock of the operating system on a file guards the folder. The file is removed at the end. The lock ends
-    with the process, even if the process is killed. A file system without locks gives no protection. A folder
-    that was made here is removed if an error leaves it empty.
+    A line has the SHA-256 of a file and its name in the folder, as ``sha256sum`` writes and checks it. While a file
+    is replaced, it has two lines: a process that is killed leaves the old or the new one, and both are its own.
 
     Raises
     ------
     InputError
-        where another process writes there, for a result of another kind, and with a line for each file that would be
-        lost; see also `folder`.
+        where the file of the list has other content.
     """
-    if other := next((other for other in others if other.is_in(path)), None):
-        raise InputError(f"{path}: has the result of {other.words}, which would be lost; name another folder")
-    ours, left_empty = not path.exists(), False
-    lock = folder(path) / LOCK
-    while True:
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            if not take_lock(handle):
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.absolute()
+        self._file, self._lines = self.folder / LIST, set[str]()
+        if self._file.exists() or self._file.is_symlink():
+            # a pipe would be waited for, and a link may lead anywhere
+            content = None if self._file.is_symlink() else regular_bytes(self._file)
+            self._lines.update((content or b"").decode(errors="replace").split("\n"))
+            self._lines.discard("")
+            if content is None or not all(map(_LINE.fullmatch, self._lines)):
                 raise InputError(
-                    f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder "
-                    "with -o"
+                    f"{self._file}: is no list of files of chainunit; move it, or name another folder"
                 )
-            # the owner of the lock may have removed its file after it was opened here, before it was locked
-            with contextlib.suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(handle), lock.stat()):
-                    break
-        except BaseException:
-            os.close(handle)
-            raise
-        os.close(handle)
-    try:
-        with _listed(path, kind.file, names) if kind else contextlib.nullcontext():
-            yield path
-    except BaseException:
-        left_empty = ours
-        raise
-    finally:
-        if sys.platform == "win32":  # an open file cannot be removed there
-            os.close(handle)
-        # a file with content is no lock file of this package
-        with contextlib.suppress(OSError):
-            if not lock.stat().st_size:
-                lock.unlink()
-        if sys.platform != "win32":
-            os.close(handle)
-        if left_empty:
-            _remove_empty(path)
+
+    def _line(self, file: Path, content: Path) -> str:
+        return f"{digest(content)}  {file.absolute().relative_to(self.folder).as_posix()}"
+
+    def has(self, file: Path) -> bool:
+        """Whether the program wrote this file as it is now."""
+        return self._line(file, file) in self._lines
+
+    def add(self, file: Path, content: Path) -> None:
+        """Note that `file` is about to get this content; as it is now, it stays in the list until `close`."""
+        self._lines.add(self._line(file, content))
+        self._write()
+
+    def close(self) -> None:
+        """Leave each file as it is now in the list, and none that is gone."""
+        files = {self.folder / line[_NAME:] for line in self._lines}
+        self._lines &= {self._line(file, file) for file in files if file.is_file()}
+        self._write()
+
+    def _write(self) -> None:
+        if not self._lines:
+            self._file.unlink(missing_ok=True)
+            return
+        with atomic_file(self._file, is_result=False) as part:
+            lines = sorted(self._lines, key=lambda line: line[_NAME:])
+            part.write_text("".join(f"{line}\n" for line in lines), "utf-8", newline="\n")
+
+
+def _list_of(file: Path) -> FileList | None:
+    """The list of the claimed folder in which a file lies."""
+    return next((each for each in reversed(_lists) if file.absolute().is_relative_to(each.folder)), None)
+
+
+def clear(folder: Path, *names: str) -> None:
+    """Remove the files of an earlier run; files that no run wrote stay."""
+    for stale in (folder / name for name in names if (folder / name).is_file()):
+        listed = _list_of(stale)
+        if listed is None or listed.has(stale):
+            stale.unlink()
 
 
 @contextmanager
-def _listed(path: Path, numbers: str, names: Sequence[str]) -> Iterator[None]:
-    """Keep the list of the files of a claimed folder; `numbers` is the name of the file of the numbers."""
-    ledger = Ledger(path)
-    _ledgers.append(ledger)
+def claim(path: Path, *names: str) -> Iterator[Path]:
+    """The `folder` at `path`, for this process alone as long as the context lasts; `names` are the files that are
+    going to be written. What a killed process left of a file goes, and the folder, too, if it was made here and an
+    error leaves it empty. A file system without locks gives no protection.
+
+    Raises
+    ------
+    InputError
+        where another process writes there, and with a line for each file that no earlier run wrote and that would be
+        lost; see also `folder`.
+    """
+    from filelock import FileLock, Timeout
+
+    is_new, is_left = not path.exists(), False
+    lock = FileLock(folder(path) / LOCK)
     try:
+        try:
+            lock.acquire(blocking=False)
+        except Timeout as error:
+            raise InputError(
+                f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder with -o"
+            ) from error
+        except PermissionError:
+            raise
+        except (OSError, NotImplementedError):  # a file system without locks
+            pass
+        for part in filter(lambda file: _PART.fullmatch(file.name), path.iterdir()):
+            part.unlink()
+        listed = FileList(path)
         faults = Faults()
-        for file in dict.fromkeys(
-            path / name for name in (PAGE, numbers, numbers.replace(".json", ".md"), *names)
-        ):
-            if file.is_file() and not ledger.wrote(file):
+        for file in (path / name for name in dict.fromkeys(names)):
+            if file.exists() and not (file.is_file() and listed.has(file)):
                 faults.add([InputError(f"{file}: would be lost, {_FOREIGN}")])
         faults.refuse()
-        yield
+        _lists.append(listed)
+        try:
+            yield path
+        finally:
+            _lists.remove(listed)
+            with contextlib.suppress(OSError, WriteError):
+                listed.close()
+    except BaseException:
+        is_left = is_new
+        raise
     finally:
-        _ledgers.remove(ledger)
-        with contextlib.suppress(OSError):
-            ledger.close()
-
-
-def _remove_empty(path: Path) -> None:
-    """Remove the folder and the folders in it; folders that hold a file stay."""
-    for inner in (inner for inner in path.iterdir() if inner.is_dir() and not inner.is_symlink()):
-        _remove_empty(inner)
-    with contextlib.suppress(OSError):
-        path.rmdir()
-
-
-def take_lock(handle: int, *, without_locks: bool = True) -> bool:
-    """Take the lock of an open file; False where another process has it. `without_locks` is the answer of a file
-    system that has no locks."""
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return without_locks and error.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
-    return True
+        if lock.is_locked:
+            with contextlib.suppress(OSError):  # on Windows an open file stays until it is closed
+                (path / LOCK).unlink()
+            lock.release()
+        for place in [*sorted(path.rglob("*"), reverse=True), path] if is_left else ():
+            with contextlib.suppress(OSError):  # a file, or a folder that holds one
+                place.rmdir()

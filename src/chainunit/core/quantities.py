@@ -117,7 +117,9 @@ def base_units(unit: str) -> dict[str, int]:
 
 
 def quotient(unit: str, by: str) -> str:
-    """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``."""
+    """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``; that of an energy by the time is ``W``."""
+    if (unit, by) == ("J", "s"):
+        return "W"
     powers: dict[str, int] = {}
     for sign, text in ((1, unit), (-1, by)):
         for side, part in zip((sign, -sign), text.split("/"), strict=False):

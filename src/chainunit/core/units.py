@@ -234,6 +234,8 @@ def of_other_kind(unit_text: str, unit: str) -> str:
         return ""
     if own == dimension("" if unit == "1" else unit):
         return ""
+    if unit_text.strip() == "1":
+        return "the quantity has no dimension"
     is_share = not own and not any(name in _ANGLES for name, _ in _factors(_ascii(unit_text)))
     alike = {**_KINDS, "N.m": "a torque or an energy"}
     kind = next((words for each, words in alike.items() if dimension(each) == own), "of another quantity")

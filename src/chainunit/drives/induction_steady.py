@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from ..core.engines import MATH
 from ..core.planar import Vec2
 from ..core.quantities import Value, declaration, quantity
-from ..core.search import lowest
 from .motor import T_RATED
 
 _TURN = 2.0 * math.pi
@@ -133,6 +132,8 @@ def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: flo
     It is the first maximum below synchronous speed: with a strong skin effect the torque rises again towards
     standstill. The slip has a relative accuracy of 1e-5, the torque therefore one of about 1e-10.
     """
+    from scipy.optimize import minimize_scalar
+
     synchronous = _TURN * (p.supply.f if f is None else f) / p.pole_pairs
 
     def at(slip: float) -> Steady:
@@ -142,5 +143,6 @@ def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: flo
     while k + 1 < len(SLIPS) and (next_tau := at(SLIPS[k + 1]).tau) >= tau:
         k, tau = k + 1, next_tau
     low, high = SLIPS[max(k - 1, 0)], SLIPS[min(k + 1, len(SLIPS) - 1)]
-    slip, _ = lowest(lambda slip: -float(at(slip).tau), low, high)
-    return max(at(slip), at(high), key=lambda s: s.tau)
+    accuracy = {"xatol": 1e-6 * (high - low)}
+    most = minimize_scalar(lambda slip: -at(slip).tau, bounds=(low, high), method="bounded", options=accuracy)
+    return max(at(float(most.x)), at(high), key=lambda s: s.tau)

@@ -93,9 +93,9 @@ def _by_python(
     why: str,
 ) -> Origin:
     if fmi != 2:
-        raise InputError(f"--fmi 3 needs the native backend, that is a C compiler ({COMPILERS})")
+        raise InputError(f"fmi 3 needs the native backend, that is a C compiler ({COMPILERS})")
     if platforms:
-        raise InputError("--platforms needs the native backend; a Python FMU runs on Linux and Windows alike")
+        raise InputError("platforms: need the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start, names=names)
     words = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
     return Origin("python", words)

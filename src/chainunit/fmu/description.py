@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement
 from ..core.engines import casadi_
 from ..core.errors import InputError
 from ..core.model import About, Model
-from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
+from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, quotient, written
 from ..core.symbolic_trace import Trace, trace
 from .recipe import Experiment
 from .script import Script, name_in_fmu, text_in_fmu
@@ -320,7 +320,7 @@ def _variables(
             "variability": "continuous",
             "initial": "calculated",
         }
-        yield attributes, "Real", _unit(_per_second(state.unit)), first + i
+        yield attributes, "Real", _unit(quotient(state.unit, "s")), first + i
 
 
 def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, int, list[int]]]:
@@ -400,17 +400,6 @@ def generation_time() -> str:
         ) from error
 
 
-def _per_second(unit: str) -> str:
-    """The unit of a time derivative, in base units; that of an energy is W."""
-    if unit in ("1", "J"):
-        return {"1": "1/s", "J": "W"}[unit]
-    powers = base_units(unit)
-    powers["s"] = powers.get("s", 0) - 1
-    top = ".".join(f"{b}{'' if n == 1 else n}" for b, n in powers.items() if n > 0)
-    below = [f"{b}{'' if n == -1 else -n}" for b, n in powers.items() if n < 0]
-    return (top or "1") + (f"/({'.'.join(below)})" if len(below) > 1 else "".join(f"/{b}" for b in below))
-
-
 def _definitions(
     root: Element,
     interface: Interface,
@@ -421,7 +410,7 @@ def _definitions(
     """Write the definitions of all units with the `further_units`, the declared types, the categories of messages,
     and the default experiment."""
     units = further_units | {s.variable.unit for s in interface.signals if s.variable.type == "Real"}
-    units |= {_per_second(v.unit) for v in interface.states if derivatives}
+    units |= {quotient(v.unit, "s") for v in interface.states if derivatives}
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(units):
         node = SubElement(definitions, "Unit", name=unit)

@@ -47,12 +47,10 @@ class Crank(Driver):
 
     @property
     def pins(self) -> dict[str, str]:
-        """The pin at its end."""
         return {} if self.bar.length is None else {self.end: self.bar.name}
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its bearing."""
         return (HingeData(self.bar.pin, self.bar.name),)
 
     @property
@@ -88,7 +86,6 @@ class Ram(Driver):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its rail."""
         return (GuideData(self.guide, self.bar.name, self.rail),)
 
     @property
@@ -131,7 +128,6 @@ class Cylinder(Driver):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its joints."""
         barrel, rod, lever = self.bar, self.rod.name, self.lever
         return (
             HingeData(barrel.pin, barrel.name),

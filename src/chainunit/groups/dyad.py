@@ -34,7 +34,6 @@ class Dyad(Group):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its joints."""
         first, second = self.first, self.second
         return (
             HingeData(first.pin, first.name),
@@ -88,7 +87,6 @@ class RRP(Group):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its joints."""
         first, slider = self.first, self.slider.name
         return (
             HingeData(first.pin, first.name),
@@ -97,7 +95,6 @@ class RRP(Group):
         )
 
     def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         start, rail, a = at.pins[self.first.pin], self.rail.at_position(at.links), self.first.length
         d, w = rail.u, rail.pin.p - start.p
         across = w.cross(d)
@@ -132,7 +129,6 @@ class RPR(Group):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its joints."""
         first, second = self.first, self.second
         return (
             HingeData(first.pin, first.name),
@@ -141,7 +137,6 @@ class RPR(Group):
         )
 
     def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         start, end, h = at.pins[self.first.pin], at.pins[self.second.pin], self.offset
         v = start.p - end.p  # way d + offset n
         square = v.squared()
@@ -169,7 +164,6 @@ class PRP(Group):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its joints."""
         first, second = self.first.name, self.second.name
         return (
             GuideData(self.guides_at[0], first, self.first_rail),
@@ -178,7 +172,6 @@ class PRP(Group):
         )
 
     def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         a, b = self.first_rail.at_position(at.links), self.second_rail.at_position(at.links)
         per, gap = 1.0 / a.u.cross(b.u), b.pin.p - a.pin.p
         # a.u x - b.u y = gap
@@ -208,7 +201,6 @@ class RPP(Group):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its joints."""
         block, yoke = self.block, self.yoke.name
         return (
             HingeData(block.pin, block.name),
@@ -217,7 +209,6 @@ class RPP(Group):
         )
 
     def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the coordinate `q` of the driver [rad, m]."""
         start, rail, slot = at.pins[self.block.pin], self.rail.at_position(at.links), self.slot
         d = rail.u
         e = d * slot.x + d.turned() * slot.y

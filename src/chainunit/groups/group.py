@@ -116,5 +116,5 @@ class Group:
         return []
 
     def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the coordinate `q` [rad]; `at` is the linkage before the group at this coordinate."""
+        """The group at the coordinate `q` of the driver [rad, m]; `at` is the linkage before the group there."""
         raise NotImplementedError

@@ -108,13 +108,11 @@ class GuideData(NamedTuple):
         return True
 
     def carrier(self, carries: Mapping[str, str]) -> str | None:
-        """See `HingeData`."""
         return self.by.of if isinstance(self.by, Rail) else self.by
 
     def third_before(
         self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
     ) -> Third | None:
-        """See `HingeData`."""
         if not isinstance(self.by, Rail):
             return None
         if self.by.of is None:
@@ -124,7 +122,6 @@ class GuideData(NamedTuple):
         return link.third_derivative(start, *third), third[1]
 
     def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
-        """See `HingeData`."""
         assert isinstance(reaction, GuideForce)
         arm = m.links[self.link].pin.p - m.links[carrier].pin.p
         return -reaction, -(reaction.moment + arm.cross(reaction))
@@ -241,7 +238,6 @@ class Hinge(Placed):
         return [x, y]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Placed`."""
         e, base = ZERO, self._base
         if base is not None:
             e = before[0] if before is not None else base.p2 if rates else base.p1
@@ -252,7 +248,6 @@ class Hinge(Placed):
         return [e.x, e.y]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """See `Placed`."""
         return Vec2(next(multipliers), next(multipliers)), None
 
 
@@ -278,11 +273,9 @@ class CrankDrive(Placed):
         return [{UNKNOWNS * self._link + 2: self._sense}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Placed`."""
         return [0.0 if rates else 1.0]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        """See `Placed`."""
         return None, next(multipliers)
 
 
@@ -301,7 +294,6 @@ class Guide(Hinge):
 
     @property
     def seat(self) -> Seat | None:
-        """None: it adds no pin."""
         return None
 
     def rows(self) -> list[Row]:
@@ -312,7 +304,6 @@ class Guide(Hinge):
         return [x, y, {k + 2: 1, UNKNOWNS * other + 2: -1} if isinstance(other, int) else {k + 2: 1}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Placed`."""
         other, angle, order, d = self._other, 0.0, len(rates), self._d
         if isinstance(other, int):
             turns = [z[UNKNOWNS * other + 2] for z in rates]

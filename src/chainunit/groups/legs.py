@@ -66,12 +66,10 @@ class RodLeg(Leg):
     arm: Vec2
 
     def joints(self, ternary: str) -> tuple[JointData, JointData]:
-        """See `Leg`."""
         name = self.bar.name
         return HingeData(self.bar.pin, name), HingeData(self.pin, name, ternary)
 
     def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
-        """See `Leg`."""
         return partial(_rod, number, at.pins[self.bar.pin], self.bar.length, self.arm)
 
 
@@ -88,11 +86,9 @@ class BlockLeg(Leg):
     guide: str
 
     def joints(self, ternary: str) -> tuple[JointData, JointData]:
-        """See `Leg`."""
         return GuideData(self.guide, self.bar.name, self.on), HingeData(self.pin, self.bar.name, ternary)
 
     def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
-        """See `Leg`."""
         return partial(_block, number, self.on.at_position(at.links), self.arm)
 
 
@@ -109,11 +105,9 @@ class SlotLeg(Leg):
     guide: str
 
     def joints(self, ternary: str) -> tuple[JointData, JointData]:
-        """See `Leg`."""
         return HingeData(self.bar.pin, self.bar.name), GuideData(self.guide, self.bar.name, ternary)
 
     def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
-        """See `Leg`."""
         return partial(_slot, number, at.pins[self.bar.pin], self.at, self.along)
 
 

@@ -103,7 +103,6 @@ class Triad(Group):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        """Its joints, the outer ones of the legs first."""
         outer, inner = zip(*(leg.joints(self.name) for leg in self.legs), strict=True)
         return *outer, *inner
 

@@ -10,9 +10,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..core.declared_numbers import in_declared_unit, number_in
+from ..core.declared_numbers import in_declared_unit, number_in, one_number
 from ..core.engines import MATH, numpy_
-from ..core.errors import GeometryError, check_kind
+from ..core.errors import GeometryError, InputError, check_kind, one_of, shown
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, Quantity, Variable
 from ..mechanism.models import InverseMachine
@@ -33,7 +33,8 @@ from .chain_unit import (
 from .crank_rocker import rocker_extremes
 from .flexible import ChainedModel, flexible
 from .hanging import Hanging, Modes, modes, rods, split
-from .machine import Machine, admit
+from .machine import Machine, admit, check_shapes
+from .paper_ratios import RATIOS, of_ratios
 from .parts import Stop
 
 _XP = numpy_()
@@ -97,17 +98,22 @@ class ChainUnitMachine(Machine):
 
         The ratios are rho = r/l, lam = h/l, mu = e/l1 and zeta = z/z_max with z_max = 2 l1 sqrt(1 - mu); l2 = l1 - e.
         The frame has c = sqrt(l^2 - r^2) and hy = h, so that crank and rocker are parallel at phi = 0.
+
+        Raises
+        ------
+        InputError, GeometryError
+            for a ratio out of its range, and for ratios that make no machine, with the ranges in which one of them
+            would.
         """
-        numbers = {"rho": rho, "lam": lam, "mu": mu, "zeta": zeta}
-        rho, lam, mu, zeta = (number_in("1", name, x, "ratio of lengths") for name, x in numbers.items())
-        l, l1 = number_in("m", "l", l, "coupler"), number_in("m", "l1", l1, "wall")
-        lengths = ratios(rho, lam, mu, zeta, l, l1)
-        return cls({**lengths, **(parameters or {}), **values})
+        ratios = {"rho": rho, "lam": lam, "mu": mu, "zeta": zeta, "l": l, "l1": l1}
+        numbers = {name: admit(RATIOS[name], one_number(RATIOS[name], x)) for name, x in ratios.items()}
+        return of_ratios(lambda lengths: cls({**lengths, **(parameters or {}), **values}), numbers)
 
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
-        _check_loads(left, right)
+        for name, loads in (("left", left), ("right", right)):
+            check_kind(name, loads, SideLoads)
         values = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
         inputs: Inputs = self.inputs(ChamberForces.input_layout.by_name(values))
         return inputs
@@ -162,6 +168,7 @@ class ChainUnitMachine(Machine):
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of one kilogram of material on the `side` ("left" or "right") [J/kg]: dE/dm,
         the factor of the feed in an energy balance (the energy is linear in the mass)."""
+        _check_side(side)
         kilogram = SideLoads(material_mass=1.0, processing_force=0.0)
 
         def energy(**loads: Any) -> Any:
@@ -194,12 +201,18 @@ class ChainUnitMachine(Machine):
         InputError
             see the class.
         """
-        loads = self._inputs(0.0, 0.0, 0.0, left, right)
-        psi, w, a = (admit(_ROCKER[n], x) for n, x in (("psi", psi), ("w", w), ("a", a)))
+        loads, psi, w, a = self._at_rocker(psi, w, a, left, right)
         if np.ndim(psi) == 0:
             self._check_assembly(float(psi))
         with np.errstate(invalid="ignore"):
             return chain_unit.chamber(_XP, self.p, loads, psi, w, a)
+
+    def _at_rocker(self, psi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads) -> tuple[Any, ...]:
+        """The loads and the motion of the rocker, checked."""
+        loads = self._inputs(0.0, 0.0, 0.0, left, right)
+        motion = {name: admit(_ROCKER[name], x) for name, x in (("psi", psi), ("w", w), ("a", a))}
+        check_shapes(ChamberForces.input_layout.by_name(loads) | motion)
+        return loads, motion["psi"], motion["w"], motion["a"]
 
     def _check_assembly(self, psi: float) -> None:
         p = self.p
@@ -215,6 +228,7 @@ class ChainUnitMachine(Machine):
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
+        _check_side(side)
         p, own = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
         on_web = p.web_share * loads.material_mass
@@ -233,7 +247,7 @@ class ChainUnitMachine(Machine):
             where the organ does not hang.
         """
         lengths, masses = self.organ_rods(side, loads, number)
-        return rods(lengths, masses * self.p.g, self._reach(side, psi))
+        return rods(lengths, masses * self.p.g, self._reach(side, one_number(_ROCKER["psi"], psi)))
 
     def _reach(self, side: str, psi: float) -> Any:
         """The vector from A1 to A2 of a left organ, or of the mirrored right one [m]."""
@@ -270,7 +284,7 @@ class ChainUnitMachine(Machine):
     ) -> Pulls:
         """Axial pull in the rods just inside their pins [N] at a rocker angle `psi` [rad], with speed `w` and
         acceleration `a` of the rocker; see `chain_unit.organ_pulls`."""
-        return chain_unit.organ_pulls(_XP, self.p, self._inputs(0.0, 0.0, 0.0, left, right), psi, w, a)
+        return chain_unit.organ_pulls(_XP, self.p, *self._at_rocker(psi, w, a, left, right))
 
     def mean_pulls(
         self, crank_speed: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
@@ -300,9 +314,9 @@ class ChainUnitMachine(Machine):
 
     def loaded_sides(self, feed: Feed) -> tuple[str, ...]:
         """The sides whose organ has any mass or load: an organ without both is absent, and cannot go slack."""
-        present = []
+        present, numbers = [], self._inputs(0.0, 0.0, 0.0, feed.left, feed.right)
         for side in SIDES:
-            masses, loads = getattr(self.p, side), getattr(feed, side)
+            masses, loads = getattr(self.p, side), getattr(numbers, side)
             if np.any(
                 masses.wall_mass + masses.web_mass + loads.material_mass + loads.processing_force > 0.0
             ):
@@ -315,7 +329,6 @@ class ChainUnitMachine(Machine):
         """Lowest crank speed [rad/s] at which a web goes slack somewhere in the turn, as its mean pull falls below
         zero: 0 if a web is slack at rest, infinity if no web is up to `highest`. Above this speed two rigid bars are
         no model of a chain. An end of a web may be pushed at a lower speed: there a chain sags."""
-        _check_loads(left, right)
         webs = len(self.loaded_sides(Feed(left=left, right=right)))
 
         def pull(crank_speed: Any) -> Any:
@@ -332,17 +345,16 @@ class ChainUnitMachine(Machine):
         return _first_loss(lambda w: self.least_web_pull(w * self.p.ratio, left, right), highest)
 
 
-def _check_loads(left: Any, right: Any) -> None:
-    """Refuse loads of the sides that are of another type."""
-    for name, loads in (("left", left), ("right", right)):
-        check_kind(name, loads, SideLoads)
+def _check_side(side: Any) -> None:
+    if side not in SIDES:
+        raise InputError(f"side = {shown(side)}: must be {one_of(side, SIDES)}")
 
 
-def _first_loss(pull: Callable[[Any], Any], highest: float) -> float:
+def _first_loss(pull: Callable[[Any], Any], highest: Any) -> float:
     """The lowest crank speed [rad/s] at which a least pull [N] falls to zero, see `ChainUnitMachine.slack_speed`."""
     from scipy.optimize import brentq
 
-    low, high = 0.0, 1.0
+    low, high, highest = 0.0, 1.0, number_in("rad/s", "highest", highest, "highest speed of the crank")
     if pull(low) <= 0.0:
         return 0.0
     while low < highest:
@@ -354,26 +366,6 @@ def _first_loss(pull: Callable[[Any], Any], highest: float) -> float:
             return float(brentq(pull, speeds[i - 1], speeds[i], xtol=1e-9))
         low, high = high, 2.0 * high
     return math.inf
-
-
-def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) -> dict[str, float]:
-    """Lengths [m] from the papers' ratios, by parameter name; see `ChainUnitMachine.from_ratios`."""
-    r, h, e = rho * l, lam * l, mu * l1
-    if not abs(rho) < 1.0 or not mu < 1.0:
-        raise GeometryError(
-            f"rho = {rho:g}, mu = {mu:g}: the papers' frame needs rho = r/l < 1 and mu = e/l1 < 1"
-        )
-    return {
-        "r": r,
-        "l": l,
-        "h": h,
-        "c": math.sqrt(l * l - r * r),
-        "hy": h,
-        "e": e,
-        "l1": l1,
-        "l2": l1 - e,
-        "z": zeta * 2.0 * l1 * math.sqrt(1.0 - mu),
-    }
 
 
 class ChainedUnit(Machine):

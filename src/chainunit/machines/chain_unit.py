@@ -512,6 +512,7 @@ class ChamberForces(InverseMachine):
     joints = JOINTS
     pins = PINS
     angles: ClassVar[Mapping[str, str]] = {"ψ": "rocker"}
+    within: ClassVar[Mapping[str, str]] = {"e": "h", "coupler.s": "l", "rocker.s": "h"}
     probes = staticmethod(_probes)
 
     required = (

@@ -119,7 +119,9 @@ class Machine:
         check_kind("inputs", values, Mapping, _NAMED)
         layout = self.model.input_layout
         numbers = layout.values(layout.from_names(dict(values)))
-        return layout.instance([admit(v, x) for v, x in zip(layout.variables, numbers, strict=True)])
+        admitted = [admit(v, x) for v, x in zip(layout.variables, numbers, strict=True)]
+        check_shapes(dict(zip(layout.names, admitted, strict=True)))
+        return layout.instance(admitted)
 
     def state(self, u: Any) -> MachineState:
         """The linkage with the `inputs`.
@@ -238,6 +240,15 @@ class Machine:
 
 
 _NAMED = "a mapping of names to values"
+
+
+def check_shapes(values: Mapping[str, Any]) -> None:
+    """Refuse arrays whose shapes do not broadcast, in one line with the name and the shape of each."""
+    try:
+        np.broadcast_shapes(*map(np.shape, values.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {np.shape(x)}" for name, x in values.items() if np.ndim(x))
+        raise InputError(f"shapes do not fit: {shapes}; give arrays of one shape, or numbers") from None
 
 
 def admit(variable: Variable, value: Any) -> Any:

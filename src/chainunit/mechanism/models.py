@@ -105,6 +105,8 @@ class MachineModel(Model):
     """How the angle of that link counts, in texts for people."""
     usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
     """Usual range of the crank speed [rad/s]; beyond it, a wrong unit is likely."""
+    within: ClassVar[Mapping[str, str]] = {}
+    """By the name of a length, the name of the length that it usually does not exceed."""
     sides: ClassVar[tuple[str, ...]] = ()
     """The names of its sides, each with a working organ that may be a chain. The groups of its loads and outputs on a
     side have the same name."""

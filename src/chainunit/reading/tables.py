@@ -176,19 +176,23 @@ def unusual_values(
     usual: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> Iterator[UnusualValue]:
     """The unusual values in the sections of a checked file. `declared` has the declaration of each section by
-    its name. `usual` has, by the name of a quantity, the usual sizes that replace the declared ones."""
+    its name. `usual` has, by the name of a quantity, the usual sizes that replace the declared ones; these quantities
+    are looked at if the file leaves them at their start values, too."""
     for section, of in declared.items():
         for variable in variables(of, f"{section}."):
             given: Any = data
             for name in variable.name.split("."):
                 given = given.get(name) if isinstance(given, Mapping) else None
+            here = usual.get(variable.name, variable.quantity.usual)
+            quantity = dataclasses.replace(variable.quantity, usual=here)
+            variable = dataclasses.replace(variable, quantity=quantity)
             if given is not None:
-                here = usual.get(variable.name, variable.quantity.usual)
-                variable = dataclasses.replace(
-                    variable, quantity=dataclasses.replace(variable.quantity, usual=here)
-                )
-                if value := UnusualValue.of(variable, given, to_number(variable, given)):
+                value = UnusualValue.of(variable, given, to_number(variable, given))
+                if value:
                     yield value
+            elif variable.name in usual and not quantity.is_usual(start := float(quantity.start or 0.0)):
+                template = f"{variable.template}; not in the file"
+                yield UnusualValue(dataclasses.replace(variable, template=template), start, "", None)
 
 
 def _meant(variable: Variable, given: Any) -> str | None:

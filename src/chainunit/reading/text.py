@@ -61,7 +61,7 @@ DEFAULT_UNITS: Units = MappingProxyType(
     }
 )
 _SHOWN_IN: ContextVar[Units] = ContextVar("units of words", default=DEFAULT_UNITS)
-_KIND_OF = {"W": "power", "N.m": "torque", "N": "force"}
+_KIND_OF = {"W": "power", "N.m": "torque", "N": "force", "N/m2": "stress"}
 """By unit, the kind of a quantity that declares none."""
 _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "speed": {"rad/s": (1.0, 0.0), "rev/min": (30.0 / math.pi, 0.0)},

@@ -101,8 +101,6 @@ def _words(lines: list[str], line: int, error: Exception) -> str:
         return "a number has more than 4300 digits"
     if own.count('"') == 1 or own.count("'") == 1:
         return f"{printable(own.strip(), 80)}: a quotation mark is missing"
-    if own.rstrip().endswith("="):
-        return f"{printable(own.strip(), 80)}: its value is missing"
     kind = _kind(first)
     cited = f"{printable(own.strip(), 80)}: " if own.strip() and not kind else ""
     return f"{cited}{printable(said[:1].lower() + said[1:])}{kind}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -145,11 +145,58 @@ def inspect_motion(
     off : the time at which the motor is switched off [s]
     """
     driven = recording if off is None else recording.part(end=off)
-    return [
+    faults = [
         *_rows(recording, speeds[1]),
         *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
         *_counted(recording),
     ]
+    other = _other_speed(driven, speeds[0], ratio) if faults and speeds[0] == speeds[1] else None
+    if other is None:
+        return faults
+    # at a wrong speed the rows look too few, and the machine seems to stand
+    fault = _speed_fault(recording, *other, speeds[0])
+    return [fault, *inspect_motion(recording, (other[1], other[1]), ratio, off)]
+
+
+def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str, float] | None:
+    """The column that tells that the crank turns at another speed than the `stated` one, and that speed [rad/s]: the
+    mark, the count of an encoder or the measured speed, all of which agree; one alone needs another column that
+    repeats after a turn at this speed."""
+    speeds = _mean_speeds(recording, ratio)
+    low, high = min(speeds.values(), default=0.0), max(speeds.values(), default=0.0)
+    if high > SAME * low or stated / SAME < high < SAME * stated or not speeds:
+        return None
+    name, speed = next(iter(speeds.items()))
+    # without a measured speed, the unit of the times may be another one, too
+    if not speed_column(recording) and _likely_unit(recording, 2.0 * math.pi / stated, LONGEST):
+        return None
+    analog = (other for other in recording.columns if MEASURANDS[other].analog and other != name)
+    repeats = any(_turn(recording, other, 2.0 * math.pi / speed)[0] > ALIKE for other in analog)
+    return (name, speed) if len(speeds) > 1 or repeats else None
+
+
+def _mean_speeds(recording: Recording, ratio: float) -> dict[str, float]:
+    """The mean speed of the crank [rad/s] by each column that tells it: the mark, the count of an encoder, and the
+    measured speed."""
+    speeds = {}
+    for name in ("mark", "motor.count", speed_column(recording)):
+        if name in recording.columns and (name != "mark" or len(mark_times(recording)) > FEWEST_TURNS):
+            alone = replace(recording, columns={name: recording.columns[name]})
+            speeds[name] = mean_speed(RecordedRun("", alone, 0.0), ratio)
+    return {name: speed for name, speed in speeds.items() if speed > 0.0}
+
+
+def _speed_fault(recording: Recording, name: str, speed: float, stated: float) -> InputError:
+    """The fault that the crank turns at a `speed`, by the column of this name, and not at the `stated` one."""
+    measured, expected = (f"{x:.5g} rad/s ({_per_minute(x)})" for x in (speed, stated))
+    others = ", or correct machine.ratio" if name in ("motor.w", "motor.count") else ""
+    if not speed_column(recording) and not stated / AROUND < speed < AROUND * stated:
+        others += ", or write the unit of the times into their head"
+    return _fault(
+        recording, name,
+        f"the crank turns at {measured}, and crank_speed is {expected}; write crank_speed = "
+        f'"{_per_minute(speed)}" into the table of this recording{others}',
+    )  # fmt: skip
 
 
 MOST_DROOP = 0.1
@@ -177,13 +224,7 @@ def inspect_speed(run: RecordedRun, response: Response, ratio: float, gain: floa
     droop = min(2.0 * abs(simulated / run.crank_speed - 1.0), MOST_DROOP)
     if abs(speed / run.crank_speed - 1.0) <= error + droop:
         return []
-    measured, stated = (f"{x:.5g} rad/s ({_per_minute(x)})" for x in (speed, run.crank_speed))
-    geared = ", or correct machine.ratio" if name in ("motor.w", "motor.count") else ""
-    text = (
-        f"the crank turns at {measured}, and crank_speed is {stated}; write crank_speed = "
-        f'"{_per_minute(speed)}" into the table of this recording{geared}'
-    )
-    return [_fault(run.recording, name, text)]
+    return [_speed_fault(run.recording, name, speed, run.crank_speed)]
 
 
 def _per_minute(speed: float) -> str:
@@ -198,12 +239,10 @@ def _turning_speed(
     without one."""
     span = float(recording.time[-1] - recording.time[0])
     clock = CLOCK + recording.step / span
-    for name, is_there in (
-        ("mark", len(mark_times(recording)) > FEWEST_TURNS),
-        ("motor.count", "motor.count" in recording.columns),
-    ):
-        if is_there:
-            return name, mean_speed(RecordedRun("", recording, crank_speed), ratio), clock
+    speeds = _mean_speeds(recording, ratio)
+    for name, speed in speeds.items():
+        if name != speed_column(recording):
+            return name, speed, clock
     turns = [
         (like, name, turn)
         for name in recording.columns
@@ -214,8 +253,7 @@ def _turning_speed(
     if turns:
         _, name, turn = max(turns)
         return name, 2.0 * math.pi / turn, 2.0 * clock
-    speed = measured_speed(recording, ratio)
-    return None if speed is None else (speed_column(recording), float(np.mean(speed)), clock + GAINS * gain)
+    return next(((name, speed, clock + GAINS * gain) for name, speed in speeds.items()), None)
 
 
 def _turn(recording: Recording, name: str, stated: float) -> tuple[float, float]:
@@ -412,7 +450,8 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         yield _fault(
             recording, "time",
             f"{1.0 / step:.3g} rows a second are {turn / step:.2g} in a turn of the crank; record >= "
-            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, or write the unit of the times into their head",
+            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, correct crank_speed, or write the unit of the times "
+            "into their head",
         )  # fmt: skip
     if recording.missing > MISSING:
         begin, end = max(recording.gaps, key=lambda gap: gap[1] - gap[0])
@@ -425,7 +464,8 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
     if span < FEWEST_TURNS * turn:
         yield _fault(
             recording, "time",
-            f"{span:.3g} s are {span / turn:.2g} turns of the crank; record >= {FEWEST_TURNS:.0f} turns",
+            f"{span:.3g} s are {math.floor(100.0 * span / turn) / 100.0:.3g} turns of the crank at crank_speed; "
+            f"record >= {FEWEST_TURNS:.0f} turns, or correct crank_speed",
         )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ speed or load was not steady leaves residuals that change slowly, beside the ord
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from ..core.messages import unit_behind
 from ..core.quantities import quantity
 from ..reading.results import InUnit, derived, part, result
-from .fit import NormalEquations
+from .fit import Fit, NormalEquations
 from .measurands import MEASURANDS
 from .problem import Comparison, Problem
 from .unknown import Unknown
@@ -128,6 +128,16 @@ def prior_conflicts(sought: Sequence[Unknown], best: NormalEquations) -> list[Pr
     known = [(u, float(x)) for u, x in zip(sought, best.z, strict=False) if not u.is_even]
     priors = [PriorConflict(u.name, u.unit, x, (x - u.start) / u.prior_deviation, u.start) for u, x in known]
     return [each for each in priors if abs(each.deviations) > CONFLICT]
+
+
+def describes(
+    problem: Problem, best: Fit, tests: Sequence[ResidualTest], excepted: Collection[str] = ()
+) -> bool:
+    """Whether a fit describes the recordings: it ended, its residuals may be noise, and the numbers of clocks and
+    sensors and all sought ones, without the `excepted`, are as they are known."""
+    conflicts = [*sensor_conflicts(problem, best), *prior_conflicts(problem.sought, best)]
+    are_known = all(conflict.name in excepted for conflict in conflicts)
+    return best.is_ended and are_known and all(test.is_noise for test in tests)
 
 
 def residual_tests(best: NormalEquations) -> list[ResidualTest]:

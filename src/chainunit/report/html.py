@@ -17,7 +17,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.errors import InputError
-from ..core.files import PAGE, write_file
+from ..core.files import write_file
 from ..reading.text import Units, forms
 from . import blocks as b
 from . import motion
@@ -26,7 +26,7 @@ from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 from .live_block import Live, LiveMachine
 from .packing import packed, packed_bytes
 
-NAME = PAGE
+NAME = "report.html"
 
 _SPACE = "\u00a0"  # before a unit
 _SHORT = 16

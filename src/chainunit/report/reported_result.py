@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
+import weakref
 from collections.abc import Iterator, Mapping
 from functools import cached_property, partial
 from pathlib import Path
@@ -11,7 +13,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
 from ..core.errors import WriteError, check_kind
 from ..core.files import atomic_file
 from ..core.named import Named
-from ..core.temporary_folders import in_temporary_folder
 from ..work.progress import TaskProgress
 from . import files, html, terminal
 from .blocks import Report
@@ -64,7 +65,13 @@ class ReportedResult(Generic[Question, Outcome]):
         elif task.kept is None:
             result = cls(question, compute(folder=None), None)
         else:
-            result = in_temporary_folder(lambda place: cls(question, compute(folder=place), place))
+            place = Path(tempfile.mkdtemp(prefix="chainunit_"))
+            try:
+                result = cls(question, compute(folder=place), place)
+            except BaseException:
+                shutil.rmtree(place, ignore_errors=True)
+                raise
+            weakref.finalize(result, shutil.rmtree, place, ignore_errors=True)
         failure = task.failure(result._outcome)
         if failure is not None:
             failure.partial = result

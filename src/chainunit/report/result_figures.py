@@ -16,7 +16,7 @@ FORMATS = ("png", "svg", "pdf")
 
 
 class ResultFigure:
-    """A figure of a result. A notebook shows it; `save` writes it into a file.
+    """A figure of a result. A notebook shows it as PNG; `save` writes it into a file.
 
     `title` and `alt` describe it. Its axes are in the units of the study.
     """
@@ -64,9 +64,6 @@ class ResultFigure:
 
     def _repr_png_(self) -> bytes:
         return self._bytes("png")
-
-    def _repr_svg_(self) -> str:
-        return self._bytes("svg").decode("utf-8")
 
     def __repr__(self) -> str:
         return f"<Figure {self._figure.name!r}: {self.title}>"

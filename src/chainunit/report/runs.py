@@ -8,7 +8,7 @@ from typing import Any
 
 from ..core.quantities import Layout
 from ..study.bearings import hardest_run
-from ..study.measures import MEASURES, Answers, measures_of
+from ..study.measures import MEASURES, STARTED, Answers, measures_of
 from ..study.record import StudyRecord
 from ..study.window import Phase
 from . import blocks as b
@@ -42,7 +42,9 @@ def _begin(s: b.Source, study: StudyRecord, run: str, phase: Phase) -> Iterator[
     rows = [(v.described(study.driver_noun), size) for v, size in numbers if size.value is not None]
     sizes = join((line(f"{words} ", size) for words, size in rows), "; ")
     yield b.Text(line(f"{capital(title)}: ", sizes, "."), form="short")
-    yield b.Table(tuple(map(b.TableRow, rows)), title=f"Demands of the {title} on the drive", form="long")
+    end = f", and of the end of the start-up, from {100.0 * STARTED:g} % of the speed on"
+    head = f"Demands of the {title} on the drive{end if phase is Phase.SETTLING else ''}"
+    yield b.Table(tuple(map(b.TableRow, rows)), title=head, form="long")
 
 
 def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: str, **more: Any) -> b.Table:
@@ -111,7 +113,8 @@ def _beside_the_worst(s: b.Source, study: StudyRecord, whole: b.Table) -> b.Tabl
     title = whole.title
     if peaks:
         shown.append(max(peaks, key=lambda run: abs(peaks[run])))
-        bare = " (without torque limiter)" if study.proposal is not None else ""
+        is_bare = study.proposal is not None and study.config.coupling is None
+        bare = " (without torque limiter)" if is_bare else ""
         title = f"Steady running beside the worst overload{bare}: {run_names.title(study, shown[-1])}{_doubt(study)}"
     places = [0, *(1 + runs.index(run) for run in shown)]
     rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)

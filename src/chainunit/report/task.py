@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from ..core.errors import RunError, WriteError
-from ..core.files import ResultKind, claim, clear, write_all
+from ..core.errors import InputError, RunError, WriteError
+from ..core.files import claim, clear
 from ..study import provenance
 from ..study.config import Config
 from ..study.registry import command_modules
 from ..work.progress import TaskProgress
-from . import files
+from . import files, html
 from .blocks import Report
+from .result_kind import ResultKind
 
 Question = TypeVar("Question")
 """What a task is asked: the configuration of a study, or the content of other files."""
@@ -84,13 +85,25 @@ class Task(Generic[Question, Outcome]):
         return result_kinds()[self.name].file.removesuffix(".json")
 
     def claimed(self, question: Question, folder: Path) -> AbstractContextManager[Path]:
-        """The folder, for this process alone. Errors are those of `chainunit.core.files.claim`."""
-        names = [name for name in self.files if "*" not in name]
+        """The folder, for this process alone.
+
+        Raises
+        ------
+        InputError
+            for a folder with a result of another kind; see also `chainunit.core.files.claim`.
+        """
+        other = next(
+            (kind for name, kind in result_kinds().items() if name != self.name and kind.is_in(folder)), None
+        )
+        if other is not None:
+            raise InputError(
+                f"{folder}: has the result of {other.words}, which would be lost; name another folder"
+            )
+        names = [html.NAME, f"{self._stem}.json", f"{self._stem}.md"]
+        names += [name for name in self.files if "*" not in name]
         if isinstance(question, Config):
             names += [provenance.FILE, provenance.COPY]
-        kinds = dict(result_kinds())
-        kind = kinds.pop(self.name)
-        return claim(folder, *names, *self.replaced(question), kind=kind, others=kinds.values())
+        return claim(folder, *names, *self.replaced(question))
 
     def clear(self, folder: Path) -> None:
         """Remove the files of an earlier result from a folder, see `chainunit.core.files.clear`."""
@@ -131,4 +144,11 @@ class Task(Generic[Question, Outcome]):
         the files, and the first error of a file that could not be written, or None."""
         of_task = self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
         of_study = provenance.writers(question, folder) if isinstance(question, Config) else []
-        return write_all([*of_task, *of_study])
+        paths: list[Path] = []
+        failure = None
+        for write in (*of_task, *of_study):
+            try:
+                paths += write()
+            except WriteError as error:
+                failure = failure or error
+        return paths, failure

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from textwrap import shorten
@@ -13,13 +13,17 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Styled
 
+from ..core.unit_table import UNITS
 from ..reading.text import DEFAULT_UNITS, Units, number
 from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
 _BRACKETS = re.compile(r" ?\([^()]*\)")
-_CLAUSE_END = re.compile(r"(?<=.{20})(?:[:;.] |, (?=(?:which|where|as|so that) ))")
+_UNIT = re.compile(r"(?<=\d) ([^\s,;()]+(?: m[²³]?(?![\w/]))?)")
+_KEPT = "\ue000"
+"""The mark of a blank at which no line may end."""
+_CLAUSE_END = re.compile(r"(?<=.{30})(?:[:;.] |, (?=(?:which|where|as|so that) ))")
 
 
 def plain_line(line: Line, units: Units = DEFAULT_UNITS) -> str:
@@ -94,17 +98,20 @@ def screen(report: Report, console: Console, rest: str) -> None:
         rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
     end = [line_of(warning, console.width - 1) + "\n" for warning in warnings]
     end.append(_printed(console, lambda: console.print(rest)))
-    room = _LINES - _count(end)
+    room = _LINES - sum(map(_lines, end))
     title = f"{report.title}\n" if report.title else ""
     for block in blocks:
         if _role(block) in (*_LAST, "remark"):
             continue
-        text = _fitted(block, console, report.units, room - _count([title]))
-        if text:
-            shown = title + text if isinstance(block, Table) else text
-            title = "" if isinstance(block, Table) else title
-            console.file.write(shown)
-            room -= _count([shown])
+        if isinstance(block, Table):
+            text = _first_rows(block, console, report.units, _lines, room - _lines(title), _ROWS)
+            text, title = (title + text, "") if text else ("", title)
+        else:
+            words = _with_units("\n".join(_sentences(block, report.units)))
+            text = _printed(console, partial(console.print, words)).replace(_KEPT, " ")
+        if text.strip() and _lines(text) <= room:
+            console.file.write(text)
+            room -= _lines(text)
     console.file.write("".join(end))
 
 
@@ -120,31 +127,42 @@ def line_of(text: str, width: int) -> str:
     return shorten(text, width, placeholder=" ...")
 
 
+def _with_units(text: str) -> str:
+    """The text with a mark in place of each blank between a number and its unit."""
+    names = {match[0]: re.split(r"[ /.:²³]", match[1])[0] for match in _UNIT.finditer(text)}
+    return _UNIT.sub(lambda m: m[0].replace(" ", _KEPT) if names[m[0]] in UNITS else m[0], text)
+
+
 def _printed(console: Console, show: Callable[[], None]) -> str:
     with console.capture() as printed:
         show()
     return printed.get()
 
 
-def _count(texts: Iterable[str]) -> int:
-    return sum(text.count("\n") for text in texts)
+def _lines(text: str) -> int:
+    return text.count("\n")
 
 
-def _fitted(block: Block, console: Console, units: Units, room: int) -> str:
-    """A block as the console prints it, a table with its first rows; empty if it has no room."""
-    if not isinstance(block, Table):
-        text = _printed(console, lambda: console.print("\n".join(_sentences(block, units))))
-        return text if text.strip() and _count([text]) <= room else ""
-    rows = [row for row in block.rows if row.form != "long"]
-    # a row takes a line at least
-    for count in range(min(len(rows), room), max(1, min(_ROWS, len(rows))) - 1, -1):
-        part = replace(block, rows=tuple(rows[:count]))
+def _first_rows(
+    table: Table, console: Console, units: Units, size: Callable[[str], int], room: int, fewest: int = 1
+) -> str:
+    """A table as the console prints it, with as many of its first rows as have room: the `size` of the text is up to
+    `room`, and a row adds 1 to it at least. Empty if less than `fewest` rows, or than all, have room."""
+    rows = [row for row in table.rows if row.form != "long"]
+    low, high, best = min(fewest, len(rows)) - 1, min(len(rows), room), ""
+    count = high
+    while low < high:
+        part = replace(table, rows=tuple(rows[:count]))
         text = _printed(console, partial(_show_table, part, console, units))
+        text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
         if count < len(rows):
             text += f"... and {len(rows) - count} more rows\n"
-        if _count([text]) <= room:
-            return text
-    return ""
+        if size(text) <= room:
+            best, low = text, count
+        else:
+            high = count - 1
+        count = (low + high + 1) // 2
+    return best
 
 
 _GRADES = ("good", "partly", "bad", "alarm")
@@ -184,7 +202,7 @@ def brief(report: Report, count: int, width: int = 100) -> str:
         if _role(block) in (*_LAST, "remark"):
             continue
         if isinstance(block, Table):
-            text = _cut(block, console, report.units, room - len(title) - 1)
+            text = _first_rows(block, console, report.units, len, room - len(title) - 1).rstrip("\n")
             text, title = (f"{title}\n{text}".lstrip("\n"), "") if text else ("", title)
         else:
             text = "\n".join(_sentences(block, report.units))
@@ -194,20 +212,6 @@ def brief(report: Report, count: int, width: int = 100) -> str:
             pieces.append(text)
             room -= len(text) + 1
     return "\n".join([*pieces, end])
-
-
-def _cut(table: Table, console: Console, units: Units, room: int) -> str:
-    """A table of at most so many letters, without its last rows where there are too many; else empty."""
-    rows = [row for row in table.rows if row.form != "long"]
-    for count in range(len(rows), 0, -1):
-        part = replace(table, rows=tuple(rows[:count]))
-        text = _printed(console, partial(_show_table, part, console, units))
-        lines = [line.rstrip() for line in text.splitlines()]
-        if count < len(rows):
-            lines.append(f"... and {len(rows) - count} more")
-        if len(text := "\n".join(lines)) < room:
-            return text
-    return ""
 
 
 def _role(block: Block) -> str:

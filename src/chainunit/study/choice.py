@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import refusal_prefix
-from ..core.temporary_folders import scratch
+from ..core.files import scratch
 from ..drives.catalogue import check_own
 from ..fmu.backends import Backend
 from ..work.progress import TaskProgress, quiet

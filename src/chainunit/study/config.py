@@ -11,11 +11,12 @@ from typing import Any
 
 from ..core.brief import briefly_shown
 from ..core.errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
-from ..core.quantities import Layout, variables
+from ..core.quantities import USUAL, Layout, variables
 from ..drives.catalogue import CatalogueMotor
 from ..machines.admissible import admits, causes
-from ..machines.api import machine_of, ratios
+from ..machines.api import machine_of
 from ..machines.machine import Machine
+from ..machines.paper_ratios import Ratios, of_ratios
 from ..mechanism.models import MachineModel
 from ..reading.tables import (
     UnusualValue,
@@ -56,7 +57,6 @@ from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
-    Ratios,
     Run,
     all_choices,
 )
@@ -272,7 +272,8 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
     replaced = {f"parameters.{name}" for name in named_table(data, "machine")}
     replaced |= {f"inputs.{name}" for name in named_table(data, "feed")}
     unusual = tuple(value for value in parts.unusual if value.name not in replaced)
-    unusual += tuple(unusual_values(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
+    usual = {"run.crank_speed": parts.machine.usual_speed, **_usual_lengths(parts.machine, form)}
+    unusual += tuple(unusual_values(declared, data, usual))
     with each_refusal(lambda fault: _with_hints(fault, unusual)):
         events = read_events(form.event, parts.machine)
         if "event" in data:
@@ -293,6 +294,16 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             labels=form.report.labels,
         )
         return _config(form, parts, events, contents)
+
+
+def _usual_lengths(machine: type[MachineModel], form: Any) -> dict[str, tuple[float, float]]:
+    """The usual sizes of lengths that another length of the file limits; see `InverseMachine.within`."""
+    low, high = USUAL["m"]
+    return {
+        f"machine.{name}": (low, min(most, high))
+        for name, longer in machine.within.items()
+        if (most := getattr(form.machine, longer, None)) is not None
+    }
 
 
 def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputError:
@@ -437,11 +448,12 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
 
 def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
+    make: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
     if of_papers:
-        return _machine_of_papers(parts.machine, given, filled(Ratios, of_papers))
+        with refusal_prefix("ratios: ", "ratios"):
+            return of_ratios(lambda lengths: make(parts.machine, given | lengths), filled(Ratios, of_papers))
     try:
-        of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
-        return of(parts.machine, given)
+        return make(parts.machine, given)
     except InputError as error:
         names = error.names if isinstance(error, GeometryError) else ()
         model = parts.machine
@@ -450,33 +462,9 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
             spoil = causes(admits(model), given, model.parameter_layout, model.Parameters())
         # the value that spoils the machine, and not one whose range that value sets
         key = next((f"machine.{name}" for name in (*spoil, *names) if name in given), "machine")
-        line = f"machine: {error}{_taken_over(error, model, given)}{_remedy(spoil)}"
+        ranges = f"; with all other values as they are, {', or '.join(spoil.values())}" if spoil else ""
+        line = f"machine: {error}{_taken_over(error, model, given)}{ranges}"
         raise InputError(line, key=key) from error
-
-
-def _machine_of_papers(model: Any, given: Mapping[str, float], of_papers: Mapping[str, float]) -> Machine:
-    """The machine whose lengths follow from ratios."""
-    admitted = admits(model)
-
-    def holds(values: Mapping[str, float]) -> bool:
-        try:
-            return admitted({**given, **ratios(**values)})
-        except GeometryError:
-            return False
-
-    with refusal_prefix("ratios: ", "ratios"):
-        lengths = ratios(**of_papers)
-    try:
-        return machine_of(model, {**given, **lengths})
-    except GeometryError as error:
-        spoil = causes(holds, of_papers, Layout(Ratios), Ratios())
-        key = f"ratios.{next(iter(spoil))}" if spoil else "ratios"
-        raise InputError(f"ratios: {error}{_remedy(spoil)}", key=key) from error
-
-
-def _remedy(spoil: Mapping[str, str]) -> str:
-    """Words to follow a refusal: the ranges of the values that spoil the machine."""
-    return f"; with all other values as they are, {', or '.join(spoil.values())}" if spoil else ""
 
 
 def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[str, float]) -> str:

@@ -124,10 +124,11 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     if shocks and not set(openings) & set(shocks):
         warn(
             "coupling never opens",
-            "The torque limiter opens in no jam, lump or block of this study: it is set to {trip}, they put "
+            "The torque limiter opens in no overload of this study ({where}): it is set to {trip}, they put "
             "{largest} on it at most, steady running {steady}"
             + ("." if most is None else "; the motor gives {motor} at most."),
             *shocks,
+            where="; ".join(map(study.title_of, shocks)),
             largest=(max(shocks.values()), "N.m"),
             steady=(on_coupling(study.drive, study.steady), "N.m"),
             **amounts,

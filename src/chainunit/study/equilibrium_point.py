@@ -45,7 +45,7 @@ def equilibrium_point(
     if own.kind in (STOP, INDIFFERENT):
         where = "on an end stop" if own.kind == STOP else "indifferent over a range"
         raise InputError(
-            f"--at {shown(at)}: the equilibrium {number} is {where}; {_listed(found, model)}; "
+            f"at = {shown(at)}: the equilibrium {number} is {where}; {_listed(found, model)}; "
             f"give {_others(found)}"
         )
     return number, own
@@ -57,14 +57,14 @@ def _number(at: str, found: Equilibria, model: type[InverseMachine]) -> int:
     if text is None:
         if not found.stable:
             raise InputError(
-                f"--at {shown(at)}: there is no stable equilibrium; {_listed(found, model)}; "
+                f"at = {shown(at)}: there is no stable equilibrium; {_listed(found, model)}; "
                 f"give {_others(found)}"
             )
         lowest = min(found.stable, key=lambda each: each.potential or 0.0)
         return found.places.index(lowest) + 1
     if not text.isdecimal() or not 1 <= int(text) <= len(found.places):
         raise InputError(
-            f"--at {shown(at)}: must be equilibrium:N with N from 1 to {len(found.places)}; "
+            f"at = {shown(at)}: must be equilibrium:N with N from 1 to {len(found.places)}; "
             f"{_listed(found, model)}"
         )
     return int(text)

@@ -19,6 +19,7 @@ from ..core.units import shortest_text
 from ..drives.catalogue import KINDS as CATALOGUES
 from ..drives.catalogue_rows import LEFT_OUT, TEXTS
 from ..drives.motors import MOTORS
+from ..machines.paper_ratios import Ratios
 from ..models import MACHINES
 from ..reading.lists import TableList
 from ..reading.tables import instance
@@ -28,7 +29,7 @@ from .event import TYPES, Event
 from .file_section import FileSection
 from .motor_sources import OwnMotor
 from .parts import ReportTable
-from .sections import Ratios, SystemTable, all_choices, all_sections
+from .sections import SystemTable, all_choices, all_sections
 
 _OF_MOTORS = {
     "speed_control.kp": "tuned",

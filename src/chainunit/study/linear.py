@@ -114,10 +114,10 @@ def linear_point(
     whole, is_file = is_study_file(name), name.lower().endswith(".toml")
     if whole and values is not None:
         raise InputError(
-            f"--config {values}: is not of a study file, which has its own values; leave it out for {name}"
+            f"config = {values}: is not of a study file, which has its own values; leave it out for {name}"
         )
     if inverse and (whole or not is_file):
-        raise InputError(f"--inverse: is of linkage files; leave it out for {name}")
+        raise InputError(f"inverse: is of linkage files; leave it out for {name}")
     if whole:
         return _point_of_study(study_files.load(Path(name)), at, progress)
     if is_file:
@@ -162,7 +162,7 @@ def _at_equilibrium(model: type[Model], start: Mapping[str, float], at: str) -> 
     inverse = model.inverse if issubclass(model, DirectMachine) else model
     if not issubclass(inverse, InverseMachine) or inverse.States is not None:
         raise InputError(
-            f"--at {shown(at)}: {model.name} has no equilibria that are known; they are of linkages and machines "
+            f"at = {shown(at)}: {model.name} has no equilibria that are known; they are of linkages and machines "
             "without states of their own; give states and inputs, NAME=VALUE, .."
         )
     number, own = equilibrium_point(inverse, start, at)
@@ -225,7 +225,7 @@ def _values(model: type[Model], at: At) -> dict[str, float]:
             name, sign, text = (part.strip() for part in each.partition("="))
             if not sign:
                 raise InputError(
-                    f"--at {shown(at)}: must be NAME=VALUE, .. of states and inputs of {model.name}, such as "
+                    f"at = {shown(at)}: must be NAME=VALUE, .. of states and inputs of {model.name}, such as "
                     f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study, '
                     '"equilibrium" of a machine'
                 )
@@ -238,7 +238,7 @@ def _values(model: type[Model], at: At) -> dict[str, float]:
         try:
             values[name] = to_number(variables[k], given)
         except ValueError as error:
-            raise InputError(f"--at: {error}") from None
+            raise InputError(f"at: {error}") from None
     return values
 
 
@@ -254,7 +254,7 @@ def _point_of_study(
     """The point of the whole drive of a study."""
     if asks_for_equilibrium(at):
         raise InputError(
-            f"--at {shown(at)}: is of a linkage file, or of a machine by its name; a study has runs: {START}, "
+            f"at = {shown(at)}: is of a linkage file, or of a machine by its name; a study has runs: {START}, "
             f"{', '.join([STEADY, *config.events])}"
         )
     drive = drive_to_export(config, progress=progress)
@@ -324,17 +324,15 @@ def _run_and_time(at: str, runs: list[str]) -> tuple[str, float | None]:
     name, sign, text = (part.strip() for part in at.partition(":"))
     if name not in runs:
         raise InputError(
-            f"--at {shown(at)}: there is no run {shown(name)}{near_name(name, runs) or ';'} there are "
+            f"at = {shown(at)}: there is no run {shown(name)}{near_name(name, runs) or ';'} there are "
             f'{", ".join(runs)}; must be RUN:TIME, such as "{START}:0.4 s", or NAME=VALUE, .. of states and inputs'
         )
     if not sign and name == STEADY:
         return name, None
     if not text:
-        raise InputError(f'--at {shown(at)}: must be RUN:TIME, such as "{name}:0.4 s"; the time is missing')
+        raise InputError(f'at = {shown(at)}: must be RUN:TIME, such as "{name}:0.4 s"; the time is missing')
     try:
-        return name, to_number(
-            Variable("--at", "time of the run", Quantity("s", "", low=0.0, high=1e6)), text
-        )
+        return name, to_number(Variable("at", "time of the run", Quantity("s", "", low=0.0, high=1e6)), text)
     except ValueError as error:
         raise InputError(f'{error}; must be RUN:TIME, such as "{name}:0.4 s"') from None
 
@@ -374,7 +372,7 @@ def _from_rest(rig: Rig, simulation: Any, time: float | None, steady: bool) -> A
             return simulation
         if steady and time < started.steady_from:
             raise InputError(
-                f'--at "{STEADY}:{time:g} s": steady running begins at {started.steady_from:.4g} s; before it name '
+                f'at = "{STEADY}:{time:g} s": steady running begins at {started.steady_from:.4g} s; before it name '
                 f'"{START}:{time:g} s"'
             )
         rig = started.rig
@@ -386,7 +384,7 @@ def _from_rest(rig: Rig, simulation: Any, time: float | None, steady: bool) -> A
 def _in_event(rig: Rig, simulation: Any, event: Event, time: float) -> None:
     """Bring the simulation to the time [s] of the run of an event."""
     if not rig.takes(event):
-        raise InputError(f"--at: {event.title} is not in the study, as {event.without}")
+        raise InputError(f"at: {event.title} is not in the study, as {event.without}")
     started = start_up(rig, simulation, _silent, rig.guards)
     _refuse_opened(simulation, started.stop - 0.5 * rig.step)
     rig = started.rig
@@ -399,7 +397,7 @@ def _in_event(rig: Rig, simulation: Any, event: Event, time: float) -> None:
     stop = begin + lead + event.time_followed(rig.operation.turn)
     if not begin < time <= stop:
         raise InputError(
-            f"--at {time:g} s: the run of {event.name} goes from {begin:.4g} s to {stop:.4g} s; the event begins at "
+            f"at = {time:g} s: the run of {event.name} goes from {begin:.4g} s to {stop:.4g} s; the event begins at "
             f"{begin + lead:.4g} s"
         )
     if time > begin + lead:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, RunError, printable
+from ..core.files import scratch
 from ..core.inputs import TOML, file_text
 from ..core.model import About, Model
 from ..core.quantities import Layout
-from ..core.temporary_folders import scratch
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..fmu.script import Names
@@ -62,7 +62,7 @@ def start_of(drive: Drive, operation: OperatingConditions, model: type[Model]) -
     for kind in parts_of_line():
         if model is kind.model:
             if (part := drive.line.part(kind.name)) is None:
-                raise InputError(f"the study has no [{kind.name}]; add the table, or export without --config")
+                raise InputError(f"the study has no [{kind.name}]; add the table, or export without config")
             return part.component.start
     if not issubclass(model, Motor):
         if not _is_of(model, drive):
@@ -180,7 +180,7 @@ def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
     limits = limits_of_organs(machine, feed, ("N.m",))
     reasons = [at_speed(each.topic, speed, each.speed) for each in passed_limits(limits, speed)]
     at = number(speed, "rad/s", "speed", beside=False)
-    remedy = 'for chains put organ = "chain" at the top of the file'
+    remedy = 'for chains give the study organ = "chain"'
     return [f"{reason.speed_limit}; this study turns at {at}; {remedy}." for reason in reasons]
 
 

@@ -186,9 +186,8 @@ def _machine_model(table: Any, source: str) -> tuple[type[MachineModel], tuple[U
                 low, high = (math.degrees(end) for end in model.span)
                 raise InputError(
                     f"{table.machine} has a driver that swings from {low:g} deg to {high:g} deg, and a study, a "
-                    "sizing and a sweep need one that turns all the way round; chainunit linkage --speed shows its "
-                    "forces there and back, chainunit export makes an FMU that takes its motion, or, with --direct, "
-                    "its torque"
+                    "sizing and a sweep need one that turns all the way round; the report on the linkage shows its "
+                    "forces there and back, and its FMU takes its motion, or, as a direct model, its torque"
                 )
             if not model.turns:
                 raise InputError(

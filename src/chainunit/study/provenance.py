@@ -16,8 +16,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.errors import InputError
-from ..core.files import write_file
-from ..core.ledger import digest
+from ..core.files import digest, write_file
 from .config import Config, FileContents
 from .parts import beside
 from .registry import registered

@@ -44,17 +44,14 @@ HOLDS_AT, TRIPS_AT = 1.05, 1.2
 """Multiples of its setting: at the first a relay must not trip within two hours, at the second it must."""
 _PICK_UP = 1.1  # between the two
 _LASTING = 5
+MORE_CURRENT = 1.2
+"""Locked-rotor current of a cage motor by the tolerance of IEC 60034-1, over that of its catalogue."""
 
 
-def start_class(time: Any, current: Any, rated: float) -> int:
-    """The least trip class, from `LIGHT` on, whose relay, cold and set to the `rated` current [A], surely holds
-    during a start.
-
-    The heat of the start is that of the square of the RMS `current` [A] over `time` [s], both of shape (n,). The
-    relay's cooling is left out, which is on the safe side.
-    """
-    seconds = start_seconds(time, current, rated)
-    usual = [each for each in CLASSES if each.name.isdigit() and int(each.name) >= LIGHT]
+def class_holding(seconds: float, least: int = LIGHT) -> int:
+    """The least trip class, from the class `least` on, whose cold relay surely holds in a start of so many `seconds`,
+    see `start_seconds`."""
+    usual = [each for each in CLASSES if each.name.isdigit() and int(each.name) >= least]
     return next((int(each.name) for each in usual if seconds <= each.shortest), HEAVIER)
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..reading.text import number
+from .arrays import peak
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .inverter import inverter_need
@@ -65,6 +66,8 @@ def conclude(study: StudyRecord) -> None:
         _on_start(study)
         _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
+        if study.drive.foreign is None:
+            _on_rotor(study)
     of_drive = None if study.proposal is None else study.proposal.findings
     if of_drive is not None:
         of_drive.remark(study)
@@ -328,6 +331,22 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         yield "trip", f"after {time}; {energy} pass it while it opens, {stays}", amounts
     elif name in config.events and answers.recovery_time is None and study.returns:
         yield "not recovered", "", {}
+
+
+def _on_rotor(study: StudyRecord) -> None:
+    """Note a peak of the motor's torque that is not of the load, but of the rotor, whose speed swings."""
+    torque, acceleration = (study.steady[f"motor.{name}"].values for name in ("air_gap_tau", "a"))
+    most, load = peak(torque), peak(torque - study.drive.fmu_parameters.rotor.J * acceleration)
+    if most > 1.05 * load:
+        study.note(
+            "rotor accelerates",
+            "steady running: load and losses take {load} at the motor's shaft at most, and the motor gives {most}: "
+            "the rest accelerates its rotor, as the speed swings by {ripple}.",
+            STEADY,
+            load=(load, "N.m"),
+            most=(most, "N.m"),
+            ripple=(study.answers[STEADY].speed_ripple, "1", "percent"),
+        )
 
 
 def _on_inverter(study: StudyRecord) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..core.errors import InputError, shown
 from ..drives.motors import MOTORS
-from ..machines.api import ratios
+from ..machines.paper_ratios import Ratios, lengths
 from ..models import MACHINES
 from ..reading.tables import filled
 from .conditions import (
@@ -26,7 +26,6 @@ from .conditions import (
 from .foreign_machine import ForeignModel
 from .parts import FMU, Parts, parts_of
 from .registry import registered
-from .sections import Ratios
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ def _of_parts() -> Iterator[Rule]:
 def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
     yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
-    for name in ratios(**filled(Ratios, {})):
+    for name in lengths(**filled(Ratios, {})):
         words = "given beside [ratios], which sets it; leave out one of the two"
         yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), words)
 

@@ -32,7 +32,7 @@ from .pulls import least_pulls
 from .readings import crank_angle
 from .record import Spread, StudyRecord
 from .registry import registered
-from .relay import protecting_class, start_class
+from .relay import class_holding, protecting_class, start_seconds
 from .remarks import conclude
 from .rig import Rig
 from .start_up import start_up
@@ -85,7 +85,7 @@ def run_study(
         drive = with_parts_beside(choice.drive, config.plans, config.feed, turn)
         if check and drive.foreign_titles:
             titles = " and ".join(drive.foreign_titles)
-            raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
+            raise InputError(f"check: the equations of {titles} are not known; leave it out")
         study = StudyRecord(config, drive, statics(drive, turns, config.run.step), choice.proposal)
         if choice.proposal is not None:
             study.findings[choice.proposal.name] = choice.proposal.findings
@@ -148,8 +148,7 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
         return
     least, of = max(found.start_class, study.relay_class), plate.nameplate
     before, stall = study.answers[verdict.STEADY].current_rms, of.rated_current * of.locked_current_ratio
-    seconds = found.start_seconds(of.rated_current, study.drive.switched_until)
-    trip_class = protecting_class(least, seconds, of.rated_current, before, stall, of.locked_time)
+    trip_class = protecting_class(least, found.relay_seconds, of.rated_current, before, stall, of.locked_time)
     if trip_class == study.relay_class:
         return
     study.relay_class = trip_class
@@ -277,7 +276,7 @@ class Runner:
             return
         rise = run.sel(time=slice(None, time))
         current = drive.relay_current(rise["time"].values, rise[f"motor.{drive.motor.current}"].values)
-        study.relay_class = start_class(rise["time"].values, current, rated)
+        study.relay_class = class_holding(start_seconds(rise["time"].values, current, rated))
         if study.proposal is not None:
             study.relay_class = max(study.relay_class, study.proposal.start_class)
 

@@ -13,23 +13,12 @@ from ..drives.contactor import StarDelta
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.motor import Motor
+from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
 from .entry_values import FileNames
 from .file_section import FileSection
 from .registry import registered
-
-
-@declaration
-class Ratios:
-    """The ratios of the papers, which a file may give in place of lengths."""
-
-    rho: Value = quantity("1", "r/l, crank to coupler", default=0.1, above=0.0, max=1.0)
-    lam: Value = quantity("1", "h/l, rocker to coupler", default=2.0 / 3.0, above=0.0)
-    mu: Value = quantity("1", "e/l1, rocker arm of the web hinge to wall", default=0.6, above=0.0, max=1.0)
-    zeta: Value = quantity("1", "z/z_max, half width", default=0.5, above=0.0, max=1.0)
-    l: Value = quantity("m", "coupler A-Bd", default=1.5, above=0.0)
-    l1: Value = quantity("m", "wall A1-B", default=1.35, above=0.0)
 
 
 @declaration

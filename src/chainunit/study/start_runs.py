@@ -18,7 +18,7 @@ from .arrays import peak
 from .drive import Drive
 from .event import Event
 from .measures import STARTED, time_to_start
-from .relay import start_class
+from .relay import class_holding, start_seconds
 from .rig import Rig, join
 from .torques import CURVE, PeakOf, at_gear, on_coupling, quasi_static_peak
 
@@ -53,6 +53,9 @@ class StartNumbers:
     start_time: Value = quantity("s", "start-up time")
     start_class: Value = quantity(
         "1", "trip class of the overload relay that holds; 40: none up to class 30; none for an inverter"
+    )
+    relay_seconds: Value = quantity(
+        "s", "the start as time at 7.2 times the rated current of the motor; none for an inverter"
     )
     current: Value = quantity("A", "largest current of the motor")
     long_current: Value = quantity("A", "current that is exceeded for 60 s in all; 0 in a shorter start")
@@ -132,10 +135,11 @@ def _numbers(
 ) -> StartNumbers:
     """The numbers of a start that has `reached` its speed at that time [s]."""
     time, current = run["time"].values, np.abs(run[f"motor.{drive.motor.current}"].values)
-    relay, rated = None, drive.rated_current
+    relay, seconds, rated = None, None, drive.rated_current
     if reached is not None and rated is not None and not drive.follows:
         starting = time <= max(reached, drive.switched_until)
-        relay = start_class(time[starting], drive.relay_current(time, current)[starting], rated)
+        seconds = start_seconds(time[starting], drive.relay_current(time, current)[starting], rated)
+        relay = class_holding(seconds)
     return StartNumbers(
         angle=angle,
         quasi_static=quasi_static_peak(drive, run),
@@ -144,6 +148,7 @@ def _numbers(
         coupling_transient=of(drive, run),
         start_time=reached,
         start_class=relay,
+        relay_seconds=seconds,
         current=peak(current),
         long_current=exceeded_for(time, current, OVERLOADED),
         time_above=0.0 if rated is None else time_above(time, current, rated),

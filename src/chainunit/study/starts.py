@@ -15,7 +15,6 @@ from .analysis import Analysis, Findings, Work
 from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
-from .relay import MULTIPLE
 from .rig import Rig
 from .sections import SOFTER
 from .start_runs import StartNumbers, longest_start, starts_from_all
@@ -57,19 +56,11 @@ class StartFindings(Findings):
         """Trip class of the relay that holds in every start that reaches its speed; 0 for an inverter."""
         return int(max((start.start_class or 0 for start in self.starts), default=0))
 
-    def start_seconds(self, setting: float, switched_until: float) -> float:
-        """An upper bound of the time [s] for which `MULTIPLE` times the `setting` [A] of a relay heats it as much as
-        the hardest start does, which ends after the motor is `switched_until` its last connection [s]; infinite if a
-        start does not reach its speed. In star the whole current of the line is in the windings, see
-        `Drive.relay_current`."""
-        windings = math.sqrt(3.0) if switched_until else 1.0
-        return max(
-            math.inf
-            if start.start_time is None
-            else max(start.start_time, switched_until)
-            * (windings * start.current / (MULTIPLE * setting)) ** 2
-            for start in self.starts
-        )
+    @property
+    def relay_seconds(self) -> float:
+        """The hardest start as time at `MULTIPLE` times the rated current [s]; infinite if a start does not reach its
+        speed, and 0 for an inverter."""
+        return max(math.inf if s.start_time is None else s.relay_seconds or 0.0 for s in self.starts)
 
     @property
     def stuck(self) -> list[StartNumbers]:

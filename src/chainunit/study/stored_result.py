@@ -48,7 +48,7 @@ def read_result(path: Path) -> StoredResult:
     file = path / FILE if path.is_dir() else path
     if not file.exists():
         raise InputError(
-            f"{path}: has no result (No such file or directory); make it by chainunit study -o {path}"
+            f"{path}: has no result (No such file or directory); make it by a run of the study into this folder"
         )
     return stored_result(file, json_of(file_bytes(file, JSON), str(file), "result of a study"))
 
@@ -62,5 +62,5 @@ def stored_result(file: Path, data: Any) -> StoredResult:
         for the content of another file.
     """
     if not isinstance(data, dict) or not isinstance(data.get("answers"), dict) or "chainunit" not in data:
-        raise InputError(f"{file}: is no result of a study; chainunit study writes {FILE}")
+        raise InputError(f"{file}: is no result of a study; a run into a folder writes {FILE}")
     return StoredResult(file, data)

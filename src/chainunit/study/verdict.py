@@ -210,6 +210,8 @@ class Verdict:
     def text(self) -> str:
         """The verdict in a line."""
         holds = _HOLDS[self.holds].format(_BARS_IN_PART if self.model == BARS else "")
+        if self._stalls and self.holds != "false":
+            holds = f"would be {holds} if the {self.driver} turned"
         line = f"{_SUBJECTS[self.subject].format(self.model)}, {self.driver} at "
         line += (
             f"{self._turns}, judged at the required {self._judged_speed}"

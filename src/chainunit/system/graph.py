@@ -18,7 +18,7 @@ from typing import Any
 
 from ..core.brief import briefly_shown
 from ..core.declared_numbers import has_own_unit, number_in, one_number
-from ..core.errors import InputError, shown
+from ..core.errors import InputError, check_kind, shown
 from ..core.model import Model, Terminal
 from ..core.ports import FLANGE, LOAD, PortSlopes
 from ..core.quantities import Layout, Type, base_units
@@ -160,6 +160,9 @@ class System:
             # names of components become names of files, and full names are split at the first dot
             if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
                 raise InputError(f"{shown(name)}: a component's name must be of letters, digits and _")
+        for name, pairs in (("joints", self.joints), ("wires", self.wires)):
+            for pair in pairs:
+                check_kind(name, pair, tuple | list, "a list of pairs of full names")
         partners: dict[str, str] = {}
         for joint in self.joints:
             for one, other in (joint, joint[::-1]):

@@ -7,6 +7,9 @@ import ctypes
 import logging
 import math
 import re
+import shutil
+import tempfile
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -14,7 +17,6 @@ from xml.etree.ElementTree import Element
 
 from ..core.errors import InputError, RunError, printable, shown
 from ..core.inputs import ON_DISK, XML, check_archive, regular, xml_of
-from ..core.temporary_folders import remove_folder, temporary_folder
 from ..fmu.loading import fmi2_callbacks, loading
 
 log = logging.getLogger("chainunit.fmu")
@@ -57,7 +59,8 @@ class Fmu:
         if not Path(file).exists():
             raise InputError(f"{file}: no such FMU")
         check_archive(regular(Path(file)), str(file), ON_DISK, "FMU")
-        self.folder = temporary_folder("chainunit_fmu")
+        self.folder = tempfile.mkdtemp(prefix="chainunit_fmu_")
+        self._remove = weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
         try:
             extract(str(file), unzipdir=self.folder)
             if self.document("modelDescription.xml") is None:
@@ -131,7 +134,7 @@ class Fmu:
 
     def close(self) -> None:
         """Remove the unpacked files."""
-        remove_folder(self.folder)
+        self._remove()
 
 
 def _unloadable(fmu: Fmu, error: Exception) -> str:

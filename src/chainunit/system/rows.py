@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import InputError
+from ..core.errors import InputError, texts_in
 from ..core.files import netcdf
 from .instance import Instance
 
@@ -30,7 +30,7 @@ def selected(names: Iterable[str] | None, there: Sequence[str]) -> list[str]:
     InputError
         for a name that is not there.
     """
-    wanted = set(there if names is None else names)
+    wanted = set(there if names is None else texts_in("names", names))
     for full in sorted(wanted - set(there)):
         raise InputError(f"{full}: cannot be kept; must be an output or an input with a signal")
     return [full for full in there if full in wanted]

@@ -204,10 +204,7 @@ class FmuSimulation(Simulation):
         self._fmus = {}
 
     def _free_instances(self) -> None:
-        for name, instance in self._instances.items():
-            if name in self._state:
-                instance.forget(self._state[name])
-            instance.close()
+        _free(self._instances, self._state)
         self._instances, self._state = {}, {}
 
     # -- set-up
@@ -460,10 +457,25 @@ class FmuSimulation(Simulation):
         self.time = self._saved_at
 
     def _repeat(self, runs: Sequence[_PastRun]) -> None:
-        """Make these runs from the start again; the signals stay as they are."""
-        signals = self.signals
-        self._free_instances()
-        self._past = []
+        """Make these runs from the start again; the signals stay as they are. After a failure the simulation is as it
+        was before: its instances are kept until then, or run again if an FMU allows one instance alone."""
+        before = dict(vars(self))
+        alone = any(fmu.interface.canBeInstantiatedOnlyOncePerProcess for fmu in self._fmus.values())
+        if alone:
+            self._free_instances()
+        try:
+            self._run_again(runs)
+        except BaseException:
+            self._free_instances()
+            vars(self).update(before)
+            if alone:
+                self._run_again(before["_past"])
+            raise
+        if not alone:
+            _free(before["_instances"], before["_state"])
+
+    def _run_again(self, runs: Sequence[_PastRun]) -> None:
+        signals, self._instances, self._state, self._past = self.signals, {}, {}, []
         self.time, first = self._start
         self.signals = dict(first)
         self._instantiate()
@@ -472,6 +484,14 @@ class FmuSimulation(Simulation):
             if failure is not None:
                 raise failure
         self.signals = signals
+
+
+def _free(instances: Mapping[str, Any], states: Mapping[str, Any]) -> None:
+    """Free instances, and the saved states of some of them."""
+    for name, instance in instances.items():
+        if name in states:
+            instance.forget(states[name])
+        instance.close()
 
 
 def beyond(guarded: Sequence[Guarded]) -> bool:

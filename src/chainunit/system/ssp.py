@@ -19,11 +19,10 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ..core.errors import InputError, refusal_prefix
-from ..core.files import atomic_file, folder
+from ..core.files import atomic_file, folder, scratch
 from ..core.inputs import ARCHIVE, file_bytes
 from ..core.model import Model
 from ..core.quantities import written
-from ..core.temporary_folders import scratch
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..fmu.pack import interface_of, pack, xml_bytes

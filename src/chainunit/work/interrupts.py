@@ -27,9 +27,8 @@ _received: list[int] = []
 """The signals since `begin`, in order."""
 _before: dict[int, Any] = {}
 """The handlers before `begin`."""
-_hooks: list[Any] = []
-"""The hook for lost errors before `begin`."""
-_state = {"held": False, "in hook": False}
+_state: dict[str, Any] = {"held": False, "hook": None}
+"""Whether signals no longer interrupt, and the hook for lost errors before `begin`."""
 
 
 def received() -> int | None:
@@ -46,8 +45,7 @@ def begin() -> None:
     """Handle the signals from now on. A signal that the parent lets this process ignore (``nohup``, a job in the
     background) stays ignored. To be called in the main thread."""
     _received.clear()
-    _state["held"] = False
-    _hooks.append(sys.unraisablehook)
+    _state.update(held=False, hook=sys.unraisablehook)
     sys.unraisablehook = _on_lost
     for number in _NUMBERS:
         if signal.getsignal(number) != signal.SIG_IGN:
@@ -57,12 +55,6 @@ def begin() -> None:
 def hold() -> None:
     """Let no signal interrupt any more. The first one is only remembered; a further one ends the process at once."""
     _state["held"] = True
-
-
-def ignore() -> None:
-    """Let Ctrl-C change nothing any more: at the end of a process Python takes its handlers away."""
-    if signal.SIGINT in _before:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
@@ -76,38 +68,26 @@ def remembered() -> Iterator[None]:
         yield
     finally:
         hold()
-        sys.unraisablehook = _hooks.pop()
+        sys.unraisablehook = _state["hook"]
         while _before:
-            number, handler = _before.popitem()
-            signal.signal(number, handler)
+            signal.signal(*_before.popitem())
 
 
 def _on_signal(number: int, frame: Any) -> None:
-    if _state["held"]:
-        if number in _received:
-            os._exit(128 + number)
-        _received.append(number)
-        return
+    again = number in _received
     _received.append(number)
-    if _state["in hook"]:
-        _raise_later()
-        return
-    raise KeyboardInterrupt
+    if not _state["held"]:
+        raise KeyboardInterrupt
+    if again:
+        os._exit(128 + number)
 
 
 def _on_lost(lost: Any) -> None:
     """Python's hook for an error that no caller can take."""
     if _received and issubclass(lost.exc_type, KeyboardInterrupt):
-        _state["in hook"] = True
-        _raise_later()
-        _state["in hook"] = False
-    else:
-        _hooks[-1](lost)
-
-
-def _raise_later() -> None:
-    if not _state["held"]:
         _thread.start_new_thread(_raise_again, (_received[-1],))
+    else:
+        _state["hook"](lost)
 
 
 def _raise_again(number: int) -> None:
@@ -142,8 +122,7 @@ def stoppable() -> Iterator[Callable[[], bool]]:
         reports.extend([True] * len(interrupts))
         return bool(reports)
 
-    handlers = {number: signal.getsignal(number) for number in _NUMBERS}
-    previous: dict[int, Any] = {number: handler for number, handler in handlers.items() if callable(handler)}
+    previous: dict[int, Any] = {n: handler for n in _NUMBERS if callable(handler := signal.getsignal(n))}
     for number in previous:
         signal.signal(number, later)
     try:

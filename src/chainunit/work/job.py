@@ -1,38 +1,34 @@
-"""Declares long work that is made in batches: how many points, which results, and the function that makes them."""
+"""Long work that is made in batches: points, results, the function that makes them, and the file of the results.
+
+One process writes the NetCDF file, batch by batch. Each value has its place in it from the begin, and the checksum of
+a batch is written after its values: a batch without the right checksum is missing. The bytes of the file follow from
+the job alone, and not from the order of the batches or the number of kills between them.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
-import re
-from collections.abc import Callable, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..core.quantities import base_units
+from .. import __version__
+from ..core.errors import InputError, WriteError
+from ..core.files import atomic_file, netcdf, writing
 
-Work: TypeAlias = Callable[[Any, int, int], Mapping[str, Any]]
-"""``work(task, begin, end)``: the results of the points from `begin` to `end` - 1, by the names of the result
-variables, each of shape (end - begin, ...); of a text variable a list of end - begin texts."""
+if TYPE_CHECKING:
+    import xarray as xr
+
 CHECKS = "batch_checksum"
-"""Name of the variable with the checksum of each batch in the store of a job."""
-BATCH = "batch"
-"""Name of its dimension."""
-DECLARATION = "declaration"
-"""Name of the variable with the digest of the declaration in the store of a job."""
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-
-
-@dataclass(frozen=True)
-class Coordinate:
-    """A dimension of a result beside the points, with its values, shape (n,)."""
-
-    name: str
-    values: tuple[float, ...]
-    unit: str
-    description: str
+"""Name of the variable with the checksum of each batch."""
+_FORMAT: Literal["NETCDF3_64BIT_DATA"] = "NETCDF3_64BIT_DATA"
+"""The classic format: a kill between two writes leaves all other values as they are."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +37,8 @@ class ResultVariable:
 
     Parameters
     ----------
-    name : a name as in Python; it is that of the variable in the store
     unit : as in `chainunit.core.quantities`
     dtype : a NumPy type of numbers: ``float64``, ``float32``, or an integer type
-    dims : names of the coordinates beside the points, in order
     flags : words for the integers 0, 1, ... of a variable that is a choice (CF: flag_values, flag_meanings)
     letters : the longest text [bytes in UTF-8] of a variable that is a text; a longer text is cut
     """
@@ -53,55 +47,41 @@ class ResultVariable:
     unit: str
     description: str
     dtype: str = "float64"
-    dims: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
     letters: int = 0
-
-    @property
-    def kind(self) -> np.dtype:
-        """The type of the stored values."""
-        return np.dtype("S1" if self.letters else self.dtype)
 
     @property
     def attributes(self) -> dict[str, Any]:
         """The attributes of the stored variable, by the CF conventions."""
         attributes: dict[str, Any] = {"units": self.unit, "long_name": self.description}
         if self.flags:
-            attributes["flag_values"] = np.arange(len(self.flags), dtype=self.kind)
+            attributes["flag_values"] = np.arange(len(self.flags), dtype=self.dtype)
             attributes["flag_meanings"] = " ".join(self.flags)
-        if self.letters:
-            attributes["_Encoding"] = "utf-8"
-        return attributes
+        return attributes | ({"_Encoding": "utf-8"} if self.letters else {})
+
+    def stored(self, values: Any) -> np.ndarray:
+        """The values of some points as they are stored, texts as bytes in UTF-8, shape (n, letters)."""
+        if not self.letters:
+            return np.asarray(values).astype(self.dtype, casting="same_kind")
+        # a longer text is cut between two characters
+        cut = [text.encode()[: self.letters].decode(errors="ignore").encode() for text in values]
+        return np.array(cut, f"S{self.letters}").reshape(-1, 1).view("S1")
 
 
 @dataclass(frozen=True)
 class Job:
     """Work on `points` points in batches of `batch`.
 
-    The store of a job is called by its `name` and the first digits of its `digest`; the `digest` must differ
-    where any result differs, the number of points apart. A store may grow: a job with more points goes on from
-    the batches of one with fewer.
-
     Parameters
     ----------
     name : begin of the file name of the store, in letters, digits and ``_``
     title : the work in words, for progress and messages
-    points : number of points
     batch : number of points of a batch. A batch should take a second
         or so: less than 0.1 s is lost in messages between processes, and a batch in work is lost at a kill
-    variables : the results of a point
-    work : the function that makes a batch; it is pickled by its name, so that it must be at the top of a module
-        that a worker can import. Each process calls it from one thread at a time
-    task : what `work` gets; it is pickled and sent once to each worker
-    digest : digest of everything on which the results depend, in hexadecimal digits
+    work : ``work(task, begin, end)`` gives the results of the points from `begin` to `end` - 1, by the names of the
+        `variables`, each of shape (end - begin,); of a text a list of texts. A worker must be able to import it
+    digest : digest of everything on which the results depend, the number of points apart, in hexadecimal digits
     dimension : name of the dimension of the points
-    coordinates : the dimensions beside it
-    close : function that releases what `work` keeps in its process from batch to batch; called at the end
-
-    Raises
-    ------
-    ValueError
-        for a declaration that no store can have.
     """
 
     name: str
@@ -109,60 +89,158 @@ class Job:
     points: int
     batch: int
     variables: Sequence[ResultVariable]
-    work: Work
+    work: Callable[[Any, int, int], Mapping[str, Any]]
     task: Any
     digest: str
     dimension: str = "point"
-    coordinates: Sequence[Coordinate] = ()
-    close: Callable[[], None] | None = None
-
-    def __post_init__(self) -> None:
-        if self.points < 0 or self.batch < 1:
-            raise ValueError(f"a job of {self.points} points in batches of {self.batch}")
-        names = [v.name for v in self.variables] + [c.name for c in self.coordinates]
-        names += [CHECKS, self.dimension, BATCH, DECLARATION]
-        wrong = [name for name in (self.name, *names) if not _NAME.fullmatch(name)]
-        if wrong or len(set(names)) < len(names):
-            raise ValueError(f"names of a job must be plain and differ: {wrong or names}")
-        for variable in self.variables:
-            base_units(variable.unit)
-            self.shape(variable)
-        if not re.fullmatch(r"[0-9a-f]{8,}", self.digest):
-            raise ValueError(f"digest {self.digest!r}: must be at least 8 hexadecimal digits")
 
     @property
     def store_name(self) -> str:
         """Name of the file that is the store."""
         return f"{self.name}_{self.digest[:12]}.nc"
 
-    def batches(self, points: int | None = None) -> int:
-        """The number of batches, of all points by default."""
-        return -(-(self.points if points is None else points) // self.batch)
-
-    def shape(self, variable: ResultVariable) -> tuple[int, ...]:
-        """The shape of a variable at one point."""
-        sizes = {each.name: len(each.values) for each in self.coordinates}
-        unknown = [name for name in variable.dims if name not in sizes]
-        if unknown or (variable.letters and variable.dims):
-            raise ValueError(f"{variable.name}: dimension {unknown or variable.dims} has no coordinate")
-        return (variable.letters,) if variable.letters else tuple(sizes[name] for name in variable.dims)
-
-    def dims(self, variable: ResultVariable) -> tuple[str, ...]:
-        """The names of the dimensions of a stored variable."""
-        return (self.dimension, *((f"{variable.name}_letter",) if variable.letters else variable.dims))
-
-    def layout(self) -> bytes:
+    @property
+    def layout(self) -> str:
         """A digest of the declaration of the results, without the number of points, in hexadecimal digits."""
-        variables = [
-            [v.name, v.unit, v.kind.str, self.dims(v), self.shape(v), v.flags] for v in self.variables
-        ]
-        axes = [[c.name, c.unit, list(c.values)] for c in self.coordinates]
-        text = json.dumps([self.digest, self.dimension, self.batch, variables, axes])
-        return hashlib.sha256(text.encode()).hexdigest().encode()
+        variables = [[v.name, v.unit, v.dtype, v.flags, v.letters] for v in self.variables]
+        text = json.dumps([self.digest, self.dimension, self.batch, variables])
+        return hashlib.sha256(text.encode()).hexdigest()
 
 
-def text_array(texts: Sequence[str], letters: int) -> np.ndarray:
-    """Texts as an array of their bytes in UTF-8, shape (n, letters), with zeros behind; a longer text is cut
-    between two characters."""
-    cut = [text.encode()[:letters].decode(errors="ignore").encode() for text in texts]
-    return np.array(cut, f"S{letters}").reshape(-1, 1).view("S1")
+class BatchStore:
+    """The store of a `job` in a folder, which is made where it is missing or has another declaration. One with fewer
+    points grows; one with more points keeps them.
+
+    Raises
+    ------
+    InputError
+        where its file is no regular one.
+    WriteError
+        where it cannot be written.
+    """
+
+    earlier_points = 0
+    """number of points that the store had before"""
+    damaged_batches = 0
+    """number of batches that the store had in part or with other bytes than were written"""
+
+    def __init__(self, job: Job, folder: Path) -> None:
+        self.job, self.file = job, folder / job.store_name
+        self._names = [v.name for v in job.variables]
+        earlier = 0
+        if self.file.exists():
+            if not self.file.is_file():
+                raise InputError(f"{self.file}: is not a regular file; remove it")
+            with contextlib.suppress(WriteError, AttributeError), self._opened() as stored:
+                if stored.declaration == job.layout:
+                    earlier = len(stored.dimensions[job.dimension])
+        self._points = max(job.points, earlier)
+        if self._points > earlier:
+            self._make(earlier)
+
+    def _make(self, earlier: int) -> None:
+        """Make the file for all points, with the whole batches of a smaller one with the `earlier` points."""
+        with atomic_file(self.file, is_result=False) as part, self._opened("w", part) as new:
+            new.set_fill_off()  # a batch that is not written has the checksum 0
+            self._declare(new)
+            if earlier:
+                with self._opened() as old:
+                    for batch in range(earlier // self.job.batch):
+                        for name in self._names:
+                            new[name][slice(*self.extent(batch))] = old[name][slice(*self.extent(batch))]
+                        new[CHECKS][batch] = old[CHECKS][batch]
+
+    def _declare(self, file: Any) -> None:
+        job = self.job
+        about = {"title": job.title, "source": f"chainunit {__version__}", "declaration": job.layout}
+        file.setncatts(about)
+        file.createDimension(job.dimension, self._points)
+        file.createDimension("batch", -(-self._points // job.batch))
+        for v in job.variables:
+            dims = [job.dimension] + ([f"{v.name}_letter"] if v.letters else [])
+            if v.letters:
+                file.createDimension(dims[1], v.letters)
+            file.createVariable(v.name, "S1" if v.letters else v.dtype, dims).setncatts(v.attributes)
+        about = {"units": "1", "long_name": "CRC-32 of the values of a batch"}
+        file.createVariable(CHECKS, "u4", ("batch",)).setncatts(about)
+        # the values as they are
+        file.set_auto_maskandscale(False)
+        file.set_auto_chartostring(False)
+
+    @contextlib.contextmanager
+    def _opened(self, mode: Literal["r", "r+", "w"] = "r", part: Path | None = None) -> Iterator[Any]:
+        from netCDF4 import Dataset
+
+        with writing(self.file), netcdf(), Dataset(part or self.file, mode, format=_FORMAT) as file:
+            file.set_auto_maskandscale(False)
+            file.set_auto_chartostring(False)
+            yield file
+
+    def extent(self, batch: int) -> tuple[int, int]:
+        """The first point of a batch, and the first one of the next."""
+        begin = batch * self.job.batch
+        return begin, min(begin + self.job.batch, self._points)
+
+    def size(self, batch: int) -> int:
+        """The number of points of a batch that the job asks for."""
+        begin, end = self.extent(batch)
+        return min(end, self.job.points) - begin
+
+    def missing(self, progress: Callable[[int], None]) -> list[int]:
+        """The batches of the job that the store does not have. `progress` is called with the number of points that
+        are complete."""
+        gaps = []
+        with self._opened() as file:
+            marks = file[CHECKS][:]
+            for batch in range(-(-self.job.points // self.job.batch)):
+                if marks[batch] and marks[batch] == self._mark(file, batch):
+                    self.earlier_points += self.size(batch)
+                    if batch % 1000 == 999:
+                        progress(self.earlier_points)
+                else:
+                    gaps.append(batch)
+                    self.damaged_batches += bool(marks[batch])
+        progress(self.earlier_points)
+        return gaps
+
+    def _mark(self, file: Any, batch: int) -> int:
+        """The checksum of a batch: of the declaration, the extent of the batch, and its values as they are stored."""
+        begin, end = self.extent(batch)
+        check = zlib.crc32(f"{self.job.layout}{begin, end}".encode())
+        for name in self._names:
+            check = zlib.crc32(np.ascontiguousarray(file[name][begin:end]).tobytes(), check)
+        return check
+
+    def write(self, batch: int, results: Mapping[str, Any]) -> None:
+        """Write the results of a batch, and then its checksum.
+
+        Raises
+        ------
+        WriteError
+            where the file cannot be written.
+        """
+        begin, end = self.extent(batch)
+        with self._opened("r+") as file:
+            for v in self.job.variables:
+                self._put(file, v.name, slice(begin, end), v.stored(results[v.name]))
+            self._put(file, CHECKS, batch, np.uint32(self._mark(file, batch)))
+
+    def _put(self, file: Any, name: str, place: slice | int, values: Any) -> None:
+        file[name][place] = values
+        file.sync()
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The points of the job, with texts as str, opened lazily: a variable is read when its values are used."""
+        import xarray as xr
+
+        with netcdf():
+            dataset = xr.open_dataset(self.file, engine="netcdf4", decode_times=False, cache=False)
+        dataset.attrs["points"] = self.job.points
+        return dataset[self._names].isel({self.job.dimension: slice(0, self.job.points)})
+
+
+def made_anew(batches: int, points: str, store: str) -> str:
+    """Words on damaged batches of a store."""
+    noun, verb = ("batch", "was") if batches == 1 else ("batches", "were")
+    return f"{batches} {noun} of {points} in {store} {verb} damaged, and {verb} computed anew"

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from chainunit.core.files import ResultKind
 from chainunit.report.command_options import OutputFolder
 from chainunit.report.console import carry_out, study_file
+from chainunit.report.result_kind import ResultKind
 
 
 def pin_life(

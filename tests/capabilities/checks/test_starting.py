@@ -3,15 +3,20 @@ directions, and a study."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
 
+from chainunit.capabilities.checks import starting
 from chainunit.capabilities.checks.starting import starting_rows
+from chainunit.capabilities.checks.tables import StartingTable
+from chainunit.drives.catalogue import catalogue
 from chainunit.study.config import parse
 from chainunit.study.permitted_starts import StartingData, permitted_starts, start_torques
 
@@ -77,6 +82,35 @@ def test_a_motor_at_its_rated_current_may_not_start_again():
     assert row(current=6.2).limit == 0.0 and not row(current=6.2).holds
     # a load that drives takes no share
     assert start_torques(np.array([0.0, 1.0]), np.ones(2), np.array([0.0, 10.0]), 1.0)[1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("inertia", "start", "words"),
+    [
+        (
+            4.30,
+            "star-delta",
+            "1.96 kg m² beside its rotor up to speed, twice from cold",
+        ),
+        (4.30, "direct", "4.28 kg m², more: ask the maker of the motor"),
+        (1.90, "direct", "1.88 kg m², within it"),
+        (4.30, "soft", ""),
+    ],
+)
+def test_the_inertia_that_a_standard_has_every_motor_start(monkeypatch, inertia, start, words):
+    """An 11 kW motor of 4 poles starts 1.96 kg m2 by IEC 60034-12: 0.04 11^0.9 2^2.5; a crusher has 4.3 kg m2, and
+    the sheet said nothing."""
+    plate = next(m.nameplate for m in catalogue() if m.designation == "IE3 4-pole 11 kW, 160M")
+    flywheel, rotor = 0.01, SimpleNamespace(J=plate.J + 0.01)
+    study = SimpleNamespace(
+        drive=SimpleNamespace(foreign=None, fmu_parameters=SimpleNamespace(rotor=rotor)),
+        plate=SimpleNamespace(nameplate=dataclasses.replace(plate, starts=0.0)),
+        config=SimpleNamespace(drive=SimpleNamespace(start=start)),
+        steady=None,
+    )
+    monkeypatch.setattr(starting, "load_inertia", lambda drive, run: np.full(3, inertia - 0.02 - flywheel))
+    why = starting._why_none(study, StartingTable(), 2.0)
+    assert words in why and ("IEC 60034-12" in why) == bool(words)
 
 
 # -- a study

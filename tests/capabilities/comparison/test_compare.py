@@ -248,12 +248,15 @@ def test_a_measure_of_one_alone_and_other_units(folder, tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (None, "there: has no result (No such file or directory); make it by chainunit study -o there"),
+        (
+            None,
+            "there: has no result (No such file or directory); make it by a run of the study into this folder",
+        ),
         ("{", "result.json: is no result of a study ("),
         ('{"answers": {"steady": NaN}}', "is no result of a study (NaN is no number of JSON)"),
         ("[" * 100_000, "is no result of a study ("),
-        ("[]", "is no result of a study; chainunit study writes result.json"),
-        ('{"answers": []}', "is no result of a study; chainunit study writes result.json"),
+        ("[]", "is no result of a study; a run into a folder writes result.json"),
+        ('{"answers": []}', "is no result of a study; a run into a folder writes result.json"),
         ("\x00\xff", "is no result of a study ("),
     ],
 )

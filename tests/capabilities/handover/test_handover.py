@@ -18,7 +18,7 @@ from chainunit.capabilities.handover.page import HandoverQuestion, hand_over, sa
 from chainunit.capabilities.handover.shell import LONGEST, _element, environment
 from chainunit.capabilities.handover.template import ROOT, elements
 
-pytestmark = pytest.mark.second
+pytestmark = pytest.mark.slow
 
 TEMPLATE = json.loads((Path(__file__).parents[2] / "data" / "idta_02021.json").read_text("utf-8"))
 LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,7 +28,7 @@ from chainunit.recordings.inspection import inspect_runs
 from chainunit.recordings.plant import Plant
 from chainunit.recordings.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.recordings.recording import Recording
-from chainunit.recordings.residuals import residual_tests, sensor_conflicts
+from chainunit.recordings.residuals import describes, residual_tests, sensor_conflicts
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 
@@ -191,9 +192,16 @@ def test_a_wrong_gear_strains_the_clock(loaded):
     """With a mark on the crank and a speed of the motor, a gear that is off by 2 % looks as a clock that is."""
     recording = without(loaded, "motor.count")
     right = problem_of(recording)
-    assert sensor_conflicts(right, fit(right)) == []
+    best = fit(right)
+    assert sensor_conflicts(right, best) == [] and describes(right, best, residual_tests(best))
+    assert not describes(right, replace(best, is_ended=False), residual_tests(best))
     wrong = problem_of(recording, ratio=51.0)
-    (drift,) = [each for each in sensor_conflicts(wrong, fit(wrong)) if each.name == "run0.drift"]
+    best = fit(wrong)
+    conflicts = sensor_conflicts(wrong, best)
+    assert not describes(wrong, best, residual_tests(best))
+    assert not describes(wrong, best, residual_tests(best), [conflict.name for conflict in conflicts[1:]])
+    assert describes(wrong, best, [], [conflict.name for conflict in conflicts])
+    (drift,) = [each for each in conflicts if each.name == "run0.drift"]
     assert abs(drift.deviations) > 50.0 and drift.value == pytest.approx(5e-5 * drift.deviations)
 
 

@@ -6,6 +6,8 @@ import json
 import math
 import re
 import tomllib
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,10 +16,12 @@ from command import chainunit
 from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError, Study
-from chainunit.capabilities.identification import identification
+from chainunit.capabilities.identification import identification, suspects
 from chainunit.capabilities.identification import page as report
 from chainunit.capabilities.identification.result import _number, identified_tables, sentences
+from chainunit.capabilities.identification.study_method import IdentificationResult
 from chainunit.capabilities.watch.false_loads import false_loads
+from chainunit.core.errors import InterruptedRunError
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
 from chainunit.reading.results import as_data
@@ -25,11 +29,12 @@ from chainunit.recordings import fit as fitting
 from chainunit.recordings.measurands import MEASURANDS
 from chainunit.recordings.unknown import Unknown
 from chainunit.report import blocks
+from chainunit.report.console import Forecast, carry_out
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
 from chainunit.system import Profile
 
-pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 FILE = """
 title = "A mill"
 [motor]
@@ -100,6 +105,7 @@ def write(
     np.savetxt(folder / name, table, "%.7g", ",", header=",".join(names), comments="")
 
 
+RECORDED = Path(__file__).parents[3] / "examples" / "identification"
 COLUMNS = 'columns = { "motor.i" = "I_A", "motor.w" = "n" }\n'
 
 
@@ -323,6 +329,80 @@ def test_a_wrong_crank_is_recognised(tmp_path):
     assert "machine.r" in suspects and not any("smooth" in name for name in suspects)
     first = result["suspects"][0]
     assert first["describes"] and first["suspects"][0]["known"]["value"] == 0.16
+
+
+@pytest.fixture
+def wrong_gain(tmp_path, monkeypatch):
+    """The packaged recordings, with a gain of the converter that is not the recorded one. The sensor of the current
+    makes up for it in part by a gain of its own. Only two known numbers are doubted."""
+    doubted, numbers = ("motor.speed_control.kp", "motor.rotor.J"), suspects.known_numbers
+    monkeypatch.setattr(
+        suspects, "known_numbers", lambda *args: [u for u in numbers(*args) if u.name in doubted]
+    )
+    text = (RECORDED / "mill.toml").read_text("utf-8").replace("kp = 0.1017", "kp = 0.06")
+    for name in ("loaded.csv.gz", "empty.csv.gz"):
+        text = text.replace(f'"{name}"', f'"{(RECORDED / name).as_posix()}"\nend = "20 s"')
+    (tmp_path / "mine.toml").write_text(text.partition("[watch")[0], "utf-8")
+    return tmp_path / "mine.toml"
+
+
+def test_one_cause_is_named_and_its_search_has_a_forecast(wrong_gain):
+    """The number that explains the recordings alone, and not the sensor that made up for it. The search for it
+    reports its steps, so that a forecast is made like that of other long work."""
+    reports = list[tuple[str, float, float]]()
+    found = Study.from_file(wrong_gain).identify(progress=lambda *report: reports.append(report))
+    assert [conflict.name for conflict in found.found.prior_conflicts] == ["gain(motor.i)"]
+    (cause,) = found.warnings
+    assert re.match(
+        r"The model describes the recordings with motor[.]speed_control[.]kp = 0[.](099|10)", cause
+    )
+    of_search = [report for report in reports if report[0].startswith("suspects, at most")]
+    shares = [complete / total for _, complete, total in of_search]
+    assert shares == sorted(shares) and len(set(shares)) > 5 and 0.0 == shares[0] < shares[-1] <= 1.0
+    # a step takes six seconds: after the first one the forecast is near that of all steps
+    forecast = Forecast()
+    texts = [
+        forecast.words(6.0 * share * report[2], *report)
+        for share, report in zip(shares, of_search, strict=True)
+    ]
+    (text,) = filter(None, texts)
+    assert texts.index(text) == 1 and re.fullmatch(
+        r"About 2 min more: suspects, at most 23 steps \(.*\)[.]", text
+    )
+
+
+def test_an_interrupted_search_for_suspects_leaves_the_fit(wrong_gain, monkeypatch, capsys):
+    """The command says that the search was not finished, writes the files, and ends with the status of Ctrl-C; in
+    Python the result is that of the fit, too."""
+    computed = list[identification.IdentifiedMachine]()
+
+    def interrupted(what, complete, total):
+        if what.startswith("suspects"):
+            raise KeyboardInterrupt
+
+    def once(config, folder, progress, **options):
+        if not computed:
+            computed.append(identification.identify(config, interrupted))
+        return computed[0]
+
+    monkeypatch.setattr(report, "TASK", replace(report.TASK, compute=once))
+    monkeypatch.setattr(IdentificationResult, "_task", report.TASK)
+    with pytest.raises(InterruptedRunError, match="search for suspects was interrupted") as ended:
+        Study.from_file(wrong_gain).identify()
+    (note,) = [text for text in ended.value.partial.warnings if "search for suspects" in text]
+    assert note == (
+        "The search for suspects was interrupted, and none are named; identify again to name them."
+    )
+    assert not ended.value.partial.is_described and len(ended.value.partial.answers) == 16
+    folder = wrong_gain.parent / "out"
+    with pytest.raises(SystemExit) as end:
+        carry_out(report.TASK, study_files.load(wrong_gain), folder, whole=True)
+    assert end.value.code == 130
+    shown = capsys.readouterr()
+    assert "The search for suspects was interrupted" in shown.out
+    assert "The run stopped early: the search for suspects was interrupted" in shown.err
+    result = json.loads((folder / "result.json").read_text("utf-8"))
+    assert result["fit"]["is_ended"] and result["suspects"] == [] and "was interrupted" in result["status"]
 
 
 def test_a_fit_without_an_end(tmp_path, monkeypatch):

@@ -161,10 +161,10 @@ def earlier(tmp_path_factory):
         (["DcMotor", "--pairs", "w_ref"], '--pairs "w_ref": must be INPUT:OUTPUT'),
         (["DcMotor", "--pairs", "w_ref:v_ref"], '"v_ref": no such output'),
         (["DcMotor", "--pairs", "wref:w"], '"wref": no such input'),
-        (["DcMotor", "--at", "w=3 kg"], "--at: w"),
+        (["DcMotor", "--at", "w=3 kg"], "at: w"),
         (["nothing.toml"], "nothing.toml: cannot be read"),
         (["Motor"], "Motor: no such model"),
-        (["DcMotor", "--inverse"], "--inverse: is of linkage files"),
+        (["DcMotor", "--inverse"], "inverse: is of linkage files"),
     ],
 )
 def test_a_refusal_has_status_2_and_leaves_the_files(earlier, arguments, words):

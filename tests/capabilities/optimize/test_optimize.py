@@ -30,7 +30,7 @@ from chainunit.capabilities.optimize.search import Search
 from chainunit.capabilities.optimize.table import wishes_of
 from chainunit.capabilities.optimize.wishes import TurnLimit
 from chainunit.capabilities.optimize.words import bindings, conflict_sentences
-from chainunit.core import ledger
+from chainunit.core.files import LIST
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
@@ -616,7 +616,7 @@ def test_the_command(tmp_path, best):
     words = " ".join(done.stdout.split())
     assert "The best machine has r 0.17522 m (today 0.15000 m), h" in words and "crank.s -0.264" in words
     folder = tmp_path / "out" / "deep"
-    names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", ledger.NAME, *OF_STUDY}
+    names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", LIST, *OF_STUDY}
     assert {file.name for file in folder.iterdir()} == names
     result = json.loads((folder / "result.json").read_text("utf-8"))
     assert result["quantities"]["peak(crank_torque)"]["best"]["value"] == pytest.approx(

@@ -43,7 +43,7 @@ from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
-from chainunit.work.job import CHECKS, DECLARATION
+from chainunit.work.job import CHECKS
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 RUNS = 50
@@ -113,7 +113,7 @@ def vanish(process):
 def opened(folder):
     """The results in a folder."""
     (store,) = folder.glob("monte_carlo_*.nc")
-    dataset = xr.open_dataset(store).drop_vars([CHECKS, DECLARATION])
+    dataset = xr.open_dataset(store).drop_vars(CHECKS)
     return monte_carlo.MonteCarloResult(dataset.load(), store, "cs")
 
 
@@ -173,14 +173,14 @@ def task_by(config):
     return random_task(config, Drive(DcMotor, config.motor.parameters, config.machine), {}, 1.0)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_killed_study_goes_on_from_what_it_saved(killed):
     folder, done, message = killed
     assert 0 < done < 4 and f"resumed {16 * (done - 1)} 1" in message
     assert opened(folder).runs == RUNS
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path):
     """In this process, from the first to the last run: the bytes of every file are the same."""
     folder, _, _ = killed
@@ -195,7 +195,7 @@ def branches(task, simulation, *drawn):
     return list(system.runs([point(task, each) for each in drawn]))
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_run_is_what_its_number_says(killed):
     """Run again here, in this process, in another order."""
     task, results = task_of(killed[0]), opened(killed[0]).dataset
@@ -213,7 +213,7 @@ def test_a_run_is_what_its_number_says(killed):
             assert {name: float(run[name]) for name in got} == got
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_store_says_what_its_numbers_are(killed):
     results = opened(killed[0]).dataset
     assert results["side"].attrs["flag_meanings"] == "none left right"
@@ -223,7 +223,7 @@ def test_the_store_says_what_its_numbers_are(killed):
         assert results[v.name].attrs == {"units": v.unit, "long_name": v.description}
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_answers_hang_together(killed):
     result = opened(killed[0])
     runs = result.dataset
@@ -238,7 +238,7 @@ def test_answers_hang_together(killed):
     assert share["unit"] == "1" and share["low"]["value"] < share["value"] < share["high"]["value"]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_quantiles_have_intervals_or_are_left_out(killed):
     """Of the few runs the median is told, of 100 like them the 5 % and 95 % quantiles, too, of 400 all."""
     few = opened(killed[0]).dataset
@@ -310,7 +310,7 @@ def test_lumps_come_on_both_sides_alike_often_and_by_the_seed():
     assert [d.event.side for d in drawn[:50]] != sides
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_lumps_come_anywhere_in_a_turn(killed):
     angles = sorted(opened(killed[0]).values("crank_angle"))
     gaps = [b - a for a, b in zip(angles, [*angles[1:], angles[0] + 2.0 * math.pi], strict=True)]
@@ -319,7 +319,7 @@ def test_lumps_come_anywhere_in_a_turn(killed):
     assert max(gaps) < 2.0 * math.pi * (math.log(n) + 3.0) / n
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_what_the_numbers_depend_on_is_in_the_name(killed):
     folder, _, _ = killed
     task = task_of(folder)
@@ -334,7 +334,7 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
     assert task_of(folder, runs=20).digest() == digest
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     """Its numbers are missing, its event and the reason are kept, and the runs after it are the same."""
     task, good = task_of(killed[0], runs=5), block_runs.follow
@@ -358,7 +358,7 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     assert result.quantiles["crank_torque_peak"] == {}
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
     (store,) = killed[0].glob("monte_carlo_*.nc")
     copy = Path(shutil.copy(store, tmp_path))
@@ -370,7 +370,7 @@ def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
     assert reports == [(0, 50), (48, 50), (50, 50)] and copy.read_bytes() == store.read_bytes()
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp_path):
     """A parcel that has come over a wire holds all that a run needs."""
     parcel = monte_carlo.Parcel.of(task_of(killed[0]))
@@ -386,7 +386,7 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
         np.testing.assert_array_equal(runs[name], wanted[name])
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_scheduler_is_asked_before_any_run(tmp_path):
     pytest.importorskip("distributed")
     with socket.socket() as taken:
@@ -410,7 +410,7 @@ def test_processes_leave_nothing_behind(end, tmp_path):
     scratch.mkdir()
     running = start(tmp_path, 18 if end is None else 10_000, env=os.environ | {"TMPDIR": str(scratch)})
     if end is not None:
-        while not finished(tmp_path) or len(list(scratch.glob("chainunit*"))) < 4:
+        while not finished(tmp_path) or len(list(scratch.rglob("chainunit_fmu_*"))) < 4:
             assert running.poll() is None
             time.sleep(0.02)
         os.killpg(running.pid, end)
@@ -435,7 +435,7 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     assert notes["runs made anew"] == {"text": words}
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_question_and_answer_tell_of_random_overloads(tmp_path):
     """A coupling that opens in most runs is a warning, not a number in a table alone."""
     (tmp_path / "study.toml").write_text("event = []\n" + STUDY.format(runs=6))
@@ -494,7 +494,7 @@ def compiled_task(text, folder=None, runs=6):
     return random_task(config, drive, files, 1.2)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     "text", [STUDY, BLOCKED, MOTOR + STUDY, CHAIN + STUDY], ids="bars blocked induction chains".split()
@@ -519,7 +519,7 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
             assert x == b[name] or abs(x - b[name]) < 1e-3 * max(abs(b[name]), 0.1), (name, x, b[name])
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize(
     "text, fed_from",

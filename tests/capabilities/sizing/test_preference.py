@@ -34,15 +34,15 @@ from chainunit.drives.gear_ratios import (
     ratio_on_offer,
     typical_efficiency,
 )
-from chainunit.drives.gearing import START_FACTOR, ordered_torque
-from chainunit.drives.service_factor import belt_factor, gear_factor, load_class
+from chainunit.drives.gearing import START_FACTOR
+from chainunit.drives.service_factor import LOAD_CLASSES, belt_factor, gear_factor, load_class
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number
 from chainunit.study.catalogue_drive import gear_with
 from chainunit.study.choice import drive_of
-from chainunit.study.config import parse
+from chainunit.study.config import load, parse
 from chainunit.study.limits import Check
-from chainunit.study.relay import HEAVIER, start_class
+from chainunit.study.relay import HEAVIER, class_holding, start_seconds
 from chainunit.study.rig import Rig
 from chainunit.study.start_runs import exceeded_for, starts_from_all, time_above
 
@@ -196,6 +196,30 @@ def test_service_factors_of_gears_and_belts():
     )
     assert belt_factor("moderate", 12.0, is_on_line=True) == 1.3
     assert belt_factor("heavy", 24.0, is_on_line=False) == 1.4
+    # a reader multiplies by the factor that is printed: 684 N m times 1.2 was 825 N m, as 1.204 was meant
+    assert gear_factor("uniform", 24.0, 6.0) == 1.2 and gear_factor("moderate", 16.0, 10.0) == 1.31
+
+
+def test_the_tables_of_service_factors_are_those_of_the_page():
+    """Crushers had the factor of hammer mills: 1.2 in place of 1.3."""
+    page = (Path(__file__).parents[3] / "docs" / "drives.md").read_text("utf-8")
+    tables = page.partition("### The service factor")[2].partition("###")[0]
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in tables.splitlines()
+        if line[:1] == "|"
+    ]
+    gear = {name: row[1:] for row in rows if len(row) == 4 for name in row[0].split(", ")}
+    belt = {row[0]: row[2:] for row in rows if len(row) == 8}
+    for name in LOAD_CLASSES:
+        assert [f"{gear_factor(name, hours, 0.0):.1f}" for hours in (8.0, 16.0, 24.0)] == gear[name]
+        factors = [
+            belt_factor(name, h, is_on_line=line) for line in (False, True) for h in (10.0, 16.0, 24.0)
+        ]
+        assert [f"{factor:.1f}" for factor in factors] == belt[name]
+    crusher = load(Path(__file__).parents[2] / "data" / "duties" / "jawdrive.toml")
+    assert crusher.plans["sizing"].belt_factor(20.0, "star-delta") == 1.4
+    assert "V-belt for 154 kW" in page and "belt 5.3 for 154 kW" in page
 
 
 def test_the_service_factor_of_a_study_file():
@@ -302,7 +326,7 @@ def test_the_class_of_a_start_by_hand():
         (7.2, 9.1, HEAVIER),
     ):
         time = np.linspace(0.0, seconds, 101)
-        assert start_class(time, np.full(101, 3.0 * current), 3.0) == wanted
+        assert class_holding(start_seconds(time, np.full(101, 3.0 * current), 3.0)) == wanted
 
 
 # -- the order
@@ -606,7 +630,7 @@ def check_order(config, first, name, tmp_path, monkeypatch, *motors, more=""):
     that the start takes nearly wholly."""
     best = first.chosen_candidate
     start = max(each.quasi_static for each in starts_from_all(Rig(config.operation, best.drive, None), 3.0))
-    order = ordered_torque(max(best.trial.duty.torque / 0.9, start / START_FACTOR))
+    order = max(best.trial.duty.torque / 0.9, start / START_FACTOR)
     for factor in (START_FACTOR, start / order / 0.97):
         lines = f"{more}[gear]\ntorque_limit = {order}\nstart_factor = {factor}\n"
         _, result = sized(name, tmp_path, monkeypatch, *motors, more=lines, candidates=float(len(motors)))

@@ -251,7 +251,7 @@ def scipy_rms(study, inertia, terms):
 
 
 @pytest.mark.compiler
-@pytest.mark.second
+@pytest.mark.slow
 def test_an_integration_with_scipy_has_the_same_rms_torques(given):
     findings = StaticInertiaFindings.of_study(given)
     mean, w0 = findings.inertia.mean, findings.speed
@@ -390,7 +390,7 @@ def shaper(tmp_path_factory):
 
 
 @pytest.mark.compiler
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_that_one_inertia_makes_too_small_is_told_with_what_it_misses(shaper):
     findings = StaticInertiaFindings.of_study(shaper)
     choice = findings.choice
@@ -408,7 +408,7 @@ def test_a_motor_that_one_inertia_makes_too_small_is_told_with_what_it_misses(sh
 
 
 @pytest.mark.compiler
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_trial_in_the_machine_is_a_study_of_that_motor(shaper, tmp_path):
     """Another study, whose file names the other motor, finds the same temperature."""
     choice = StaticInertiaFindings.of_study(shaper).choice
@@ -423,7 +423,7 @@ def test_the_trial_in_the_machine_is_a_study_of_that_motor(shaper, tmp_path):
 
 
 @pytest.mark.compiler
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_search_that_fails_leaves_the_rest(shaper):
     words = trial_words(
         dataclasses.replace(
@@ -450,7 +450,7 @@ def test_machines_without_an_inertia_of_their_angle_say_so():
     assert obstacle(chains) == "the inertia of the machine does not belong to its angle alone"
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.compiler
 def test_runs_that_fail_are_told_and_leave_the_study(monkeypatch, tmp_path):
     def fails(*_):

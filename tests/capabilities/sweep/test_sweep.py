@@ -36,7 +36,7 @@ from chainunit.capabilities.sweep.plan import SweptParameter
 from chainunit.capabilities.sweep.shares import shares_of_points, shares_on_grid
 from chainunit.capabilities.sweep.summary import _correlation
 from chainunit.core.errors import InputError as Refusal
-from chainunit.core.ledger import Ledger
+from chainunit.core.files import FileList
 from chainunit.core.native.compilers import compiler
 from chainunit.core.quantities import Quantity, Variable
 from chainunit.reading.results import as_data
@@ -48,7 +48,7 @@ from chainunit.study.cycle import cycle
 from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
 from chainunit.study.verdict import two_bars
-from chainunit.work.store import made_anew
+from chainunit.work.job import made_anew
 
 HERE = Path(__file__).parents[2]
 NATIVE = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -860,7 +860,7 @@ def test_the_command(tmp_path):
     # a picture of an earlier run
     old = tmp_path / "map" / "sweep_of_old.png"
     old.write_bytes(b"")
-    Ledger(old.parent).add(old, old)
+    FileList(old.parent).add(old, old)
     (store,) = (tmp_path / "map").glob("sweep_*.nc")
     before = store.stat().st_mtime_ns
     assert chainunit("sweep", "map.toml", "-o", "map", cwd=tmp_path).returncode == 0
@@ -929,7 +929,7 @@ def test_a_refused_sweep_leaves_nothing(tmp_path):
 
         threading.Thread(target=answer, daemon=True).start()
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        with pytest.raises(InputError, match="answers, but is no Dask scheduler"):
+        with pytest.raises(InputError, match="does not answer as a Dask scheduler"):
             study.sweep(tmp_path / "out", scheduler=address)
         # it ends the thread
         server.shutdown(socket.SHUT_RDWR)

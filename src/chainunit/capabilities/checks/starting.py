@@ -5,7 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
+from ...drives.nameplate import Nameplate
+from ...reading.text import number
 from ...study.permitted_starts import PermittedStarts, permitted_starts, starting_data
+from ...study.readings import load_inertia
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
 from .row import CheckRow, NotChecked
@@ -72,7 +77,22 @@ def _why_none(study: StudyRecord, table: StartingTable, asked: float) -> str:
     if not asked:
         return "the file does not say how many; add [starting] with per_hour"
     if not table.permitted and not study.plate.nameplate.starts:
-        return "the catalogue gives no permitted starts of the bare rotor; add [starting] with permitted"
+        why = "the catalogue gives no permitted starts of the bare rotor; add [starting] with permitted"
+        return why + _by_standard(study, study.plate.nameplate)
     if study.start is None or study.start.start_time is None:
         return "the motor does not come to its speed"
     return ""
+
+
+def _by_standard(study: StudyRecord, plate: Nameplate) -> str:
+    """The inertia at the motor's shaft beside the one that IEC 60034-12 demands of a motor of design N at 50 Hz, in
+    words: 0.04 P^0.9 p^2.5, with P in kW and p pairs of poles. Empty for another start or frequency."""
+    if study.config.drive.start not in ("direct", "star-delta") or plate.frequency != 50.0:
+        return ""
+    inertia = np.mean(load_inertia(study.drive, study.steady)) + study.drive.fmu_parameters.rotor.J - plate.J
+    most = 0.04 * (plate.power / 1e3) ** 0.9 * (plate.poles / 2.0) ** 2.5
+    verdict = "within it" if inertia <= most else "more: ask the maker of the motor"
+    return (
+        f". IEC 60034-12 demands of a motor of design N that it brings {number(most, 'kg.m2')} beside its rotor up "
+        f"to speed, twice from cold or once from hot; the machine has {number(float(inertia), 'kg.m2')}, {verdict}"
+    )

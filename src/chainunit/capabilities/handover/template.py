@@ -46,11 +46,6 @@ class TemplateElement(NamedTuple):
         """Whether there may be several."""
         return self.cardinality.endswith("Many")
 
-    @property
-    def is_required(self) -> bool:
-        """Whether there must be one."""
-        return self.cardinality.startswith("One")
-
 
 @cache
 def elements() -> Mapping[str, TemplateElement]:

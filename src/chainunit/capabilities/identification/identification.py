@@ -10,12 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.brief import briefly_shown
-from ...core.errors import Faults, InputError
+from ...core.errors import Faults, InputError, InterruptedRunError
 from ...drives.induction_motor import InductionMotor
 from ...recordings.fit import MOST_ROUNDS, Fit, fit
-from ...recordings.inspection import (
-    inspect_runs,
-)
+from ...recordings.inspection import inspect_runs
 from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_offset
 from ...recordings.problem import Comparison, Problem, RecordedRun, Sensor
 from ...recordings.recorded_drive import check_motor_is_known, is_of_shaft, plant_for
@@ -38,7 +36,7 @@ from ...work.progress import TaskProgress, quiet
 from .information import Combination, Information, information
 from .posterior import Posterior, posterior
 from .reading import IdentificationPlan, PlannedRun
-from .suspects import KnownNumbers, known_number_tests, suspect_sets
+from .suspects import KnownNumbers, is_described, known_number_tests, suspect_sets
 
 CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
 """Gains of the control of a motor, of which the course of its current depends."""
@@ -85,6 +83,7 @@ class IdentifiedMachine:
     `information_at_start` is the information of the runs at the start values, with further runs in order;
     `information_at_fit` the same at the fitted values. `best` are the normal equations there, `posterior` is the
     distribution of the sought numbers around them, and `known` has the tests of known numbers with the suspects.
+    There is a `failure` if the search for suspects was interrupted.
     """
 
     config: Config
@@ -96,6 +95,7 @@ class IdentifiedMachine:
     information_at_fit: Information
     residual_tests: tuple[ResidualTest, ...]
     known: KnownNumbers
+    failure: InterruptedRunError | None = None
 
     @property
     def estimates(self) -> dict[str, FittedNumber]:
@@ -103,21 +103,21 @@ class IdentifiedMachine:
         marginals = zip(self.plan.sought, self.best.z, self.posterior.marginals, strict=False)
         if not self.is_described:
             return {
-                own.name: FittedNumber(own, float(x), own.start, own.prior_deviation, *own.interval, False)
-                for own, x, _ in marginals
+                u.name: FittedNumber(u, float(x), u.start, u.prior_deviation, *u.interval, False)
+                for u, x, _ in marginals
             }
-        determined = {each.name: each.is_determined for each in self.information_at_fit.determinations}
+        determined = {d.name: d.is_determined for d in self.information_at_fit.determinations}
         return {
-            own.name: FittedNumber(
-                own,
+            u.name: FittedNumber(
+                u,
                 float(x),
-                each.value,
-                each.deviation,
-                each.low,
-                each.high,
-                determined[each.name] and not _bound_of(own, float(x)),
+                m.value,
+                m.deviation,
+                m.low,
+                m.high,
+                determined[m.name] and not _bound_of(u, float(x)),
             )
-            for own, x, each in marginals
+            for u, x, m in marginals
         }
 
     @property
@@ -130,11 +130,8 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the fit ended, the residuals may be noise, clocks, sensors and known numbers are as they are known,
-        and no bound is active."""
-        if not self.best.is_ended or self.prior_conflicts or self.posterior.active_bounds:
-            return False
-        return not self.known.are_rejected and all(test.is_noise for test in self.residual_tests)
+        """Whether the model describes the recordings, see `suspects.is_described`."""
+        return is_described(self.problem, self.best, self.residual_tests, self.posterior, self.known)
 
     @property
     def prior_conflicts(self) -> list[PriorConflict]:
@@ -223,18 +220,16 @@ def identify(
     progress("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False, at=best)
     around = posterior(problem, best, workers, plan.seed)
-    known, residuals = known_number_tests(problem, best, workers), tuple(residual_tests(best))
-    machine = IdentifiedMachine(config, plan, problem, before, best, around, after, residuals, known)
+    numbers, residuals = known_number_tests(problem, best, workers), tuple(residual_tests(best))
+    machine = IdentifiedMachine(config, plan, problem, before, best, around, after, residuals, numbers)
     if machine.is_described:
         return machine
-    sets = suspect_sets(
-        problem,
-        best,
-        workers,
-        tuned_gains(config.motor, config.file.given),
-        lambda names: progress(f"other {names}", 0.97, 1.0),
-    )
-    return replace(machine, known=replace(known, sets=sets))
+    assumed = tuned_gains(config.motor, config.file.given)
+    try:
+        sets = suspect_sets(problem, best, workers, assumed, progress)
+        return replace(machine, known=replace(numbers, sets=sets))
+    except KeyboardInterrupt:
+        return replace(machine, failure=InterruptedRunError("the search for suspects was interrupted"))
 
 
 def tuned_gains(motor: Any, keys: Set[str]) -> list[str]:

@@ -41,6 +41,7 @@ def identification_report(machine: IdentifiedMachine) -> b.Report:
                 b.Section("runs", "Recordings and sensors", tuple(_runs(s))),
             ),
             source=s.line("Study file: {source} · chainunit {chainunit}"),
+            failure=str(machine.failure or ""),
             units=config.units,
             opening_title="The answer",
             status=result["status"],
@@ -71,6 +72,7 @@ TASK: Task[Config, IdentifiedMachine] = Task(
     files=(FILE, "course_*.png"),
     writers=_writers,
     content=IdentificationSummary,
+    failure=lambda machine: machine.failure,
     shortfall=lambda machine: None if machine.is_described else "",
 )
 

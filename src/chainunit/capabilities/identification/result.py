@@ -164,7 +164,8 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
     return IdentificationSummary(
         heading=Heading.of(machine.config.title, machine.config.file),
         is_described=machine.is_described,
-        status="complete" if machine.is_described else "the model does not describe the recordings",
+        status=("complete" if machine.is_described else "the model does not describe the recordings")
+        + (f"; {machine.failure}" if machine.failure else ""),
         sought=len(estimates),
         told=sum(each.is_determined for each in estimates.values()),
         runs={run.name: _run(machine, k) for k, run in enumerate(machine.plan.runs)},
@@ -306,28 +307,31 @@ def sentence_before_fit(plan: IdentificationPlan, before: Information) -> str:
 def sentences(machine: IdentifiedMachine) -> list[str]:
     """Sentences that judge an identification."""
     active_bounds = machine.posterior.active_bounds
-    words = list[str]()
+    lines = list[str]()
     if not machine.best.is_ended:
         worst, size = machine.best.worst
-        words.append(
+        lines.append(
             f"The fit still improved in its last round, and is farthest from {worst.column} of the run {worst.run}, "
             f"with residuals of {size:.2g} times its noise; check the unit and the sign of this column, crank_speed "
             "and the gear ratio"
         )
-    words += [
-        f"{each}: the model does not describe the recordings; check the gear ratio, the units of the columns and the "
-        "data of the sensors"
-        for each in machine.prior_conflicts
+    is_explained = any(suspects.describes for suspects in machine.known.sets)
+    lines += [
+        f"{conflict}: the model does not describe the recordings; check the gear ratio, the units of the columns and "
+        "the data of the sensors"
+        for conflict in machine.prior_conflicts
+        if not is_explained
     ]
-    words += [
-        f"{name} = {each.fitted:.4g}{unit_behind(each.unknown.unit)} lies at its {each.at_bound} bound"
+    lines += [
+        f"{name} = {estimate.fitted:.4g}{unit_behind(estimate.unknown.unit)} lies at its {estimate.at_bound} bound"
         + (", and the recordings contradict this bound" if system_name(name) in active_bounds else "")
         + ": widen it, or check what else is held for known"
-        for name, each in machine.estimates.items()
-        if each.at_bound
+        for name, estimate in machine.estimates.items()
+        if estimate.at_bound
     ]
-    words += _on_known_numbers(machine.known)
-    is_explained = any(each.describes for each in machine.known.sets)
+    lines += _on_known_numbers(machine.known)
+    if machine.failure is not None:
+        lines.append(f"{str(machine.failure).capitalize()}, and none are named; identify again to name them")
     for check in machine.residual_tests:
         unit = MEASURANDS[check.column].unit
         place = f"{check.column} of the run {check.run}"
@@ -335,41 +339,41 @@ def sentences(machine: IdentifiedMachine) -> list[str]:
             continue  # by numbers that are named above
         if check.reason == "orders":
             order, size = check.orders[0]
-            words.append(
+            lines.append(
                 f"{place}: the model does not describe it. Order {order} of the crank remains, with {size:.2g} "
                 f"{unit}; check the dimensions, the gear ratio, and the control"
             )
         elif check.reason == "slow":
-            words.append(
+            lines.append(
                 f"{place}: the model does not describe it. Slow changes remain, with a standard deviation of "
                 f"{check.changes:.2g} {unit}: the speed, the feed or the supply was not steady; state the changes of "
                 "the speed (speeds), or name a steady part (begin, end)"
             )
         elif check.noise > EXCESS_NOISE:
-            words.append(
+            lines.append(
                 f"{place}: its noise is {check.noise:.2g} times the stated one; state "
                 "its own (identify.sensor.noise), as all deviations grow with it"
             )
-    return words
+    return lines
 
 
-def _on_known_numbers(known: KnownNumbers) -> Iterator[str]:
+def _on_known_numbers(numbers: KnownNumbers) -> Iterator[str]:
     """Sentences on the known numbers and the law of friction that the recordings contradict."""
-    explaining = [str(each) for each in known.sets if each.describes]
+    explaining = [str(suspects) for suspects in numbers.sets if suspects.describes]
     if explaining:
         yield (
             f"The model describes the recordings with {'; or with '.join(explaining)}: measure these numbers, or "
             "seek them (identify.parameter)"
         )
-    if not explaining and known.is_law_rejected:
+    if not explaining and numbers.is_law_rejected:
         yield (
             "The recordings contradict the law of friction in the pins: friction that is the same at all speeds does "
             "not describe them"
         )
-    if not explaining and known.sets:
+    if not explaining and numbers.sets:
         yield (
-            f"No one or two of the known numbers explain the recordings; nearest comes {known.sets[0]}: check these "
-            "first"
+            f"No one or two of the known numbers explain the recordings; nearest comes {numbers.sets[0]}: check "
+            "these first"
         )
 
 

@@ -69,7 +69,8 @@ def identify(
     InputError
         for a study without the table [identify], and with a line for each fault of the recordings.
     RunError
-        if the machine does not run with the start values.
+        if the machine does not run with the start values, and if the search for suspects is interrupted; its
+        `partial` is then the result of the fit.
     WriteError
         for a file that cannot be written; the others are written.
     """

@@ -28,8 +28,10 @@ from ...reading.results import OWN, part, result
 from ...recordings.fit import Fit, NormalEquations, assemble, fit
 from ...recordings.plant import AnyPlant
 from ...recordings.problem import OUTLIER, Comparison, Problem
-from ...recordings.residuals import prior_conflicts, residual_tests, sensor_conflicts
+from ...recordings.residuals import ResidualTest, describes, residual_tests
 from ...recordings.unknown import Unknown
+from ...work.progress import TaskProgress, quiet
+from .posterior import Posterior
 
 LAW, OTHER_LAWS = "machine.pin.w_smooth", (10.0, 2.0, 1.1)
 """The number by which the law of friction is another one, and factors on it for friction that grows with speed."""
@@ -46,19 +48,18 @@ WRONG, ASSUMED = 0.2, 1.0
 RANGE = 4.0
 """Factor by which a known number may be wrong."""
 FEW, SEARCHES = 3, 3
-"""Number of sets of suspects with which the recordings are fitted again in a search, and most searches."""
-MOST_ROUNDS = 15
-"""Most rounds of a fit with suspects: it begins near its end if they are the right ones."""
+"""Number of sets of suspects with which the recordings are fitted again around a fit, and most fits around which the
+known numbers are freed to find such sets."""
+MOST_ROUNDS, USUAL_ROUNDS = 15, 5
+"""Most and usual rounds of a fit with suspects: it begins near its end if they are the right ones."""
 MARGIN = 25.0
 """Sum of squares, in parts of that of noise, by which a set of suspects may be worse than the best one."""
 NEARLY, OTHERS = 40.0, 6
 """Factor on this margin within which the quadratic form is no judge, and number of sets that are fitted there."""
+MOST_STEPS = (SEARCHES + 1) * FEW + OTHERS + SEARCHES + 2
+"""Most steps of a search: fits with suspects, and fits around which known numbers are freed."""
 MOST_SETS = 12
 """Most sets of suspects that are named."""
-_CHANGE = 0.05
-"""Change for which the derivatives are integrated, in parts of the number."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -131,14 +132,13 @@ class KnownNumbers:
         """Whether the recordings contradict the law of friction."""
         return self.law is not None and self.law.is_rejected
 
-    @property
-    def suspects(self) -> tuple[Suspect, ...]:
-        """All suspects, those of the best set first."""
-        of_name = dict[str, Suspect]()
-        for each in self.sets:
-            for suspect in each.suspects:
-                of_name.setdefault(suspect.name, suspect)
-        return tuple(of_name.values())
+
+def is_described(
+    problem: Problem, best: Fit, tests: Sequence[ResidualTest], around: Posterior, numbers: KnownNumbers
+) -> bool:
+    """Whether the model of an identification describes the recordings: the fit does so, no bound is active, and the
+    recordings contradict no known number."""
+    return describes(problem, best, tests) and not around.active_bounds and not numbers.are_rejected
 
 
 def known_numbers(plant: AnyPlant, sought: Collection[str], assumed: Collection[str] = ()) -> list[Unknown]:
@@ -167,7 +167,7 @@ def suspect_sets(
     best: NormalEquations,
     workers: int = 2,
     assumed: Collection[str] = (),
-    progress: Progress = lambda _: None,
+    progress: TaskProgress = quiet,
 ) -> tuple[SuspectSet, ...]:
     """The sets of one or two known numbers that, if they are wrong, explain the recordings best.
 
@@ -186,13 +186,14 @@ class _Search:
         best: NormalEquations,
         workers: int,
         assumed: Collection[str],
-        progress: Progress,
+        progress: TaskProgress,
     ) -> None:
         self._problem, self._best, self._workers, self._progress = problem, best, workers, progress
         self._assumed = assumed
         self._more = known_numbers(problem.plant, {u.name for u in problem.sought}, assumed)
         self._fits = dict[frozenset[str], tuple[Problem, Fit]]()
         self._failed = set[frozenset[str]]()
+        self._steps = 0
 
     def sets(self) -> Iterator[SuspectSet]:
         """The sets that explain the recordings about as well as the best one, the best first. If none explains them,
@@ -230,7 +231,7 @@ class _Search:
 
     def _best_freed(self) -> _Freed:
         """The known numbers, freed around the best fit with one or two of them."""
-        first = freed = _Freed.around(self._problem, self._best, self._more, self._workers)
+        first = freed = self._freed_around(self._problem, self._best)
         for k in range(SEARCHES):
             ranked = [names for names, _ in freed.ranked()]
             if self._try(ranked, freed) or not self._fits:
@@ -238,8 +239,23 @@ class _Search:
             if k == 0:
                 # far from straight, the form shows a second number only after the first one is right
                 self._try([names for names in ranked if len(names) == 1], first)
-            freed = _Freed.around(*self._fits[self._winner()], self._more, self._workers)
-        return _Freed.around(*self._fits[self._winner()], self._more, self._workers) if self._fits else freed
+            freed = self._freed_around(*self._fits[self._winner()])
+        return self._freed_around(*self._fits[self._winner()]) if self._fits else freed
+
+    def _freed_around(self, problem: Problem, best: NormalEquations) -> _Freed:
+        self._step("derivatives")
+        return _Freed.around(problem, best, self._more, self._workers)
+
+    def _step(self, title: str) -> Callable[[int, float], None]:
+        """Begin a step; the function reports the rounds of a fit."""
+        complete, self._steps = self._steps, self._steps + 1
+
+        def report(rounds: int, _: float) -> None:
+            share = complete + rounds / (rounds + USUAL_ROUNDS)
+            self._progress(f"suspects, at most {MOST_STEPS} steps ({title})", share, MOST_STEPS)
+
+        report(0, 0.0)
+        return report
 
     def _winner(self) -> frozenset[str]:
         return min(self._fits, key=lambda names: _cost(*self._fits[names]))
@@ -258,19 +274,23 @@ class _Search:
         """Fit the recordings with these numbers sought, too, from the values that the quadratic form promises."""
         if names in self._fits or names in self._failed:
             return
-        self._progress(" and ".join(sorted(names)))
         wider, z = _wider(self._problem, self._best.z, [u for u in self._more if u.name in names])
         for name, x in freed.point(names).items():
             if name in wider.place:
                 z[wider.place[name]] = x
         z = np.clip(z, *wider.bounds)
+        progress = self._step(" and ".join(sorted(names)))
         try:
-            self._fits[names] = wider, fit(wider, z, self._workers, most=MOST_ROUNDS)
+            self._fits[names] = wider, fit(wider, z, self._workers, progress, most=MOST_ROUNDS)
         except (RunError, InputError):
             self._failed.add(names)
 
     def _describes(self, names: frozenset[str]) -> bool | None:
-        return _describes(*self._fits[names], names) if names in self._fits else None
+        """Whether the model with these numbers sought describes the recordings; None if no fit was made."""
+        if names not in self._fits:
+            return None
+        problem, best = self._fits[names]
+        return describes(problem, best, residual_tests(best), names)
 
     def _set(self, names: frozenset[str], freed: _Freed, excess: float) -> SuspectSet:
         """The set of these suspects; those that changed most come first."""
@@ -278,31 +298,25 @@ class _Search:
         if names in self._fits:
             wider, best = self._fits[names]
             values = {name: float(best.z[wider.place[name]]) for name in names}
-        known = {u.name: u for u in self._more}
+        numbers = {u.name: u for u in self._more}
         kinds = {v.name: v.kind for v, _ in self._problem.plant.parameters()}
         suspects = (
-            Suspect(name, known[name].unit, kinds[name], known[name].start, x, name not in self._assumed)
-            for name, x in sorted(values.items(), key=lambda each: -abs(each[1] / known[each[0]].start - 1.0))
+            Suspect(name, numbers[name].unit, kinds[name], numbers[name].start, x, name not in self._assumed)
+            for name, x in sorted(
+                values.items(), key=lambda item: -abs(item[1] / numbers[item[0]].start - 1.0)
+            )
         )
         return SuspectSet(tuple(suspects), excess, self._describes(names))
 
 
 def _sorted(costs: Mapping[frozenset[str], float]) -> list[tuple[frozenset[str], float]]:
-    return sorted(costs.items(), key=lambda each: each[1])
+    return sorted(costs.items(), key=lambda item: item[1])
 
 
 def _smallest(sets: Iterable[frozenset[str]]) -> list[frozenset[str]]:
     """The sets that have none of the others in them."""
     listed = list(sets)
     return [names for names in listed if not any(other < names for other in listed)]
-
-
-def _describes(problem: Problem, best: Fit, suspects: Collection[str]) -> bool:
-    """Whether a fit ended, its residuals are noise, and clocks, sensors and all numbers except the suspects are as
-    they are known."""
-    of_numbers = (each for each in prior_conflicts(problem.sought, best) if each.name not in suspects)
-    conflicts = [*sensor_conflicts(problem, best), *of_numbers]
-    return best.is_ended and not conflicts and all(test.is_noise for test in residual_tests(best))
 
 
 def _wider(problem: Problem, z: Any, more: Sequence[Unknown]) -> tuple[Problem, Any]:
@@ -325,30 +339,30 @@ class _Freed:
     """The sum of squares around a fit as a quadratic form in the changes of further numbers from their known values,
     with all sought numbers free."""
 
-    def __init__(self, problem: Problem, at: NormalEquations, more: Sequence[Unknown]) -> None:
+    def __init__(self, problem: Problem, best: NormalEquations, more: Sequence[Unknown]) -> None:
         self._more, self._names = more, [u.name for u in more]
         places = [problem.place[name] for name in self._names]
-        free = [k for k in range(len(at.z)) if k not in set(places)]
-        self._now = at.z[places] - np.array([u.start for u in more])
+        free = [k for k in range(len(best.z)) if k not in set(places)]
+        self._now = best.z[places] - np.array([u.start for u in more])
         self._prior = np.array([u.prior_deviation for u in more]) ** -2.0
-        self._free = {u.name: float(at.z[k]) for k, u in enumerate(problem.unknowns) if k in set(free)}
-        scale = 1.0 / np.sqrt(np.diag(at.matrix)[free])
-        inner = at.matrix[np.ix_(free, free)] * np.outer(scale, scale)
-        cross = scale[:, None] * at.fisher[np.ix_(free, places)]
-        own: Any = np.linalg.solve(inner, np.column_stack([cross, scale * at.gradient[free]]))
+        self._free = {u.name: float(best.z[k]) for k, u in enumerate(problem.unknowns) if k in set(free)}
+        scale = 1.0 / np.sqrt(np.diag(best.matrix)[free])
+        inner = best.matrix[np.ix_(free, free)] * np.outer(scale, scale)
+        cross = scale[:, None] * best.fisher[np.ix_(free, places)]
+        solution: Any = np.linalg.solve(inner, np.column_stack([cross, scale * best.gradient[free]]))
         # the steps of all others, and how they follow these numbers
-        self._others = scale * own[:, -1], scale[:, None] * own[:, :-1]
-        self._alone = np.diag(at.fisher)[places]
-        self._form = at.fisher[np.ix_(places, places)] - cross.T @ own[:, :-1]
+        self._others = scale * solution[:, -1], scale[:, None] * solution[:, :-1]
+        self._alone = np.diag(best.fisher)[places]
+        self._form = best.fisher[np.ix_(places, places)] - cross.T @ solution[:, :-1]
         # of the recordings alone: the weights of these numbers are counted by themselves
-        gradient = at.gradient[places] + self._prior * self._now
-        self._pull = gradient - cross.T @ own[:, -1]
+        gradient = best.gradient[places] + self._prior * self._now
+        self._pull = gradient - cross.T @ solution[:, -1]
 
     @classmethod
-    def around(cls, problem: Problem, at: NormalEquations, more: Sequence[Unknown], workers: int) -> _Freed:
-        """Around the fit `at` of a problem, in which some of the further numbers may be sought."""
-        wider, z = _wider(problem, at.z, more)
-        scales = {key: 1.0 / weight for key, weight in at.weights.items()}
+    def around(cls, problem: Problem, best: NormalEquations, more: Sequence[Unknown], workers: int) -> _Freed:
+        """Around the fit `best` of a problem, in which some of the further numbers may be sought."""
+        wider, z = _wider(problem, best.z, more)
+        scales = {key: 1.0 / weight for key, weight in best.weights.items()}
         return cls(wider, assemble(wider, z, tuple(wider.comparisons(z, workers)), scales), more)
 
     def tests(self) -> Iterator[ScoreTest]:
@@ -370,19 +384,19 @@ class _Freed:
     def point(self, names: Collection[str]) -> dict[str, float]:
         """The same with the values of all other unknowns that follow."""
         values = self.values(names)
-        known = zip(self._more, self._now, strict=True)
-        steps = [values.get(u.name, u.start) - u.start - now for u, now in known]
-        own, following = self._others
-        changes = own - following @ np.array(steps)
+        pairs = zip(self._more, self._now, strict=True)
+        steps = [values.get(u.name, u.start) - u.start - now for u, now in pairs]
+        alone, following = self._others
+        changes = alone - following @ np.array(steps)
         others = zip(self._free.items(), changes, strict=True)
         return {name: x + float(change) for (name, x), change in others} | values
 
     def ranked(self) -> list[tuple[frozenset[str], float]]:
         """The sets of one and of two numbers with their sums of squares, the best first."""
-        told = [k for k in range(len(self._more)) if self._form[k, k] > ROUNDING * self._alone[k]]
-        sets = [(k,) for k in told] + list(itertools.combinations(told, 2))
+        determined = [k for k in range(len(self._more)) if self._form[k, k] > ROUNDING * self._alone[k]]
+        sets = [(k,) for k in determined] + list(itertools.combinations(determined, 2))
         costs = [(frozenset(self._names[k] for k in places), self._solution(places)[1]) for places in sets]
-        return sorted(costs, key=lambda each: each[1])
+        return sorted(costs, key=lambda item: item[1])
 
     def _places(self, names: Collection[str]) -> tuple[int, ...]:
         return tuple(k for k, name in enumerate(self._names) if name in names)
@@ -431,11 +445,11 @@ def _law_test(problem: Problem, best: NormalEquations, workers: int) -> ScoreTes
         alone += weight * float(slope @ slope)
         pull += weight * float(slope @ (root * here.residuals))
     scale = 1.0 / np.sqrt(np.diag(best.matrix))
-    own: Any = np.linalg.solve(best.matrix * np.outer(scale, scale), scale * cross)
-    information = alone - float(scale * cross @ own)
+    solution: Any = np.linalg.solve(best.matrix * np.outer(scale, scale), scale * cross)
+    information = alone - float(scale * cross @ solution)
     if information <= ROUNDING * alone:
         return ScoreTest(LAW, v.unit, x, 0.0, math.inf)
-    change = (pull - float(own @ (scale * best.gradient))) / information
+    change = (pull - float(solution @ (scale * best.gradient))) / information
     return ScoreTest(LAW, v.unit, x, change, 1.0 / math.sqrt(information))
 
 

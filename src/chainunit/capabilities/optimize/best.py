@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.brief import briefly_shown
-from ...core.temporary_folders import scratch
+from ...core.files import scratch
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...study.cycle import cycle

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.files import write_file
-from ...core.temporary_folders import scratch
+from ...core.files import scratch, write_file
 from ...fmu.backends import Backend
 from ...reading.results import as_data
 from ...reading.text import Units, shown_in

@@ -20,8 +20,8 @@ import numpy as np
 
 from ... import __version__
 from ...batch.transients import can_run
+from ...core.files import scratch
 from ...core.quantities import Layout, Value, declaration, quantity, variables
-from ...core.temporary_folders import remove_folder, temporary_folder
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import Estimate, derived, part, result
 from ...study.analysis import Findings
@@ -36,10 +36,9 @@ from ...study.readings import crank_angle
 from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.window import Phase, Window
-from ...work.job import Job, ResultVariable
+from ...work.job import Job, ResultVariable, made_anew
 from ...work.progress import TaskProgress
 from ...work.runner import run as run_job
-from ...work.store import made_anew
 from .table import RandomPlan
 
 if TYPE_CHECKING:
@@ -173,15 +172,12 @@ class Parcel:
         """The system of the task in its steady state."""
         if self.states is not None:
             return self.task.block(self.states)
-        folder = temporary_folder("chainunit_runs")
-        try:
-            files = {name: Path(folder, f"{name}.fmu") for name in self.content}
+        with scratch() as folder:
+            files = {name: folder / f"{name}.fmu" for name in self.content}
             for name, file in files.items():
                 file.write_bytes(self.content[name])
             # it unpacks the FMUs
             return EventSimulation(replace(self.task.rig, files=files), self.task.steady)
-        finally:
-            remove_folder(folder)
 
 
 _systems: dict[str, BlockRuns | EventSimulation] = {}
@@ -400,7 +396,6 @@ def job_of(task: RandomTask) -> Job:
         task=parcel,
         digest=parcel.digest,
         dimension="run",
-        close=close_system,
     )
 
 
@@ -416,7 +411,10 @@ def run(
     job = job_of(task)
     if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
         workers = 1
-    outcome = run_job(job, folder, progress, workers, scheduler)
+    try:
+        store = run_job(job, folder, progress, workers, scheduler)
+    finally:
+        close_system()
     return MonteCarloResult(
-        outcome.dataset, outcome.file, task.method, outcome.earlier_points, outcome.damaged_batches
+        store.dataset, store.file, task.method, store.earlier_points, store.damaged_batches
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from ...study.arrays import peak
 from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.cycle import cycle
 from ...study.drive import Drive
+from ...study.drive_tables import DriveTables
 from ...study.event import Event, Role
 from ...study.event_torques import from_event_on
 from ...study.events import one_sided_event
@@ -25,6 +26,7 @@ from ...study.limits import starting
 from ...study.measures import STARTED
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
+from ...study.relay import HEAVIEST
 from ...study.rig import Rig, join
 from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
 from ...study.start_up import start_up
@@ -38,6 +40,8 @@ from ...work.progress import TaskProgress
 from .coupling import effects
 from .inverter import boosts
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
+from .task import SizingTask
+from .trial import try_motor
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,37 +126,49 @@ def _loaded_starts(study: StudyRecord) -> list[Event]:
     return [each for each in study.config.events.values() if each.from_rest and each.name in study.answers]
 
 
-_Trial = tuple[Rig, float, dict[str, float]]
-"""A rig with a starter, the time after which its start-up counts as failed [s], and the numbers of the starter."""
+_Trial = tuple[Rig, float, dict[str, float], DriveTables]
+"""A rig with a starter, the time after which its start-up counts as failed [s], its numbers, and its tables."""
+
+
+def _permits(study: StudyRecord, rig: Rig, tables: DriveTables, starts: Sequence[StartNumbers]) -> bool:
+    """Whether a relay and the chosen motor, by each limit of its choice with the margin, permit these `starts`."""
+    from .findings import SizingFindings
+
+    sizing, config = SizingFindings.of_study(study), study.config
+    task = SizingTask(sizing.plan, tables, config.machine, rig.operation, config.events)
+    trial = try_motor(task, sizing.best.motor, rig.drive, sizing.duty, rig.files)
+    tried = dataclasses.replace(trial, starts=starts).result()
+    has_relay = tried.start_class is None or tried.start_class <= HEAVIEST
+    return has_relay and dataclasses.replace(sizing.best, drive=rig.drive, trial=tried).keeps_margin
 
 
 def _gentlest(
     trials: Iterator[_Trial], study: StudyRecord, goal: float, limit: float
 ) -> tuple[Rig, list[StartNumbers], dict[str, float]] | None:
-    """The first of the `trials` whose starts put at most `goal` [N m] on the coupling and take at most the time
-    `limit` [s]; where none does, the one whose hardest start is the gentlest. None where none starts in time."""
+    """The first of the `trials` whose starts take at most the time `limit` [s], are permitted, and put at most `goal`
+    [N m] on the coupling, or else the one with the gentlest starts. None if none is permitted."""
     events = _loaded_starts(study)
     angle, full = _worst(study).angle, []
-    probes: list[tuple[float, int, _Trial]] = []
+    probes: list[tuple[float, _Trial]] = []
     for trial in trials:
         probe = start_from(trial[0], angle, trial[1])
         if probe.start_time is None or probe.start_time > limit:
             continue
         if probe.coupling_torque > goal:
-            probes.append((probe.coupling_torque, len(probes), trial))
+            probes.append((probe.coupling_torque, trial))
             continue
         starts = starts_from_all(trial[0], trial[1], events)
-        if all(start.start_time is not None and start.start_time <= limit for start in starts):
+        if _permits(study, trial[0], trial[3], starts):
             full.append((trial[0], starts, trial[2]))
             if hardest(starts) <= goal:
                 return full[-1]
             # the next one is probed at the angle at which this one is hardest
             angle = max(starts, key=lambda start: start.coupling_torque).angle
-    if probes:
-        _, _, (rig, longest, numbers) = min(probes, key=lambda probe: probe[:2])
-        starts = starts_from_all(rig, longest, events)
-        if all(start.start_time is not None and start.start_time <= limit for start in starts):
-            full.append((rig, starts, numbers))
+    for _, trial in sorted(probes, key=lambda probe: probe[0]):
+        starts = starts_from_all(trial[0], trial[1], events)
+        if _permits(study, trial[0], trial[3], starts):
+            full.append((trial[0], starts, trial[2]))
+            break
     return min(full, key=lambda trial: hardest(trial[1]), default=None)
 
 
@@ -186,7 +202,7 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative
                 operation=dataclasses.replace(rig.operation, starter_time=time),
                 drive=dataclasses.replace(rig.drive, parameters=p),
             )
-            yield soft, usual + time, {"voltage": voltage, "ramp": time}
+            yield soft, usual + time, {"voltage": voltage, "ramp": time}, own
 
     best = _gentlest(rigs(), study, setting.running, starting(None, plate).limit)
     if best is None:
@@ -236,7 +252,7 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
             fed = dataclasses.replace(
                 rig, operation=operation, drive=with_inertia(own, drive, drive.added_inertia)
             )
-            yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}
+            yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, own
 
     for boost in boosts(tables.starter.inverter.boost, "starter.inverter.boost" in tables.given):
         best = _gentlest(rigs(boost), study, setting.running, math.inf)
@@ -326,9 +342,15 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative 
     if rig.drive.foreign_titles or capacity >= setting.gear:
         return None
     slowest = max(StartFindings.of_study(study).starts, key=lambda start: start.start_time or 0.0)
+    left_out = Alternative(Way.SLIP_CLUTCH, WayNumbers.of(running=setting.running), {})
     run = slip_run(rig, slowest, capacity)
     if run is None:
-        return Alternative(Way.SLIP_CLUTCH, WayNumbers.of(running=setting.running), {})
+        return left_out
+    time = run["time"].values
+    heat, end = float(np.trapezoid(run["motor.heat"].values, time)), float(time[-1])
+    slipping = dataclasses.replace(slowest, start_time=end, heat=heat, followed=end)
+    if not _permits(study, rig, study.config.drive, [slipping]):
+        return left_out
     numbers = WayNumbers.of(
         setting=capacity,
         running=setting.running,

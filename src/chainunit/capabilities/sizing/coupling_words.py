@@ -41,7 +41,7 @@ def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
 _OBSTACLES = {
     Obstacle.START: "No torque limiter: {start} needs a setting of {least} ({start_torque} by load and "
     "acceleration); {bound}. For running alone {least_in_running} would do.",
-    Obstacle.MOTOR: "No torque limiter: it has to open above {above}; the motor gives at most {motor} at the "
+    Obstacle.MOTOR: "No torque limiter: it has to open above {above}; the warm motor gives at most {motor} at the "
     "{driver}.",
     Obstacle.GEAR: "No torque limiter: it has to open above {above}; the gear may carry {gear} in running.",
     Obstacle.OVERLOADS: "No torque limiter: it has to open above {above}; {bound}.",
@@ -55,7 +55,7 @@ _OBSTACLES = {
 
 _REASONS = {
     Obstacle.START: "a start loads it with {start}",
-    Obstacle.MOTOR: "the motor gives {motor} at most",
+    Obstacle.MOTOR: "the warm motor gives {motor} at most",
     Obstacle.GEAR: "the gear may carry {gear} in running",
     Obstacle.OVERLOADS: "no overload of this study would open it",
     Obstacle.RELEASE: "it opens too late",
@@ -95,13 +95,13 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
             above=above,
             motor=_torque(setting.motor),
             gear=_torque(setting.gear),
-            bound=_bound(setting),
+            bound=_bound(study, setting),
         ) + _transient(study, setting)
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
         f"Recommended torque limiter{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
         f"{_torque(setting.normal)} {of} puts on it{by}, and {'above' if setting.stalls else 'below'} the "
-        f"{_torque(setting.motor)} that the motor gives at the {study.driver_noun}. It opens where "
+        f"{_torque(setting.motor)} that the warm motor gives at the {study.driver_noun}. It opens where "
         f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
@@ -138,14 +138,13 @@ def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
     )
 
 
-def _bound(setting: Setting) -> str:
+def _bound(study: StudyRecord, setting: Setting) -> str:
     """The reason why a coupling of the least setting protects nothing, in words."""
     if setting.obstacle is Obstacle.START and setting.least >= setting.gear:
         return f"the gear may carry {_torque(setting.gear)} in running"
     if not setting.overloads:
-        return "this study has no jam, lump or block that could open it"
-    most = _torque(max(setting.overloads.values()))
-    return f"the jams, lumps and blocks of this study give at most {most}"
+        return "this study has no overload that could open it"
+    return f"the overloads of this study give less: {_list_of(study, setting.overloads)}"
 
 
 def _too_late(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative]) -> str:
@@ -190,11 +189,12 @@ _WAYS = {
 
 _FAILURES = {
     Way.SOFT_STARTER: "No soft starter that was tried brings the {driver} to its speed from every angle within the "
-    "locked-rotor time of the motor.",
-    Way.INVERTER: "An inverter does not bring the {driver} to its speed from every angle with any ramp and boost "
-    "(starter.inverter.boost) that were tried.",
+    "limits of this motor: its locked-rotor time, the heat of its starts, their number in an hour, each with the "
+    'margin. A larger motor may have one (start = "soft").',
+    Way.INVERTER: "An inverter does not bring the {driver} to its speed from every angle, within the limits of this "
+    "motor, with any ramp and boost (starter.inverter.boost) that were tried.",
     Way.SLIP_CLUTCH: "A slip clutch that running alone permits slips on in the start and does not bring the machine "
-    "to its speed.",
+    "to its speed within the limits of this motor.",
 }
 """By way, the sentence on one with which the machine does not start."""
 

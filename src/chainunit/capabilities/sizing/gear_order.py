@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...drives.gearing import ordered_torque
+from ...reading.text import number
 from ...study.event import Role
 from ...study.event_torques import gear_peaks, running_peak, running_words
 from ...study.judgement import wrong_runs
@@ -62,8 +62,9 @@ def gear_order(
         return None
     gear, wrong, peaks = study.config.drive.gear, wrong_runs(study), gear_peaks(study)
     running, factor, kept = running_peak(study, at_gear), gear.start_factor, 1.0 - margin
-    loads = {"running": GearLoad(running.torque, running_words(study, running.run), kept)}
-    times = f" times the service factor {service:.3g}"
+    free = f", {number(margin, '1', 'percent', full=False)} of the rated torque left free" if margin else ""
+    loads = {"running": GearLoad(running.torque, running_words(study, running.run), kept, free)}
+    times = f" times the service factor {service:g}"
     if study.plate is not None:
         rated = study.plate.nameplate.torque * study.drive.ratio * gear.efficiency
         loads["service"] = GearLoad(rated, "the motor at its rating", 1.0 / service, times)
@@ -79,11 +80,11 @@ def gear_order(
         name = max(overloads, key=lambda name: overloads[name])
         with_coupling = setting is not None and setting.torque and name in setting.effects
         words = f"an overload ({study.title_of(name)}{', with the limiter' if with_coupling else ''})"
-        rule = f", permitted {factor:g} x rated"
+        rule = f", permitted {factor:g} x rated{free}"
         loads["overload"] = GearLoad(overloads[name], words, factor * kept, rule)
     least = max(load.rated for load in loads.values())
     transient = None if found is None else found.transient
-    return GearOrder(ordered_torque(least), loads, left_out, transient)
+    return GearOrder(least, loads, left_out, transient)
 
 
 def _starts(study: StudyRecord, found: StartFindings | None, peaks: Mapping[str, float]) -> dict[str, float]:

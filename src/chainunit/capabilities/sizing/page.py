@@ -213,7 +213,10 @@ def _relay(s: b.Source) -> Iterator[Line]:
 def _class(s: b.Source) -> Line:
     """The trip class of the relay, to follow its setting; empty for the motor protection of an inverter."""
     protection = s.result["sizing"].get("protection", {})
-    return line(", ", s.words("sizing.protection.relay_class.value")) if "relay_class" in protection else ()
+    if "relay_class" not in protection:
+        return ()
+    tolerance = Aside(s.words("sizing.protection.tolerance")) if protection.get("tolerance") else ()
+    return line(", ", s.words("sizing.protection.relay_class.value"), tolerance)
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

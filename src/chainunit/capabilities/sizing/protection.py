@@ -13,8 +13,6 @@ MARGIN = 1.25
 """Ratio of the setting of a torque limiter to the largest torque of normal duty."""
 MARKED_START = 1.1
 """Ratio of the torque of a start to that of running from which on the start decides the setting."""
-_ALIKE = 1.01
-"""The same, up to which the torque is that of running: a start ends in running."""
 
 
 class Obstacle(StrEnum):
@@ -95,12 +93,12 @@ class Setting:
     @property
     def normal(self) -> float:
         """The largest torque of normal duty, starts included."""
-        return self.start if self.is_of_start else self.running
+        return max(self.running, self.start)
 
     @property
     def is_of_start(self) -> bool:
         """Whether a start puts more on the coupling than running does."""
-        return self.start > _ALIKE * self.running
+        return self.start > self.running
 
     @property
     def least(self) -> float:

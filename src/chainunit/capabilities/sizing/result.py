@@ -12,8 +12,8 @@ from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import number
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
-from ...study.relay import class_words
-from ...study.starts import transient_words
+from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words
+from ...study.starts import StartFindings, transient_words
 from .candidate import TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
 from .gear_order import gear_order
@@ -148,6 +148,7 @@ class MotorProtection:
     )
     relay_class: Mapping[str, str] | None = part("trip class of IEC 60947-4-1", unit=GIVEN, optional=True)
     device: str = part("the device")
+    tolerance: str | None = part("the class for a motor with more current", default=None, optional=True)
 
 
 @result
@@ -176,9 +177,9 @@ class DriveProtection:
     normal_torque: float = quantity("N.m", "largest torque of normal duty on the coupling, at the {driver}")
     running_torque: float = quantity("N.m", "largest torque of running on the coupling")
     start_torque: float = quantity(
-        "N.m", "largest torque of a start on the coupling by load and acceleration"
+        "N.m", "largest torque of a start of the cold motor on the coupling by load and acceleration"
     )
-    breakdown_torque: float = quantity("N.m", "most that the motor gives at the {driver}")
+    breakdown_torque: float = quantity("N.m", "pull-out torque of the warm motor, at the {driver}")
     effects: Mapping[str, Mapping[str, InUnit]] = part("peak at the output of the gear, by overload")
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")
     disturbances: Mapping[str, InUnit] = part("peak of each disturbance on the coupling")
@@ -254,10 +255,12 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    words = class_words(study.relay_class)
+    words, caveat = class_words(study.relay_class), _tolerance(study)
     trip_class = {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
     if study.drive.star_delta is None:
-        return MotorProtection(InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay")
+        return MotorProtection(
+            InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
+        )
     place = (
         "in the phases of the delta, behind the main contactor, where it usually sits: 1/sqrt(3) of the rated"
     )
@@ -266,4 +269,18 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
         InUnit(rated, "A", title="thermal relay in the supply line in place of that, setting"),
         trip_class,
         "relay in the phases of the delta",
+        caveat,
     )
+
+
+def _tolerance(study: StudyRecord) -> str | None:
+    """The class whose relay holds in each start of a motor at the tolerance of its current, in words; None if the
+    ordered one does."""
+    found = StartFindings.found_in(study)
+    if found is None or found.stuck or study.relay_class > HEAVIEST:
+        return None
+    holding = class_holding(MORE_CURRENT**2 * found.relay_seconds, study.relay_class)
+    words = f"{'of ' if holding <= HEAVIEST else ''}{class_words(holding)}"
+    more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
+    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; one {words} holds"
+    return None if holding == study.relay_class else said

@@ -124,8 +124,9 @@ SIZING_KEYS: Mapping[str, Any] = {
         Literal[LOAD_CLASSES],
         Field(
             None,
-            description="class of the load for the service factor: uniform, with moderate or with heavy shocks; "
-            "without it, it follows from the inertia of the machine over that of the motor",
+            description="class of the load for the service factor: uniform, with moderate, heavy or very heavy "
+            "shocks (crushers on a belt); without it, it follows from the inertia of the machine over that of the "
+            "motor",
         ),
     ),
     "ratio_series": (

@@ -25,7 +25,7 @@ from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
 from ...study.permitted_starts import permitted_starts, starting_data
 from ...study.readings import crank_angle, load_inertia, turns_made
-from ...study.relay import start_class
+from ...study.relay import class_holding, start_seconds
 from ...study.rig import Rig, join
 from ...study.start_runs import (
     OVERLOADED,
@@ -122,7 +122,7 @@ class Trial:
         rise = self._from_rest.sel(time=slice(None, max(self._first, self.drive.switched_until)))
         time, current = (rise[name].values for name in ("time", f"motor.{self.drive.motor.current}"))
         current = self.drive.relay_current(time, current)
-        first = start_class(time, current, self.motor.nameplate.rated_current)
+        first = class_holding(start_seconds(time, current, self.motor.nameplate.rated_current))
         return max(first, *(start.start_class for start in self.starts), 0)
 
     @cached_property

@@ -310,7 +310,7 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         yield b.Text(s.line(words), "note")
     if s.result["made_anew"]:
         yield b.Text(s.line("{made_anew}."), "note")
-    yield b.Text(s.line("All points: {store} (Zarr)."), "fine", "long")
+    yield b.Text(s.line("All points: {store} (NetCDF)."), "fine", "long")
 
 
 TASK: Task[Config, SweptStudy] = Task(

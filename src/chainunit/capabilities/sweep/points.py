@@ -31,9 +31,9 @@ from ...study.cycle_quantities import CycleQuantity, cycle_quantity, evaluate
 from ...study.event import Event
 from ...study.measures import Answers
 from ...study.rig import Rig
-from ...work.job import Job, ResultVariable
+from ...work.job import BatchStore, Job, ResultVariable
 from ...work.progress import TaskProgress
-from ...work.runner import Outcome, check_scheduler
+from ...work.runner import check_scheduler
 from ...work.runner import run as run_job
 from .plan import SweepPlan
 from .runs import block_of, check_drive, measures
@@ -280,7 +280,7 @@ class SweepFindings:
 
     config: Config
     task: SweepTask
-    outcome: Outcome
+    outcome: BatchStore
 
     @property
     def plan(self) -> SweepPlan:

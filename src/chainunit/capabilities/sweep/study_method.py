@@ -57,7 +57,7 @@ class SweepResult(ReportedResult[Config, SweptStudy]):
 
     @property
     def file(self) -> Path:
-        """The store of all points (Zarr), a folder."""
+        """The store of all points, a NetCDF file."""
         return self._outcome.findings.outcome.file
 
 

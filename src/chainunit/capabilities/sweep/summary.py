@@ -25,7 +25,7 @@ from ...study.limits import limit_reached
 from ...study.organ_limits import limits_of_organs
 from ...study.quantiles import CONFIDENCE, quantile
 from ...study.verdict import SpeedLimit, passed_limits
-from ...work.store import made_anew
+from ...work.job import made_anew
 from .plan import SweptParameter
 from .points import SweepFindings
 from .shares import LEAST_POINTS, Shares, shares_of_points, shares_on_grid

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from ...core.errors import InputError, printable
-from ...core.files import ResultKind
 from ...report.console import show_remark, study_file, terminal_console
+from ...report.result_kind import ResultKind
 
 _KEY = Path("chainunit.key")
 _MODEL = "Study file or linkage file (TOML) of the FMU, where its model is no packaged one."
@@ -47,7 +47,7 @@ def certify(
 
     Writes beside it its meta-data (.srmd).
     """
-    from ...core.temporary_folders import scratch
+    from ...core.files import scratch
     from .certify import certified, members_of, place_beside, place_of, write
     from .keys import private_key, readable_by_others
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import functools
 import importlib
+import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -139,17 +140,10 @@ class PythonCode:
         """Make the instance."""
         self._slave = self._make()
 
-    def setupExperiment(self, startTime: float) -> None:
-        """See FMI 2.0."""
-        self._slave.setup_experiment(startTime)
-
-    def enterInitializationMode(self) -> None:
-        """See FMI 2.0."""
-        self._slave.enter_initialization_mode()
-
-    def exitInitializationMode(self) -> None:
-        """See FMI 2.0."""
-        self._slave.exit_initialization_mode()
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """Another function of FMI 2.0: ``setReal`` is ``set_real`` in Python."""
+        method = getattr(self._slave, re.sub("[A-Z]", lambda letter: f"_{letter[0].lower()}", name))
+        return lambda *values, **named: method(*values, *named.values())
 
     def doStep(self, time: float, size: float) -> None:
         """See FMI 2.0.
@@ -162,34 +156,6 @@ class PythonCode:
         if not self._slave.do_step(time, size):
             lines = [each.msg for each in self._slave.log_queue]
             raise RunError(lines[-1] if lines else "the step is discarded")
-
-    def setReal(self, references: Sequence[int], values: Sequence[float]) -> None:
-        """See FMI 2.0."""
-        self._slave.set_real(references, values)
-
-    def setInteger(self, references: Sequence[int], values: Sequence[int]) -> None:
-        """See FMI 2.0."""
-        self._slave.set_integer(references, values)
-
-    def setBoolean(self, references: Sequence[int], values: Sequence[int]) -> None:
-        """See FMI 2.0."""
-        self._slave.set_boolean(references, values)
-
-    def getReal(self, references: Sequence[int]) -> list[float]:
-        """See FMI 2.0."""
-        return list(self._slave.get_real(references))
-
-    def getInteger(self, references: Sequence[int]) -> list[int]:
-        """See FMI 2.0."""
-        return list(self._slave.get_integer(references))
-
-    def getBoolean(self, references: Sequence[int]) -> list[bool]:
-        """See FMI 2.0."""
-        return list(self._slave.get_boolean(references))
-
-    def terminate(self) -> None:
-        """See FMI 2.0."""
-        self._slave.terminate()
 
     def freeInstance(self) -> None:
         """Let the instance go."""

@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.errors import InputError, RunError, printable
-from ...core.files import full
+from ...core.files import full, scratch
 from ...core.quantities import Type
-from ...core.temporary_folders import scratch
 from ...fmu.loading import fmi2_callbacks, loading
 from ...fmu.reference import csv_bytes
 from .archive import unsafe

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ...core.files import ResultKind
 from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out, study_file
+from ...report.result_kind import ResultKind
 
 
 def watch(

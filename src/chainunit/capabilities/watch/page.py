@@ -76,7 +76,7 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
                 "): its alarms may be those of a wrong machine. ",
                 "If the feed was another one, state it ([feed]), or widen its deviation (watch.feed_deviation)."
                 if s.result["of_feed_alone"]
-                else "Identify the machine first (chainunit identify).",
+                else "Identify the machine first.",
             ),
         )
     if s.result["failed_identification"]:

@@ -13,9 +13,9 @@ import numpy as np
 
 from ...core.brief import briefly_shown
 from ...core.errors import Faults, InputError
+from ...core.files import scratch
 from ...core.inputs import JSON, file_bytes, json_of
 from ...core.quantities import Layout
-from ...core.temporary_folders import scratch
 from ...drives.terminal_signals import terminal_signals
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
@@ -29,6 +29,7 @@ from ...recordings.recording import Recording
 from ...recordings.residuals import (
     PriorConflict,
     ResidualTest,
+    describes,
     prior_conflicts,
     residual_tests,
     sensor_conflicts,
@@ -136,8 +137,7 @@ class WatchedRecording:
     @property
     def is_described(self) -> bool:
         """Whether the machine of the study describes the begin of the recording."""
-        is_noise = all(test.is_noise for test in self.residual_tests)
-        return self.learned.is_ended and is_noise and not self.prior_conflicts
+        return describes(self.problem, self.learned, self.residual_tests)
 
     @property
     def prior_conflicts(self) -> list[PriorConflict]:
@@ -149,9 +149,8 @@ class WatchedRecording:
     @property
     def only_feed_differs(self) -> bool:
         """Whether nothing but a feed that is not as stated speaks against the machine of the study."""
-        own = sensor_conflicts(self.problem, self.learned)
-        are_noise = all(test.is_noise for test in self.residual_tests)
-        return not self.is_described and self.learned.is_ended and not own and are_noise
+        loads = {load.name for load in self.problem.sought}
+        return not self.is_described and describes(self.problem, self.learned, self.residual_tests, loads)
 
     @property
     def noises(self) -> tuple[float, float]:

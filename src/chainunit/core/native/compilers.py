@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import RunError
+from ..files import scratch
 from ..inputs import regular_bytes
-from ..temporary_folders import scratch
 from .cache import entry
 
 _CODE = (

@@ -9,7 +9,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ...core.errors import InputError, RunError
+from ...core.errors import InputError, RunError, texts_in
 from ...core.native.compilers import COMPILERS, Compiler, compile_code, compiler, host, zig_compiler
 from ...core.printing.c_elementary import HEADER
 
@@ -65,26 +65,27 @@ def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
     InputError
         for an unknown platform, a platform without folder in the FMI version, or one without compiler.
     """
+    names = texts_in("platforms", names)
     for name in names:
         if name not in PLATFORMS:
-            raise InputError(f"--platforms {name}: no such platform; there are {', '.join(PLATFORMS)}")
+            raise InputError(f"platforms = {name}: no such platform; there are {', '.join(PLATFORMS)}")
         if fmi not in PLATFORMS[name].folders:
-            raise InputError(f"--platforms {name}: FMI {fmi}.0 has no folder for it; export with --fmi 3")
+            raise InputError(f"platforms = {name}: FMI {fmi}.0 has no folder for it; export with fmi 3")
     here = host()
     if not names:
         own = compiler()
         if here is None or own is None:
             raise InputError(
-                f"no C compiler ({COMPILERS}) for this machine found: install one, or export with --backend python"
+                f"no C compiler ({COMPILERS}) for this machine found: install one, or export with backend python"
             )
         if fmi not in PLATFORMS[here].folders:
-            raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with --fmi 3 or --backend python")
+            raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with fmi 3 or backend python")
         return (here,), own
     # zig comes first, for its old system libraries; the system's compiler knows only this machine
     able = zig_compiler() or (compiler() if set(names) == {here} else None)
     if able is None:
         raise InputError(
-            f"--platforms {' '.join(names)}: needs zig, a C compiler for all of them: pip install 'chainunit[cross]'"
+            f"platforms = {', '.join(names)}: needs zig, a C compiler for all of them: pip install 'chainunit[cross]'"
         )
     return tuple(dict.fromkeys(names)), able
 

@@ -25,7 +25,7 @@ Dimensions = Mapping[str, Dimension | None]
 
 def checked_dimension(text: str, known: Dimensions, unit: str | None) -> Dimension | None:
     """The dimension of an expression; `known` has those of the names, extremes and tables in it, None for one that
-    is not known yet.
+    is not known yet. One of numbers alone takes any dimension, as a number does.
 
     Raises
     ------
@@ -34,8 +34,13 @@ def checked_dimension(text: str, known: Dimensions, unit: str | None) -> Dimensi
     """
     of = expression(text)
     result = _dimension(of.tree, known, of)
+    if not (of.names or of.extremes or of.tables):
+        return None
     if unit is not None and result is not None and result != dimension_of_unit(unit):
-        raise InputError(f"is {shown(text)}, in {_unit(result)}; must be in {unit.replace('.', ' ')}")
+        remedy = (
+            "" if result else ": multiply by a parameter that has it, as a number in a product has no unit"
+        )
+        raise InputError(f"is {shown(text)}, in {_unit(result)}; must be in {unit.replace('.', ' ')}{remedy}")
     return result
 
 

@@ -10,7 +10,6 @@ from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...core.search import lowest
 from ...groups.triad import MOST_MISFIT, Triad
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
@@ -28,17 +27,33 @@ def lows(
     where the linkage does not close. The `margins` are the margins at the `places`."""
     last = len(places) - 1
     for group, margins_of_group in enumerate(zip(*margins, strict=True)):
-
-        def margin(q: float, group: int = group) -> float:
-            try:
-                return margins_at(q)[group]
-            except (ArithmeticError, ValueError):
-                return math.nan
-
         for k, here in enumerate(margins_of_group):
             low, high = max(k - 1, 0), min(k + 1, last)
             if here < NEAR and here <= margins_of_group[low] and here <= margins_of_group[high]:
-                yield group, *lowest(margin, places[low], places[high])
+                yield group, *_lowest(margins_at, group, places[low], places[high])
+
+
+def _lowest(
+    margins_at: Callable[[float], Sequence[float]], group: int, low: float, high: float
+) -> tuple[float, float]:
+    """The place of the least margin of a group in a range that has one low, and that margin; if the linkage does not
+    close, the first such place and NaN."""
+    from scipy.optimize import minimize_scalar
+
+    open_at: list[float] = []
+
+    def value(q: float) -> float:
+        try:
+            y = math.nan if open_at else margins_at(q)[group]
+        except (ArithmeticError, ValueError):
+            y = math.nan
+        if math.isnan(y):
+            open_at.append(q)
+        return y
+
+    accuracy = {"xatol": 1e-5 * abs(high - low)}
+    least = minimize_scalar(value, bounds=sorted((low, high)), method="bounded", options=accuracy)
+    return (open_at[0], math.nan) if open_at else (float(least.x), float(least.fun))
 
 
 def turns_of_triads(linkage: Linkage) -> dict[str, float]:
