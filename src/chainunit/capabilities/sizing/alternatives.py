@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -132,9 +132,8 @@ _Trial = tuple[Rig, float, dict[str, float], DriveTables]
 
 def _permits(study: StudyRecord, rig: Rig, tables: DriveTables, starts: Sequence[StartNumbers]) -> bool:
     """Whether a relay and the chosen motor, by each limit of its choice with the margin, permit these `starts`."""
-    from .findings import SizingFindings
-
-    sizing, config = SizingFindings.of_study(study), study.config
+    sizing: Any = study.findings["sizing"]  # by its name, as its module reads this one
+    config = study.config
     task = SizingTask(sizing.plan, tables, config.machine, rig.operation, config.events)
     trial = try_motor(task, sizing.best.motor, rig.drive, sizing.duty, rig.files)
     tried = dataclasses.replace(trial, starts=starts).result()
