@@ -195,7 +195,7 @@ def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
     there, nothing is written."""
     example = LINKAGES.parent / "own_catalogue.toml"
     text = example.read_text("utf-8").replace('"catalogue/', f'"{example.parent.as_posix()}/catalogue/')
-    (tmp_path / "own.toml").write_text(f'static_inertia_runs = "never"\n{text}', "utf-8")
+    (tmp_path / "own.toml").write_text(text, "utf-8")
     done = chainunit("study", "own.toml", "-o", "results", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert chainunit("handover", "results", "-o", "out", cwd=tmp_path).returncode == 0
