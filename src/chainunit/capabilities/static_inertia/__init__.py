@@ -41,9 +41,10 @@ class StaticInertiaAnalysis(Analysis):
     @staticmethod
     def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the motor is chosen, and the machine has turns and an inertia of its angle alone."""
-        model = drive.machine.model
+        machine, model = drive.machine, drive.machine.model
         has_inertia = issubclass(model, InverseMachine) and model.States is None and model.turns
-        return bool(plans["static_inertia"]) and not drive.foreign and has_inertia
+        is_whole = machine.simulated is machine and not drive.foreign_titles
+        return bool(plans["static_inertia"]) and has_inertia and is_whole
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> StaticInertiaFindings:
