@@ -331,7 +331,6 @@ def test_a_default_of_several_events_stands_at_the_first(made):
 EXAMPLES = Path(__file__).parents[1] / "examples"
 LEAST_LETTERS = 8.0
 """Size of letters [pt] that is readable on paper."""
-NO_OTHER_RUNS = 'static_inertia_runs = "never"\n'
 
 
 def with_bearings(text):
@@ -352,11 +351,10 @@ def machine_of(name):
     read = {file.stem: file.read_text("utf-8") for file in EXAMPLES.glob("*.toml")}
     if name == "heavy_mill":
         events = '[[event]]\ntype = "jam"\nside = "left"\n[[event]]\ntype = "blocked"\n'
-        return f"{NO_OTHER_RUNS}{with_bearings(read[name].replace('event = []', ''))}{events}"
+        return f"{with_bearings(read[name].replace('event = []', ''))}{events}"
     if name == "knife":
         return with_bearings((resources.files("chainunit.data") / "knife.toml").read_text("utf-8"))
-    # the comparison with one inertia makes the longest annex
-    return ("" if name == "motor_rejected" else NO_OTHER_RUNS) + read[name].replace('"catalogue/', catalogues)
+    return read[name].replace('"catalogue/', catalogues)
 
 
 @pytest.mark.slow

@@ -82,19 +82,11 @@ STUDIES = {
     "line": ("", (EXAMPLES / "jam_with_driveline.toml").read_text("utf-8"), ""),
 }
 
-START = r"start_up\.{0}|static_inertia\.machine\.{0}|flywheels\.compared\.given\.{0}"
 QUANTITIES = {
     "mean speed": r"answers\.steady\.speed_mean|verdict\.motor\.speed|verdict\.model\.reached",
-    "speed asked for": r"run\.crank_speed|verdict\.motor\.asked|static_inertia\.speed",
-    "winding": r"answers\.steady\.winding_temperature|static_inertia\.machine\.winding_temperature"
-    r"|energy\.own\.temperature",
-    "RMS current": r"answers\.steady\.current_rms|static_inertia\.machine\.current_rms|checks\.(relay\.before"
-    r"|starting\.current)",
-    "peak of the current": r"answers\.steady\.current_peak|static_inertia\.machine\.current_peak",
-    "RMS torque of the motor": r"answers\.steady\.motor_torque_rms|static_inertia\.machine\.motor_torque_rms",
-    "peak torque of the motor": r"answers\.steady\.motor_torque_peak|static_inertia\.machine\.motor_torque_peak",
-    "ripple": r"answers\.steady\.speed_ripple|static_inertia\.machine\.speed_ripple",
-    "start-up time": r"start_up\.start_time|static_inertia\.machine\.start_time",
+    "speed asked for": r"run\.crank_speed|verdict\.motor\.asked",
+    "winding": r"answers\.steady\.winding_temperature|energy\.own\.temperature",
+    "RMS current": r"answers\.steady\.current_rms|checks\.(relay\.before|starting\.current)",
     "rated current": r"motor\.rated_current|checks\.(relay\.setting|starting\.rated_current)"
     r"|sizing\.protection\.relay_current",
     "torque of running at the gear": r"starts\.running|checks\.gear\.running|sizing\.gear\.running",

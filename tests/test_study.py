@@ -73,7 +73,6 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
     } - {
         "driveline.png",
         "energy.png",
-        "static_inertia.png",
         "chain_sweep.png",
         "blade_path.png",
         "flywheel.png",

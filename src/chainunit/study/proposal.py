@@ -5,35 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from ..drives.catalogue import CatalogueMotor
-from ..machines.machine import Machine
 from .drive import Drive
 from .drive_tables import DriveTables
-from .limits import Check
 from .torques import DutyPeak
-
-
-@dataclass(frozen=True)
-class Judged:
-    """A drive by the criteria of a choice: its values beside their limits by name, the names of those that it does
-    not keep with the `margin`, a share of each limit, the worst first, and a sentence on it."""
-
-    checks: Mapping[str, Check]
-    missed: tuple[str, ...]
-    margin: float
-    words: str
-
-
-class Chooser(Protocol):
-    """The choice of a drive, as a study may repeat it."""
-
-    def choose(self, machine: Machine) -> DriveProposal:
-        """The drive that the same choice gives another machine with the same duty."""
-
-    def judge(self, drive: Drive, motor: CatalogueMotor) -> Judged:
-        """Any `drive` with that motor, by the runs and criteria of the choice; its machine is that of the study."""
 
 
 @dataclass(frozen=True)
@@ -64,5 +41,3 @@ class DriveProposal:
     """starts an hour that the criteria of the choice permit"""
     inverter_current: float | None = None
     """least rated current of the inverter to be ordered [A]"""
-    chooser: Chooser | None = None
-    """the choice that gave it, to repeat it; None where it cannot be repeated"""

@@ -429,7 +429,7 @@ def test_a_gear_that_an_overload_breaks_is_told_with_a_stronger_one(tmp_path):
         target = tmp_path / "catalogue" / f"{name}.csv"
         target.parent.mkdir(exist_ok=True)
         target.write_text((EXAMPLE.parent / "catalogue" / f"{name}.csv").read_text("utf-8"), encoding="utf-8")
-    text = 'static_inertia_runs = "never"\n' + text.replace(line, "service_factor = 1")
+    text = text.replace(line, "service_factor = 1")
     (tmp_path / "weak.toml").write_text(text, encoding="utf-8")
     chainunit("study", "weak.toml", "-o", "out", cwd=tmp_path)
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 from ... import __version__
@@ -20,18 +18,15 @@ from ...study.registry import registered
 from ...study.sections import all_choices, all_sections
 from ...study.stored_result import StoredResult, as_mapping
 
+SIDES = ("a", "b")
 _ROUNDING = 1e-12
 """Relative difference up to which two given values are the same: that of a unit's factor."""
+_RUNS = {"answers": "", "shaft": ": driveline", "pins": ": forces in the bearings"}
+"""By table of a result with numbers of each run, what follows the title of the run."""
+_RANDOM = "monte_carlo.quantiles"
 
-
-@cache
-def _words(driver: str) -> dict[str, str]:
-    """By name, the words on the numbers of a result."""
-    words = {name: text for part in registered() for name, text in part.words(driver).items()}
-    return words | {v.name: v.described(driver) for of in (ShaftAnswers, Answers) for v in variables(of)}
-
-
-_SIDES = ("a", "b")
+Numbers = dict[str, Any]
+"""Entries of a result by their dotted names."""
 
 
 def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
@@ -44,65 +39,40 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
       values that are not negative and no shares themselves
     - ``only``: the runs, events and measures that one of them has alone
     """
-    results = {"a": a, "b": b}
-    given = {side: dict(_given_values(each.data)) for side, each in results.items()}
-    names = list(dict.fromkeys([*given["a"], *given["b"]]))
-    different = [name for name in names if not _same(given["a"].get(name), given["b"].get(name))]
-    drivers = {each.words("driver") or USUAL_DRIVER for each in results.values()}
-    driver = drivers.pop() if len(drivers) == 1 else "driver"
-    groups = {side: dict(_groups(each, driver)) for side, each in results.items()}
-    both = [name for name in groups["a"] if name in groups["b"]]
+    results, pairs = {"a": a, "b": b}, (SIDES, SIDES[::-1])
+    given = {side: dict(_given_values(result.data)) for side, result in results.items()}
+    runs = {side: _runs(result.data) for side, result in results.items()}
+    drivers = {result.words("driver") or USUAL_DRIVER for result in results.values()}
+    words = _words(drivers.pop() if len(drivers) == 1 else "driver")
+    names = dict.fromkeys([*given["a"], *given["b"]])
+    different = [name for name in names if not _same(*(given[side].get(name) for side in SIDES))]
+    origins = {side: as_mapping(result.data.get("origins")) for side, result in results.items()}
     return {
         "chainunit": __version__,
-        "a": _head(a),
-        "b": _head(b),
-        "verdict": {side: _verdicts(each) for side, each in results.items()},
-        "warnings": {
-            side: _warnings_alone(results[side], results[other]) for side, other in (_SIDES, _SIDES[::-1])
-        },
+        **{side: _head(result) for side, result in results.items()},
+        "verdict": {side: _verdicts(result) for side, result in results.items()},
+        "warnings": {side: _warnings_alone(results[side], results[other]) for side, other in pairs},
         "given": {
-            name: {side: given[side].get(name) for side in _SIDES}
-            | {
-                f"origin_{side}": as_mapping(each.data.get("origins")).get(name, "")
-                for side, each in results.items()
-            }
+            name: {side: given[side].get(name) for side in SIDES}
+            | {f"origin_{side}": origins[side].get(name, "") for side in SIDES}
             for name in different
         },
         "given_equal": entry(len(names) - len(different), "1"),
         "runs": {
-            name: {
-                "title": groups["b"][name].title,
-                "measures": _measures(groups["a"][name], groups["b"][name]),
-            }
-            for name in both
+            run: {"title": _title(b, run), "measures": _measures(numbers, runs["b"][run], words)}
+            for run, numbers in runs["a"].items()
+            if run in runs["b"]
         },
         "only": {
-            side: _alone(results[side], groups[side], results[other], groups[other])
-            for side, other in (_SIDES, _SIDES[::-1])
+            side: _alone(results[side], runs[side], results[other], runs[other], words)
+            for side, other in pairs
         },
     }
 
 
-def _alone(
-    mine: StoredResult, groups: Mapping[str, _Group], theirs: StoredResult, others: Mapping[str, _Group]
-) -> dict[str, list[str]]:
-    """The runs, events and measures that one result has and the other has not."""
-    missing = [name for name in groups if name not in others]
-    # the further numbers of a run go with the run
-    whole = {name.removeprefix("answers.") for name in missing if name.startswith("answers.")}
-    runs = [name for name in missing if name.startswith("answers.") or name.split(".")[-1] not in whole]
-    events = as_mapping(theirs.data.get("event"))
-    return {
-        "runs": [groups[name].title for name in runs],
-        "events": [name for name in as_mapping(mine.data.get("event")) if name not in events],
-        "measures": [
-            f"{group.title}: {words}"
-            for name, group in groups.items()
-            if name in others
-            for measure, (words, _) in group.numbers.items()
-            if measure not in others[name].numbers
-        ],
-    }
+def _head(result: StoredResult) -> dict[str, str]:
+    names = ("title", "status", "chainunit")
+    return {"file": printable(str(result.file), 500)} | {name: result.words(name) for name in names}
 
 
 def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
@@ -110,30 +80,37 @@ def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
     verdicts = {}
     for name, verdict in as_mapping(result.data.get("verdict")).items():
         words = {key: as_mapping(verdict).get(key) for key in ("holds", "text")}
-        if all(isinstance(each, str) for each in words.values()):
-            verdicts[printable(name)] = {key: printable(str(each), 2000) for key, each in words.items()}
+        if all(isinstance(text, str) for text in words.values()):
+            verdicts[printable(name)] = {key: printable(str(text), 2000) for key, text in words.items()}
     return verdicts
 
 
 def _warnings_alone(mine: StoredResult, theirs: StoredResult) -> list[str]:
     """The warnings that one result has and the other has not. A kind may have had another name in an earlier version,
     so that a warning in the same words is the same, too."""
-    others = {x for known in _warnings(theirs) for x in known}
+    others = {subject_or_text for warning in _warnings(theirs) for subject_or_text in warning}
     return [text for subject, text in _warnings(mine) if subject not in others and text not in others]
 
 
 def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
     """The warnings of a result, each with its subject: its kind and its runs."""
     warnings = result.data.get("warnings")
-    for each in warnings if isinstance(warnings, list) else []:
-        text = as_mapping(each).get("text")
-        if isinstance(text, str):
-            yield (str(each.get("kind")), str(each.get("runs"))), printable(text, 2000)
+    for warning in map(as_mapping, warnings if isinstance(warnings, list) else []):
+        if isinstance(text := warning.get("text"), str):
+            yield (str(warning.get("kind")), str(warning.get("runs"))), printable(text, 2000)
 
 
-def _head(result: StoredResult) -> dict[str, str]:
-    names = ("title", "status", "chainunit")
-    return {"file": printable(str(result.file), 500)} | {name: result.words(name) for name in names}
+# -- the numbers of a result by their names
+
+
+def _leaves(node: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """All values below a node with their dotted names: entries, switches, lists of numbers, and texts."""
+    if isinstance(node, Mapping) and not _is_entry(node):
+        for name, below in node.items():
+            yield from _leaves(below, f"{path}.{printable(name)}")
+    elif node is not None:
+        plain = isinstance(node, bool | Mapping) or (isinstance(node, list) and all(map(_is_finite, node)))
+        yield path.removeprefix("."), node if plain else printable(str(node))
 
 
 def _is_finite(value: Any) -> bool:
@@ -146,97 +123,78 @@ def _is_entry(node: Any) -> bool:
         return False
     value, words = node["value"], (node.get("unit"), node.get("kind", ""))
     numbers = value if isinstance(value, list) else [] if value is None else [value]
-    return all(map(_is_finite, numbers)) and all(isinstance(x, str) and x.isprintable() for x in words)
-
-
-def _is_number(node: Any) -> bool:
-    return _is_entry(node) and _is_finite(node["value"])
-
-
-# -- given values
+    return all(map(_is_finite, numbers)) and all(
+        isinstance(text, str) and text.isprintable() for text in words
+    )
 
 
 def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The given values of a result, by their names in a study file: entries, texts, switches and lists."""
-    for name in all_choices():
+    """The given values of a result, by their names in a study file."""
+    for name in (*all_choices(), "system", "machine", "feed", "motor", "event"):
         yield from _leaves(data.get(name), name)
-    for table in ("system", "machine", "feed", "motor", "event"):
-        yield from _leaves(data.get(table), table)
     for table, section in all_sections().items():
         node = as_mapping(data.get(table))
         if section.apart:
             yield from _leaves(node.get("asked"), table)
             continue
         # the result may have its findings in the same place
-        own = {v.name for v in variables(section.declaration)} | set(section.keys)
-        yield from _leaves({name: each for name, each in node.items() if name in own}, table)
-
-
-def _leaves(node: Any, path: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(node, Mapping) and not _is_entry(node):
-        for name, inner in node.items():
-            yield from _leaves(inner, f"{path}.{printable(name)}")
-    elif node is not None:
-        plain = isinstance(node, bool | Mapping) or (isinstance(node, list) and all(map(_is_finite, node)))
-        yield path, node if plain else printable(str(node))
+        keys = {v.name for v in variables(section.declaration)} | set(section.keys)
+        yield from _leaves({name: value for name, value in node.items() if name in keys}, table)
 
 
 def _same(a: Any, b: Any) -> bool:
-    if _is_number(a) and _is_number(b):
-        same = math.isclose(a["value"], b["value"], rel_tol=_ROUNDING)
-        return bool(a["unit"] == b["unit"] and same)
+    if all(_is_entry(x) and _is_finite(x["value"]) for x in (a, b)):
+        return a["unit"] == b["unit"] and math.isclose(a["value"], b["value"], rel_tol=_ROUNDING)
     return bool(a == b)
 
 
-# -- measures
-
-
-@dataclass(frozen=True)
-class _Group:
-    """Numbers that belong to one run, by name, each with its words and its entry."""
-
-    title: str
-    numbers: Mapping[str, tuple[str, Mapping[str, Any]]]
-
-
-def _groups(result: StoredResult, driver: str) -> Iterator[tuple[str, _Group]]:
-    """The numbers of each run of a result, by their place in it; their words name the `driver`."""
-    data = result.data
-    for run in ("start_up", "settling"):
-        yield from _group(run, result.title_of(run), data.get(run), driver)
-    for run, numbers in as_mapping(data.get("answers")).items():
-        yield from _group(f"answers.{run}", result.title_of(run), numbers, driver)
-    for run, numbers in as_mapping(data.get("shaft")).items():
-        yield from _group(f"shaft.{run}", f"{result.title_of(run)}: driveline", numbers, driver)
-    for run, pins in as_mapping(data.get("pins")).items():
-        yield from _group(f"pins.{run}", f"{result.title_of(run)}: forces in the bearings", pins, driver)
-    random = as_mapping(data.get("monte_carlo")).get("quantiles")
-    yield from _group("monte_carlo.quantiles", "overloads at random", random, driver)
-
-
-def _group(place: str, title: str, node: Any, driver: str) -> Iterator[tuple[str, _Group]]:
-    numbers = {
-        name.removeprefix("."): (_spoken(name.removeprefix("."), driver), each)
-        for name, each in _leaves(node, "")
-        if _is_entry(each) and (each["value"] is None or _is_number(each))
+def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
+    """The numbers of each run of a result, by their place in it; one that is not known has the value None."""
+    tables = {table: as_mapping(data.get(table)) for table in (*_RUNS, "monte_carlo")}
+    nodes = {run: data.get(run) for run in ("start_up", "settling")}
+    nodes |= {f"{table}.{run}": node for table in _RUNS for run, node in tables[table].items()}
+    nodes[_RANDOM] = tables["monte_carlo"].get("quantiles")
+    runs = {
+        run: {
+            name: value
+            for name, value in _leaves(node, "")
+            if _is_entry(value) and not isinstance(value["value"], list)
+        }
+        for run, node in nodes.items()
     }
-    if numbers:
-        yield place, _Group(title, numbers)
+    return {run: numbers for run, numbers in runs.items() if numbers}
 
 
-def _spoken(name: str, driver: str) -> str:
+# -- their words
+
+
+def _words(driver: str) -> dict[str, str]:
+    """By name, the words on the numbers of a result."""
+    words = {name: text for part in registered() for name, text in part.words(driver).items()}
+    return words | {v.name: v.described(driver) for of in (ShaftAnswers, Answers) for v in variables(of)}
+
+
+def _spoken(name: str, words: Mapping[str, str]) -> str:
     """The name of a number in words: ``crank_torque_peak.q95`` -> crank torque, peak, 95 %."""
     first, _, rest = name.partition(".")
     rest = f"{rest[1:]} % of runs below" if rest[1:].isdigit() and rest[0] == "q" else rest.replace(".", ", ")
-    return ", ".join(filter(None, (_words(driver).get(first, first.replace("_", " ")), rest)))
+    return ", ".join(filter(None, (words.get(first, first.replace("_", " ")), rest)))
 
 
-def _measures(a: _Group, b: _Group) -> dict[str, Any]:
+def _title(result: StoredResult, run: str) -> str:
+    table, _, name = run.rpartition(".")
+    return "overloads at random" if run == _RANDOM else result.title_of(name) + _RUNS.get(table, "")
+
+
+# -- both
+
+
+def _measures(a: Numbers, b: Numbers, words: Mapping[str, str]) -> dict[str, Any]:
     """The measures that both have and that have a value in one of them."""
     return {
-        name: {"title": words} | _pair(one, b.numbers[name][1])
-        for name, (words, one) in a.numbers.items()
-        if name in b.numbers and not one["value"] is b.numbers[name][1]["value"] is None
+        name: {"title": _spoken(name, words)} | _pair(a[name], b[name])
+        for name in a
+        if name in b and not a[name]["value"] is b[name]["value"] is None
     }
 
 
@@ -256,4 +214,33 @@ def _pair(a: Mapping[str, Any], b: Mapping[str, Any]) -> dict[str, Any]:
         "b": entry(b["value"], b["unit"], str(b.get("kind", ""))),
         "difference": entry(difference, unit, of_difference),
         "relative": entry(share, "1", "percent"),
+    }
+
+
+def _alone(
+    mine: StoredResult,
+    runs: Mapping[str, Numbers],
+    theirs: StoredResult,
+    others: Mapping[str, Numbers],
+    words: Mapping[str, str],
+) -> dict[str, list[str]]:
+    """The runs, events and measures that one result has and the other has not."""
+    missing = [run for run in runs if run not in others]
+    # the further numbers of a run go with the run
+    whole = {run.removeprefix("answers.") for run in missing if run.startswith("answers.")}
+    events = as_mapping(theirs.data.get("event"))
+    return {
+        "runs": [
+            _title(mine, run)
+            for run in missing
+            if run.startswith("answers.") or run.split(".")[-1] not in whole
+        ],
+        "events": [name for name in as_mapping(mine.data.get("event")) if name not in events],
+        "measures": [
+            f"{_title(mine, run)}: {_spoken(name, words)}"
+            for run, numbers in runs.items()
+            if run in others
+            for name in numbers
+            if name not in others[run]
+        ],
     }

@@ -1,1 +1,1 @@
-"""Files for others: the sizing of a drive as an asset administration shell; cycle, candidates and checks as CSV."""
+"""Files for other programs: the numbers of a sized drive as JSON; cycle, candidates and checks as CSV."""

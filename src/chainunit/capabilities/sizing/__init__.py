@@ -114,9 +114,21 @@ class SizingCapability(Capability):
         plan: SizingPlan | None = config.plans[self.name]
         if plan is None:
             return None
-        from .chooser import SizingChooser
+        from ...drives.catalogue import offer
+        from .duty import duty_of
+        from .gear_rows import strong_enough
+        from .search import motors_on_offer, size
+        from .task import SizingTask
 
-        return SizingChooser(plan, config, folder, progress, backend).choose(config.machine)
+        offered, tables = offer(*config.file.catalogues), config.drive
+        gears = strong_enough(offered.gears, float(plan.demands.gear_torque))
+        task = SizingTask(
+            plan, tables, config.machine, config.operation, config.events, gears, offered.couplings
+        )
+        motors = motors_on_offer(task, offered.motors)
+        progress("the machine at constant speed", 0.0, 1.0)
+        duty = duty_of(task, config.values, folder, backend)
+        return size(task, motors, duty, folder, progress, backend).proposal(tables)
 
     def permitted_temperature(self, plan: SizingPlan | None) -> tuple[str, float] | None:
         """That of its table."""

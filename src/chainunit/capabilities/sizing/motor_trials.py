@@ -13,9 +13,7 @@ from ...drives.catalogue import CatalogueMotor
 from ...drives.catalogue_gears import CatalogueGear
 from ...drives.gear_ratios import DIRECT, gear_unit, next_ratio, ratio_on_offer
 from ...study.catalogue_drive import catalogue_drive, with_inertia
-from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION
-from ...study.proposal import Judged
 from .candidate import Candidate, TrialResult
 from .duty import Duty
 from .gear_rows import helps, rows_for, spent, unit_of
@@ -114,13 +112,6 @@ class MotorTrials:
         except RunError as error:
             c.trial, c.reason = TrialResult(), f"its run failed: {error}"
         return c
-
-    def judged_drive(self, drive: Drive, motor: CatalogueMotor) -> Judged:
-        """A drive as it is by its runs, with the start from the worst crank angle."""
-        sold = next((gear for gear in self.task.gears if gear.designation == drive.gear_name), None)
-        c = self.judged(Candidate(motor, drive, margin=self.plan.demands.margin, sold=sold), worst_start=True)
-        missed = sorted((name for name in c.checks if c.exceeds(name)), key=lambda name: -c.sizes[name])
-        return Judged(c.checks, tuple(missed), c.margin, c.reason)
 
     def with_least_boost(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
         """The judged candidate, with an inverter with the least boost with which it starts."""

@@ -1,83 +1,88 @@
-"""What a static inertia gets wrong: the same duty with the inertia of the machine as one number."""
+"""What a static inertia gets wrong: the RMS torque over a turn, by a calculation with the inertia as one number."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Literal
+from typing import Any
 
-from pydantic import Field
+import numpy as np
 
-from ...report.blocks import Block, Source
-from ...report.capability import Capability, Contents
-from ...report.lines import Line
-from ...study.analysis import Analysis
-from ...study.conditions import is_one_of
+from ...core.quantities import quantity
+from ...mechanism.models import InverseMachine
+from ...reading.results import result
+from ...report.blocks import Block, Source, Text
+from ...report.capability import Capability
+from ...study.analysis import Analysis, Findings, Work
+from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.record import StudyRecord
-from ...study.rules import MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, Rule, motor_is_chosen, other_models
+from ...study.rules import motor_is_chosen
 
-_NAME, _KEY = "static_inertia", "static_inertia_runs"
+_ALIKE = 0.02
+"""Relative deviation up to which the two are alike."""
+
+
+@result
+class StaticInertiaFindings(Findings):
+    """RMS torque at the crank over a turn at constant speed."""
+
+    machine: float = quantity("N.m", "RMS torque over a turn at constant speed")
+    static: float = quantity("N.m", "the same with the inertia as one number")
+
+    def remark(self, study: StudyRecord) -> None:
+        """No remark: the line of `StaticInertiaCapability.answer` says it."""
+
+
+class StaticInertiaAnalysis(Analysis):
+    """Both torques, if the study chooses the motor of a machine whose inertia belongs to its angle."""
+
+    name = "static_inertia"
+
+    @staticmethod
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
+        """Whether the motor is chosen, and the machine has turns and an inertia of its angle alone."""
+        machine, model = drive.machine, drive.machine.model
+        has_inertia = issubclass(model, InverseMachine) and model.States is None and model.turns
+        is_whole = machine.simulated is machine and not drive.foreign_titles
+        return bool(plans["static_inertia"]) and has_inertia and is_whole
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> StaticInertiaFindings:
+        """The torque of the turn with and without the term J'(phi) w^2/2 of the inertia: at constant speed one number
+        J has no part in the torque."""
+        turn = study.statics.normal
+        speed = turn.crank_speed * turn.ratio
+        inertial = 0.5 * turn.outputs.dJ_dphi * speed * speed * turn.ratio
+        return StaticInertiaFindings(_rms(turn.crank_torque), _rms(turn.crank_torque - inertial))
+
+
+def _rms(values: Any) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 class StaticInertiaCapability(Capability):
-    """The capability, with the key static_inertia_runs."""
+    """The capability; it comes with each choice of a motor."""
 
-    name = _NAME
-    choices = {  # noqa: RUF012
-        _KEY: (
-            Literal["sizing", "always", "never"],
-            Field(
-                "sizing",
-                description="when the machine is also run with one inertia, as sizing programs of drive makers take "
-                "it: where sizing chooses the motor, always, or never",
-            ),
-        )
-    }
-
-    def rules(self) -> Iterable[Rule]:
-        """It needs the inertia over the turn, and a model of the motor."""
-        always = is_one_of(_KEY, "always")
-        yield Rule(_KEY, MACHINE_FMU, NEEDS_MODEL, always)
-        yield Rule(_KEY, MOTOR_FMU, "needs a model of the motor, which is an FMU; leave it out", always)
-        for other in other_models():
-            words = f"needs an inertia that belongs to the angle, and {other.words}; leave it out"
-            yield Rule(_KEY, other.on, words, always)
+    name = "static_inertia"
 
     def plan(self, reading: FileReading) -> bool:
-        """Whether the study asks for it."""
-        when = reading.form.static_inertia_runs
-        return when == "always" or (when == "sizing" and motor_is_chosen().holds(reading.data))
+        """Whether the study chooses the motor."""
+        return motor_is_chosen().holds(reading.data)
 
     def analyses(self) -> Iterable[type[Analysis]]:
-        """The duty with one inertia."""
-        from .analysis import StaticInertiaAnalysis
-
+        """Both torques."""
         return (StaticInertiaAnalysis,)
 
-    def contents(self) -> Mapping[str, Contents]:
-        """Both duties, the drive that a program would have chosen, and a turn."""
-        from . import page
-
-        return {self.name: Contents("What a static inertia gets wrong", page.blocks, (page.PICTURE,))}
-
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """A line on it."""
-        from . import page
-
-        return page.answer(s, study)
-
-    def unchecked(self, study: StudyRecord) -> Iterator[Line]:
-        """Why a drive that was chosen has no comparison."""
-        if study.proposal is not None and _NAME not in study.findings:
-            from .runs import obstacle
-
-            why = (
-                obstacle(study.drive)
-                if study.config.plans[_NAME]
-                else 'the file has static_inertia_runs = "never"'
+        """A line if they differ."""
+        findings = StaticInertiaFindings.found_in(study)
+        if findings is not None and abs(findings.static - findings.machine) > _ALIKE * findings.machine:
+            yield Text(
+                s.line(
+                    "A constant-inertia calculation takes RMS {static_inertia.static} instead of "
+                    "{static_inertia.machine} at the {driver}."
+                )
             )
-            ended = "the study ended before" if study.failure else "its runs failed"
-            yield f"the same duty with a static inertia: {why or ended}"
 
 
 CAPABILITY = StaticInertiaCapability()
