@@ -109,7 +109,7 @@ def remark_on(study: StudyRecord) -> None:
     note(
         "chains",
         f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
-        f"{chain.end_damping:g} N m s), which has to be larger for a heavier organ, and their folding are assumed.",
+        f"{chain.end_damping:g} N m s) and their folding are assumed.",
     )
     if walls + webs < 4:
         few = f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show a chain well."

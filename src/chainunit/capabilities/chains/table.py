@@ -69,11 +69,15 @@ class ChainOrgans(OrganLaw):
 
 
 def _completed(chain: ChainOrgans, reading: FileReading) -> ChainOrgans | None:
-    """The table of a study with chains, with the highest of the speeds: twice the speed of normal running, or a fifth
-    beyond the lowest natural frequency of an organ where that is higher. None with two bars."""
+    """The table of a study with chains, with its damping, and with the highest of the speeds: twice the speed of
+    normal running, or a fifth beyond the lowest natural frequency of an organ where that is higher. None with two
+    bars."""
     if reading.form.organ != "chain" or not isinstance(reading.machine, ChainUnitMachine):
         return None
-    if "sweep_highest" in reading.given["chain"]:
+    given = reading.given["chain"]
+    usual = damping_of_organ(reading.machine)
+    chain = replace(chain, **{name: x for name, x in usual.items() if name not in given})
+    if "sweep_highest" in given:
         return chain
     _, mode = slack_and_mode(reading.machine, reading.values["feed"])
     beyond = _BEYOND * mode if math.isfinite(mode) else 0.0
@@ -81,11 +85,27 @@ def _completed(chain: ChainOrgans, reading: FileReading) -> ChainOrgans | None:
     return replace(chain, sweep_highest=highest)
 
 
+def damping_of_organ(machine: ChainUnitMachine) -> dict[str, float]:
+    """The damping of the pins of the heavier organ, by its names in `OrganLaw`: it damps the small vibration of any
+    organ as much as that of the packaged machine. The moment of the weight is m g l and the time of the vibration
+    sqrt(l/g), so that the damping of a pin grows as m l^1.5, and `eta` once more with the length."""
+    usual, law = ChainUnitMachine(), OrganLaw()
+    mass, length = (_mass(machine) / _mass(usual), machine.p.l1 / usual.p.l1)
+    return {"eta": law.eta * mass * length**2.5, "end_damping": law.end_damping * mass * length**1.5}
+
+
+def _mass(machine: ChainUnitMachine) -> float:
+    """The mass of the heavier organ without material [kg]."""
+    return max(side.wall_mass + side.web_mass for side in (machine.p.left, machine.p.right))
+
+
 CHAIN = FileSection(
     ChainOrgans,
     title="Chains",
     follows={
-        "sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more"
+        "eta": "that of the packaged machine by mass of the organ and l1^2.5",
+        "end_damping": "that of the packaged machine by mass of the organ and l1^1.5",
+        "sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more",
     },
     order=(("sweep_lowest", ">", "sweep_highest"),),
     completed=_completed,
