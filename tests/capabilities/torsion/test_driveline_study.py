@@ -378,7 +378,7 @@ def test_a_damping_ratio_sets_both_dampings():
         ("[driveline]\nJ4 = nan", "driveline.J4 = nan kg m2: must be finite"),
         ("[driveline]\nJ1 = 1", "driveline.J1: unknown key; known here: alpha1"),
         ("[driveline]\nc2 = -4", "driveline.c2 = -4 N m/rad: must be > 0 N m/rad"),
-        ("[driveline]\ndamping = 1", "driveline.damping: unknown key; it stands in [flexible_coupling]"),
+        ("[driveline]\ndamping = 1", 'driveline.damping: unknown key; was "damping_ratio" meant?'),
         ('[driveline]\nJ4 = "heavy"', 'driveline.J4 = "heavy": must be a number in kg m2'),
         ('[driveline]\nJ4 = "3 m"', 'driveline.J4 = "3 m": must be a number in kg m2'),
         ("[driveline]\nc2 = 1\nshaft2 = { section = 'round', outer = 0.04, length = 1 }",
