@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -55,6 +56,13 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
     }
 )
 """Typical start values by kind: a coupling, a two-stage helical gear, a V-belt, a worm gear."""
+
+
+def ordered_torque(least: float) -> float:
+    """Rated output torque [N m] with which a gear is ordered that needs at `least` such a one [N m]: rounded up to
+    three digits, so that a gear with the printed torque holds."""
+    step = 10.0 ** (math.floor(math.log10(least)) - 2) if least > 0.0 else 1.0
+    return float(f"{math.ceil(least / step * (1.0 - 1e-9)) * step:.6g}")
 
 
 def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:

@@ -34,7 +34,7 @@ from chainunit.drives.gear_ratios import (
     ratio_on_offer,
     typical_efficiency,
 )
-from chainunit.drives.gearing import START_FACTOR
+from chainunit.drives.gearing import START_FACTOR, ordered_torque
 from chainunit.drives.service_factor import LOAD_CLASSES, belt_factor, gear_factor, load_class
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number
@@ -630,7 +630,7 @@ def check_order(config, first, name, tmp_path, monkeypatch, *motors, more=""):
     that the start takes nearly wholly."""
     best = first.chosen_candidate
     start = max(each.quasi_static for each in starts_from_all(Rig(config.operation, best.drive, None), 3.0))
-    order = max(best.trial.duty.torque / 0.9, start / START_FACTOR)
+    order = ordered_torque(max(best.trial.duty.torque / 0.9, start / START_FACTOR))
     for factor in (START_FACTOR, start / order / 0.97):
         lines = f"{more}[gear]\ntorque_limit = {order}\nstart_factor = {factor}\n"
         _, result = sized(name, tmp_path, monkeypatch, *motors, more=lines, candidates=float(len(motors)))

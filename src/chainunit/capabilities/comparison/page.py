@@ -40,8 +40,8 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
     """Both files, their verdicts, and the warnings that only one has."""
     for side in SIDES:
         head, name = s.result[side], side.upper()
-        title = f": {{{side}.title}}" if head["title"] else ""
-        yield b.Text(s.line(f"{name}{title} ({{{side}.file}}, chainunit {{{side}.chainunit}})."))
+        titled = f"{name}: {{{side}.title}}" if head["title"] else name
+        yield b.Text(s.line(titled + f" ({{{side}.file}}, chainunit {{{side}.chainunit}})."))
         if head["status"] != "complete":
             yield b.Judgement("warning", s.line(f"{name}: {{{side}.status}}."))
     for side in SIDES:

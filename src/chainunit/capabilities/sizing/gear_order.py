@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ...drives.gearing import ordered_torque
 from ...reading.text import number
 from ...study.event import Role
 from ...study.event_torques import gear_peaks, running_peak, running_words
@@ -84,7 +85,7 @@ def gear_order(
         loads["overload"] = GearLoad(overloads[name], words, factor * kept, rule)
     least = max(load.rated for load in loads.values())
     transient = None if found is None else found.transient
-    return GearOrder(least, loads, left_out, transient)
+    return GearOrder(ordered_torque(least), loads, left_out, transient)
 
 
 def _starts(study: StudyRecord, found: StartFindings | None, peaks: Mapping[str, float]) -> dict[str, float]:

@@ -51,7 +51,7 @@ def ordered_gear(
     if order is None or not study.drive.is_geared:
         return None
     decides = order.decides
-    reason = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}"
+    reason = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}, rounded up"
     if order.left_out:
         names = ", ".join(map(study.title_of, order.left_out))
         reason += (
