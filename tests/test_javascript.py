@@ -194,8 +194,8 @@ return [coded(outputs), coded(rates)];
 
 SHORT_LINE = r"(left|right)[.](web|wall)[.](angle|w|a)|cylinder[.]moment"
 """Outputs of a chain that divide by the length of a line, which is nearly 0 in a few random states. There slopes
-change ten times as much by the last bit of the angles as by the rounding of the formula (against 50 digits). The moment
-of a cylinder is the small difference of reactions that are large in four of a thousand random states."""
+change ten times as much by the last bit of the angles as by the rounding of the formula (against 50 digits). The
+moment of a cylinder is the small difference of reactions that are large in four of a thousand random states."""
 
 
 def compare(got, want, names, units, most=1e-12, short=1e-11):
