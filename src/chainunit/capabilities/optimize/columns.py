@@ -101,7 +101,7 @@ class Columns:
                 rows.append(casadi.jtimes(rows[-1], self._lane[0], 1.0))
             result = casadi.densify(casadi.vertcat(*rows))
             arguments = [self._x, self._derived, self._lane]
-            self._functions[key] = casadi.Function("columns", arguments, [result])
+            self._functions[key] = casadi.Function("columns", arguments, [result], {"cse": True})
         return self._functions[key]
 
     def values(self, x: Any, q: Any, w: Any, places: Sequence[int], order: int = 0) -> Any:

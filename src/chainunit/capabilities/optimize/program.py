@@ -13,10 +13,10 @@ from .columns import Columns
 from .rows import OVER_TURN, Row, grid
 
 COARSE = 48
-"""Number of angles at which each limit stands."""
+"""Number of angles at which each limit over the turn stands at first; the pulls stand at half of them."""
 SLACK_SPEEDS = (0.0, 1.0)
-"""Speeds at which the pulls are limited, in parts of the highest speed of the slack-free range: without a processing
-force the pull is linear in the square of the speed, so that it is least at one end."""
+"""Speeds at which the pulls are limited at first, in parts of the highest speed of the slack-free range: without a
+processing force the pull is linear in the square of the speed, so that it is least at one end."""
 _DONE = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -25,16 +25,16 @@ _OPTIONS: dict[str, Any] = {
     "calc_lam_p": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.tol": 1e-10,
-    "ipopt.constr_viol_tol": 1e-10,
-    "ipopt.compl_inf_tol": 1e-10,
-    "ipopt.acceptable_tol": 1e-8,
-    "ipopt.acceptable_constr_viol_tol": 1e-9,
     "ipopt.bound_relax_factor": 0.0,
     "ipopt.max_iter": 300,
     "ipopt.mu_strategy": "monotone",
+    "ipopt.acceptable_tol": 1e-8,
+    "ipopt.acceptable_constr_viol_tol": 1e-9,
 }
+_ROUGH = {f"ipopt.{name}": 1e-7 for name in ("tol", "constr_viol_tol", "compl_inf_tol")}
+_EXACT = {f"ipopt.{name}": 1e-10 for name in ("tol", "constr_viol_tol", "compl_inf_tol")}
 _WARM = {
+    **_EXACT,
     "ipopt.warm_start_init_point": "yes",
     "ipopt.mu_init": 1e-6,
     "ipopt.warm_start_bound_push": 1e-9,
@@ -49,6 +49,8 @@ class Solution:
     variables (positive at an upper bound, negative at a lower one)."""
 
     z: Any
+    lanes: list[Any]
+    """angles and speeds of each row over the turn, shape (2, angles)"""
     multipliers: list[Any]
     bounds: Any
     exceeded: list[Any]
@@ -62,12 +64,12 @@ class Program:
     """The program of some rows. The variables are the free parameters, each as its place between its bounds (0 to 1),
     and the auxiliary variables.
 
-    Each row over the turn stands at `COARSE` angles, and at so many `peaks` more. There the column f, which has an
-    extreme near this angle, counts as f - f'^2 / (2 b), with the curvature b of today: to the third order in the way
-    of the extreme this is its value, so that the extreme may move with the parameters.
+    The first program from a start is rough: each row over the turn stands at angles of a grid. A further one, which
+    begins from a solution, has so many `peaks` of each row instead. There the column f, which has an extreme near this
+    angle, counts as f - f'^2 / (2 b), with the curvature b of that solution: to the third order in the way of the
+    extreme this is its value, so that the extreme may move with the parameters.
 
-    The sum of the auxiliary variables `costs` is to be least; `fine` is the number of angles for means. A program with
-    peaks begins from a solution.
+    The sum of the auxiliary variables `costs` is to be least; `fine` is the number of angles for means.
     """
 
     def __init__(
@@ -93,30 +95,30 @@ class Program:
         def table(kinds: Sequence[str], q: Any, w: Any) -> dict[int, Any]:
             """The values of the columns of these rows, one row each."""
             places = sorted({row.terms[0][1] for row in rows if row.kind in kinds})
-            if not places:
-                return {}
-            lanes = casadi.DM(np.stack(np.broadcast_arrays(q, w)))
-            values = columns.function(places)(x, derived, lanes)
+            values = columns.function(places)(x, derived, casadi.DM(np.stack(np.broadcast_arrays(q, w))))
             return {k: values[i, :].T for i, k in enumerate(places)}
 
         speed, slack_speed = speeds
-        turn = table(["turn"], grid(COARSE), speed)
-        slack = table(
-            ["slack"], np.tile(grid(COARSE), 2), np.repeat([part * slack_speed for part in SLACK_SPEEDS], COARSE)
-        )
-        mean = table(["mean", "rms"], grid(fine), speed)
-        distances = columns.distance(x)
+        half = grid(COARSE // 2)
+        self._grid = {
+            "turn": np.stack([grid(COARSE), np.full(COARSE, speed)]),
+            "slack": np.stack([np.tile(half, 2), np.repeat([share * slack_speed for share in SLACK_SPEEDS], len(half))]),
+        }
+        tables = {} if peaks else {kind: table([kind], *lanes) for kind, lanes in self._grid.items()}
+        fine = fine if peaks else COARSE
+        mean, distances = table(["mean", "rms"], grid(fine), speed), columns.distance(x)
         constraints = []
         for k, row in enumerate(rows):
             parts: list[Any] = []
             if row.kind in OVER_TURN:
                 ((_, column, factor),) = row.terms
-                parts = [factor * (turn if row.kind == "turn" else slack)[column]]
                 if peaks:
                     place = peaks * over_turn.index(k)
                     lanes = extremes[:, place : place + peaks]
                     value, slope = casadi.vertsplit(columns.function([column], 1)(x, derived, lanes[:2, :]))
-                    parts.append(factor * (value - 0.5 * slope**2 * lanes[2, :]).T)
+                    parts = [factor * (value - 0.5 * slope**2 * lanes[2, :]).T]
+                else:
+                    parts = [factor * tables[row.kind][column]]
             elif row.kind in ("mean", "rms"):
                 ((_, column, factor),) = row.terms
                 size = casadi.sumsqr(mean[column]) if row.kind == "rms" else casadi.sum1(mean[column])
@@ -142,9 +144,10 @@ class Program:
         cost = sum((z[n + place] for place in costs), casadi.MX(0.0))
         self._constraints = casadi.Function("constraints", [z, p], [g])
         self._watch = _watch(z.numel(), g.numel(), p.numel())
-        options = {**_OPTIONS, **(_WARM if peaks else {}), "iteration_callback": self._watch}
+        options = {**_OPTIONS, **(_WARM if peaks else _ROUGH), "iteration_callback": self._watch}
         self._solver = casadi.nlpsol("best", "ipopt", {"x": z, "p": p, "f": cost, "g": g}, options)
-        self._free = n
+        self._free, self._over_turn = n, over_turn
+        self._kinds = [rows[k].kind for k in over_turn]
 
     def solve(self, z: Any, low: Any, upper: Any, extremes: Any, last: Solution | None) -> Solution:
         """The solution near `z`, or near the `last` one, with the lower bounds `low` of the auxiliary variables and
@@ -159,9 +162,12 @@ class Program:
         z, p = z.copy(), np.concatenate([upper, np.ravel(extremes)])
         start: dict[str, Any] = {}
         if last is not None:
-            # a new peak has no multiplier yet
-            sizes = np.bincount(self._row)
-            parts = [np.pad(part, (0, size))[:size] for part, size in zip(last.multipliers, sizes, strict=True)]
+            # each peak begins with the multipliers of the nearest angles
+            parts = list(last.multipliers)
+            for k, before, now in zip(self._over_turn, last.lanes, extremes, strict=True):
+                parts[k] = np.zeros(len(now))
+                way = np.abs(np.sin(0.5 * (before[0][:, None] - now[:, 0]))) + np.abs(before[1][:, None] - now[:, 1])
+                np.add.at(parts[k], np.argmin(way, axis=1), last.multipliers[k])
             start = {"lam_g0": np.concatenate(parts), "lam_x0": last.bounds}
         else:
             exceeded = np.array(self._constraints(z, p)).ravel()
@@ -182,6 +188,7 @@ class Program:
         ends = np.flatnonzero(np.diff(self._row)) + 1
         return Solution(
             z=z,
+            lanes=[now[:, :2].T if len(now) else self._grid[kind] for now, kind in zip(extremes, self._kinds, strict=True)],
             multipliers=np.split(multipliers, ends),
             bounds=bounds,
             exceeded=np.split(np.where(self._equal, np.abs(g), g), ends),

@@ -28,11 +28,13 @@ _EXCEEDED = 1e-9
 """Share of its scale by which a limit may be exceeded between the angles."""
 _MET = 1e-7
 """Share of its scale by which a limit counts as met."""
-_LOOKED_AT, _NEAR = 0.05, 1e-3
+_LOOKED_AT, _NEAR = 0.05, 0.01
 """Shares of its scale by which a limit must be near at an angle of the grid, to be looked at between the angles, and
 at a peak, for which a program then has an angle."""
 _WAY, _EXACT = 1e-3, 1e-9
 """Way of a peak [rad] that its program describes to the rounding, and step at which its angle is exact."""
+_SAME = 1e-5
+"""Distance of two answers of rough programs, in parts of the bounds, that count as one."""
 _POWERS = {"mean": 1, "rms": 2}
 CHECKED = tuple(k / 16.0 for k in range(17))
 """Parts of the highest speed of the slack-free range at which the pulls are looked over; a processing force lowers
@@ -82,6 +84,7 @@ class Search:
         self._turning = [self.columns.whole(i.column) for q in quantities for i in q.integrands]
         self._turning += self.pulls
         self._programs: dict[Any, Program] = {}
+        self._answers: dict[Any, list[tuple[Any, Answer]]] = {}
         self._fine = 64
         self.effort = Effort()
         self.base = self._base()
@@ -213,15 +216,6 @@ class Search:
             rows.distances(TURNS, wishes.clearance, sizes, names)
         return rows, rows.loosen() if objective is None else {}
 
-    def _program(self, rows: Rows, costs: tuple[int, ...], peaks: int) -> Program:
-        """The program of these rows, which serves for all numbers that they have as upper limits."""
-        key = tuple(replace(row, upper=0.0) for row in rows.rows), costs, self._fine, peaks
-        if key not in self._programs:
-            speeds = self.wishes.crank_speed, self.wishes.slack_free_speed
-            sizes = len(rows.begin), self._fine, peaks
-            self._programs[key] = Program(self.columns, speeds, rows.rows, costs, *sizes)
-        return self._programs[key]
-
     def solve(
         self,
         x: Any,
@@ -235,21 +229,22 @@ class Search:
         limits = self.wishes.limits if limits is None else limits
         rows, slacks = self._rows(x, objective, limits, without)
         costs = (0,) if objective is not None else tuple(slacks.values())
-        upper = np.array([row.upper for row in rows.rows])
         z = np.concatenate([np.clip((x - low) / span, 1e-3, 1.0 - 1e-3), rows.begin])
-        followed, point = np.zeros((sum(row.kind in OVER_TURN for row in rows.rows), 0, 3)), None
-        self._are_means_rough(rows.rows, x)
+        followed, worst = np.zeros((sum(row.kind in OVER_TURN for row in rows.rows), 0, 3)), math.inf
+        point = self._run(rows, costs, z, followed, None)
+        # a start that ends where another one did has its answer
+        begun = self._answers.setdefault((tuple(rows.rows), costs), [])
+        for z, answer in begun:
+            if np.max(np.abs(point.z - z)) < _SAME:
+                return answer
+        rough = point.z
         for _ in range(_ROUNDS):
-            point = self._program(rows, costs, followed.shape[1]).solve(z, rows.low, upper, followed, point)
-            self.effort.programs += 1
-            self.effort.iterations += point.iterations
-            self.effort.evaluations += point.evaluations
             worst = math.inf
             if not point.converged:
                 break
-            z, x = point.z, low + span * point.z[:n]
+            z, x = point.z, self._x(point)
             followed, more, worst = self._followed(rows.rows, point, followed)
-            more |= self._are_means_rough(rows.rows, x)
+            more |= self._are_means_rough(rows.rows, point)
             if any(row.kind == "slope" for row in rows.rows):
                 # another extreme may be the largest one now
                 fresh, _ = self._rows(x, objective, limits, without)
@@ -259,26 +254,49 @@ class Search:
                     z[n + np.array(fresh.angles)] = np.array(fresh.begin)[fresh.angles]
             if not more:
                 break
-        return self._answer(objective, slacks, rows.rows, point, worst)
+            point = self._run(rows, costs, z, followed, point)
+        begun.append((rough, self._answer(objective, slacks, rows.rows, point, worst)))
+        return begun[-1][1]
 
-    def _are_means_rough(self, rows: Sequence[Row], x: Any) -> bool:
-        """Whether the programs had too few angles for the means of a machine; they now have enough."""
-        few = self._fine
-        for kind, k in {(row.kind, row.terms[0][1]) for row in rows if row.kind in _POWERS}:
-            exact = self._mean(x, k, kind)
-            while self._fine < _MOST_ANGLES:
-                rough = np.mean(self._turn(x, [k], self._fine) ** _POWERS[kind])
-                if not abs(rough - exact) > _EXCEEDED * abs(exact):
-                    break
-                self._fine *= 2
+    def _run(
+        self, rows: Rows, costs: tuple[int, ...], z: Any, followed: Any, last: Solution | None
+    ) -> Solution:
+        """The solution of a program of these rows, which serves for all numbers that they have as upper limits."""
+        key = tuple(replace(row, upper=0.0) for row in rows.rows), costs, followed.shape[1] and (followed.shape[1], self._fine)
+        if key not in self._programs:
+            speeds = self.wishes.crank_speed, self.wishes.slack_free_speed
+            sizes = len(rows.begin), self._fine, followed.shape[1]
+            self._programs[key] = Program(self.columns, speeds, rows.rows, costs, *sizes)
+        upper = np.array([row.upper for row in rows.rows])
+        point = self._programs[key].solve(z, rows.low, upper, followed, last)
+        self.effort.programs += 1
+        self.effort.iterations += point.iterations
+        self.effort.evaluations += point.evaluations
+        return point
+
+    def _are_means_rough(self, rows: Sequence[Row], point: Solution) -> bool:
+        """Whether the program had too few angles for a mean that is near its limit; the next one has enough."""
+        few, x = self._fine, self._x(point)
+        for row, exceeded in zip(rows, point.exceeded, strict=True):
+            if row.kind in _POWERS and exceeded[0] > -_NEAR:
+                k, power = row.terms[0][1], _POWERS[row.kind]
+                exact = self._mean(x, k, row.kind)
+                while self._fine < _MOST_ANGLES:
+                    rough = np.mean(self._turn(x, [k], self._fine) ** power)
+                    if not abs(rough - exact) > _EXCEEDED * abs(exact):
+                        break
+                    self._fine *= 2
         return self._fine > few
+
+    def _x(self, point: Solution) -> Any:
+        return self.columns.low + self.columns.span * point.z[: self.columns.size]
 
     def _followed(self, rows: Sequence[Row], point: Solution, lanes: Any) -> tuple[Any, bool, float]:
         """The peaks near or beyond a limit, as a program takes them; whether there must be a further one, as a limit
         is exceeded between the angles or a peak of its `lanes` has moved too far; and the most by which a limit is
         exceeded."""
         columns, highest = self.columns, self.wishes.slack_free_speed
-        x, aux = columns.low + columns.span * point.z[: columns.size], point.z[columns.size :]
+        x, aux = self._x(point), point.z[columns.size :]
         peaks, speeds, moved = [], [], False
         for k, before in zip((k for k, row in enumerate(rows) if row.kind in OVER_TURN), lanes, strict=True):
             row, ((_, column, factor),) = rows[k], rows[k].terms
@@ -290,10 +308,11 @@ class Search:
             tops = [self._peaks(x, column, factor, w, -offset - _LOOKED_AT * row.scale) for w in speeds[-1]]
             top = np.concatenate(tops)
             top[:, 0] = (top[:, 0] + offset) / row.scale
-            peaks.append(top[top[:, 0] > -_NEAR])
+            # the largest one stays: the next solution may be near it
+            peaks.append(top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))])
             if len(before):
                 _, (slopes,) = columns.values(x, before[:, 0], before[:, 1], [column], 1)
-                holds = point.exceeded[k][-len(before) :] > -_NEAR
+                holds = point.exceeded[k] > -_NEAR
                 moved |= bool(np.any(holds & (np.abs(slopes * before[:, 2]) > _WAY)))
         number = max((len(top) for top in peaks), default=0)
         followed = np.zeros((len(peaks), max(2 ** math.ceil(math.log2(number or 1)), lanes.shape[1], 2), 3))
@@ -301,16 +320,14 @@ class Search:
             place[:, 1] = w[0]
             place[: len(top)] = top[:, 1:]
         worst = max((float(np.max(top[:, 0], initial=-math.inf)) for top in peaks), default=-math.inf)
-        return followed, moved or worst > _EXCEEDED, worst
+        return followed, not lanes.shape[1] or moved or worst > _EXCEEDED, worst
 
     def _peaks(self, x: Any, column: int, factor: float, w: float, least: float) -> Any:
-        """The maxima of a column times `factor` at crank speed `w` that are about `least` or more: its value, the
-        angle, the speed, and 1 / curvature of the column, or 0 for a kink, shape (maxima, 4)."""
+        """The maxima of a column times `factor` at crank speed `w` that are about `least` or more, and the largest one:
+        its value, the angle, the speed, and 1 / curvature of the column, or 0 for a kink, shape (maxima, 4)."""
         y = factor * self.columns.values(x, grid(FINE), w, [column])[0, 0]
-        places = np.flatnonzero((y >= np.roll(y, 1)) & (y >= np.roll(y, -1)) & (y >= least))
-        begin = q = grid(FINE)[places]
-        if not len(q):
-            return np.zeros((0, 4))
+        near = y >= min(least, np.max(y))
+        begin = q = grid(FINE)[near & (y >= np.roll(y, 1)) & (y >= np.roll(y, -1))]
         for _ in range(_ROUNDS):
             _, slope, bend = self.columns.values(x, q, w, [column], 2)[:, 0]
             way = -slope / np.where(factor * bend < 0.0, bend, np.inf)
