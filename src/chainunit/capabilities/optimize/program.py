@@ -44,6 +44,21 @@ _WARM = {
 
 
 @dataclass(frozen=True)
+class Lanes:
+    """Angles of a program: `peaks`, shape (rows over the turn, peaks, 3), has the angle, the speed and 1 / b of each
+    peak, or 0 for a column without such a curvature; `nodes`, shape (2, nodes), the angles for means and their
+    weights."""
+
+    peaks: Any
+    nodes: Any
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """The numbers of peaks and of nodes."""
+        return self.peaks.shape[1], self.nodes.shape[1]
+
+
+@dataclass(frozen=True)
 class Solution:
     """A solution: the variables `z`, the multipliers of each row at its angles, and those of the bounds of the
     variables (positive at an upper bound, negative at a lower one)."""
@@ -69,7 +84,7 @@ class Program:
     angle, counts as f - f'^2 / (2 b), with the curvature b of that solution: to the third order in the way of the
     extreme this is its value, so that the extreme may move with the parameters.
 
-    The sum of the auxiliary variables `costs` is to be least; `fine` is the number of angles for means.
+    The sum of the auxiliary variables `costs` is to be least; `sizes` are those of its lanes.
     """
 
     def __init__(
@@ -79,8 +94,7 @@ class Program:
         rows: Sequence[Row],
         costs: Sequence[int],
         auxiliary: int,
-        fine: int,
-        peaks: int,
+        sizes: tuple[int, int],
     ) -> None:
         import casadi
 
@@ -88,14 +102,15 @@ class Program:
         z = casadi.MX.sym("z", n + auxiliary)
         over_turn = [k for k, row in enumerate(rows) if row.kind in OVER_TURN]
         upper = casadi.MX.sym("upper", len(rows))
-        extremes = casadi.MX.sym("extremes", 3, peaks * len(over_turn))
+        peaks, fine = sizes
+        extremes, nodes = casadi.MX.sym("peaks", 3, peaks * len(over_turn)), casadi.MX.sym("nodes", fine, 2)
         x = casadi.DM(columns.low) + casadi.DM(columns.span) * z[:n]
         derived = columns.derived(x)
 
-        def table(kinds: Sequence[str], q: Any, w: Any) -> dict[int, Any]:
+        def table(kinds: Sequence[str], lanes: Any) -> dict[int, Any]:
             """The values of the columns of these rows, one row each."""
             places = sorted({row.terms[0][1] for row in rows if row.kind in kinds})
-            values = columns.function(places)(x, derived, casadi.DM(np.stack(np.broadcast_arrays(q, w))))
+            values = columns.function(places)(x, derived, lanes)
             return {k: values[i, :].T for i, k in enumerate(places)}
 
         speed, slack_speed = speeds
@@ -104,9 +119,9 @@ class Program:
             "turn": np.stack([grid(COARSE), np.full(COARSE, speed)]),
             "slack": np.stack([np.tile(half, 2), np.repeat([share * slack_speed for share in SLACK_SPEEDS], len(half))]),
         }
-        tables = {} if peaks else {kind: table([kind], *lanes) for kind, lanes in self._grid.items()}
-        fine = fine if peaks else COARSE
-        mean, distances = table(["mean", "rms"], grid(fine), speed), columns.distance(x)
+        tables = {} if peaks else {kind: table([kind], casadi.DM(lanes)) for kind, lanes in self._grid.items()}
+        at_nodes = casadi.horzcat(nodes[:, 0], casadi.repmat(casadi.MX(speed), fine)).T
+        mean, distances = table(["mean", "rms"], at_nodes), columns.distance(x)
         constraints = []
         for k, row in enumerate(rows):
             parts: list[Any] = []
@@ -121,8 +136,9 @@ class Program:
                     parts = [factor * tables[row.kind][column]]
             elif row.kind in ("mean", "rms"):
                 ((_, column, factor),) = row.terms
-                size = casadi.sumsqr(mean[column]) if row.kind == "rms" else casadi.sum1(mean[column])
-                parts = [factor * (casadi.sqrt(size / fine) if row.kind == "rms" else size / fine)]
+                power = 2 if row.kind == "rms" else 1
+                size = casadi.dot(nodes[:, 1], mean[column] ** power)
+                parts = [factor * (casadi.sqrt(size) if power == 2 else size)]
             elif row.kind == "distance":
                 ((_, place, factor),) = row.terms
                 parts = [factor * distances[place]]
@@ -140,7 +156,7 @@ class Program:
         self._lifts = {
             n + place: np.array([any(k == place for k, _ in row.aux) for row in rows])[self._row] for place in costs
         }
-        p, g = casadi.vertcat(upper, casadi.vec(extremes)), casadi.vertcat(*constraints)
+        p, g = casadi.vertcat(upper, casadi.vec(extremes), casadi.vec(nodes)), casadi.vertcat(*constraints)
         cost = sum((z[n + place] for place in costs), casadi.MX(0.0))
         self._constraints = casadi.Function("constraints", [z, p], [g])
         self._watch = _watch(z.numel(), g.numel(), p.numel())
@@ -149,22 +165,21 @@ class Program:
         self._free, self._over_turn = n, over_turn
         self._kinds = [rows[k].kind for k in over_turn]
 
-    def solve(self, z: Any, low: Any, upper: Any, extremes: Any, last: Solution | None) -> Solution:
+    def solve(self, z: Any, low: Any, upper: Any, lanes: Lanes, last: Solution | None) -> Solution:
         """The solution near `z`, or near the `last` one, with the lower bounds `low` of the auxiliary variables and
-        the numbers `upper` of the rows. `extremes`, shape (rows over the turn, peaks, 3), has the angle and the speed
-        of each peak and 1 / b, or 0 for a column without such a curvature.
+        the numbers `upper` of the rows.
 
         Raises
         ------
         KeyboardInterrupt
             if Ctrl-C or SIGTERM came in the meantime.
         """
-        z, p = z.copy(), np.concatenate([upper, np.ravel(extremes)])
+        z, p = z.copy(), np.concatenate([upper, np.ravel(lanes.peaks), np.ravel(lanes.nodes)])
         start: dict[str, Any] = {}
         if last is not None:
             # each peak begins with the multipliers of the nearest angles
             parts = list(last.multipliers)
-            for k, before, now in zip(self._over_turn, last.lanes, extremes, strict=True):
+            for k, before, now in zip(self._over_turn, last.lanes, lanes.peaks, strict=True):
                 parts[k] = np.zeros(len(now))
                 way = np.abs(np.sin(0.5 * (before[0][:, None] - now[:, 0]))) + np.abs(before[1][:, None] - now[:, 1])
                 np.add.at(parts[k], np.argmin(way, axis=1), last.multipliers[k])
@@ -188,7 +203,7 @@ class Program:
         ends = np.flatnonzero(np.diff(self._row)) + 1
         return Solution(
             z=z,
-            lanes=[now[:, :2].T if len(now) else self._grid[kind] for now, kind in zip(extremes, self._kinds, strict=True)],
+            lanes=[now[:, :2].T if len(now) else self._grid[kind] for now, kind in zip(lanes.peaks, self._kinds, strict=True)],
             multipliers=np.split(multipliers, ends),
             bounds=bounds,
             exceeded=np.split(np.where(self._equal, np.abs(g), g), ends),

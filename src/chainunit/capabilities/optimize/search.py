@@ -12,18 +12,19 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InputError, RunError
-from ...mechanism.sampled_quantities import largest, means
+from ...mechanism.sampled_quantities import mean_rule, means
 from ...reading.results import part, result
 from ...study.cycle_quantities import CycleQuantity
 from .columns import Columns
-from .program import COARSE, Program, Solution
+from .program import COARSE, Lanes, Program, Solution
 from .rows import OVER_TURN, SIGNS, Row, Rows, grid
 from .wishes import SLACK, TURNS, TurnLimit, Wishes
 
 FINE = 720
 """Number of angles at which the answer of a program is looked over."""
-_MOST_ANGLES = 2**15
-"""Largest number of angles for means."""
+_PARTS, _MOST_PEAKS = 8, 8
+"""Parts of the turn at first for means, and largest number of peaks of a column at a speed: a constant column has
+peaks of rounding."""
 _EXCEEDED = 1e-9
 """Share of its scale by which a limit may be exceeded between the angles."""
 _MET = 1e-7
@@ -85,7 +86,6 @@ class Search:
         self._turning += self.pulls
         self._programs: dict[Any, Program] = {}
         self._answers: dict[Any, list[tuple[Any, Answer]]] = {}
-        self._fine = 64
         self.effort = Effort()
         self.base = self._base()
         self.scales = {q.name: abs(self.value(q, self.base)) or 1.0 for q in quantities}
@@ -118,9 +118,9 @@ class Search:
         met = np.all(self.columns.distances(x) > 0.0)
         return bool(met and np.all(np.isfinite(self._turn(x, self._turning))))
 
-    def _turn(self, x: Any, places: Sequence[int], points: int = COARSE) -> Any:
-        """Columns over the turn, shape (places, points)."""
-        return self.columns.values(x, grid(points), self.wishes.crank_speed, places)[0]
+    def _turn(self, x: Any, places: Sequence[int]) -> Any:
+        """Columns over the turn, shape (places, COARSE)."""
+        return self.columns.values(x, grid(COARSE), self.wishes.crank_speed, places)[0]
 
     # quantities
 
@@ -146,14 +146,10 @@ class Search:
 
     def _extreme(self, x: Any, k: int, reduction: str) -> tuple[float, float]:
         """The crank angle [rad] and the value of an extreme of a column."""
-        signs = np.array(SIGNS[reduction])
-
-        def values(q: Any) -> Any:
-            return signs[:, None] * self.columns.values(x, q, self.wishes.crank_speed, [k])[0]
-
-        angles, tops = largest(values, np.linspace(0.0, 2.0 * math.pi, FINE + 1), around=True)
-        place = int(np.argmax(tops))
-        return float(angles[place]), float(tops[place] * (-1.0 if reduction == "min" else 1.0))
+        w = self.wishes.crank_speed
+        peaks = np.concatenate([self._peaks(x, k, sign, w, -math.inf) for sign in SIGNS[reduction]])
+        top, angle, *_ = peaks[np.argmax(peaks[:, 0])]
+        return float(angle), float(-top if reduction == "min" else top)
 
     def extreme_angles(self, q: CycleQuantity, x: Any) -> list[float]:
         """The crank angles of the extremes of a quantity [rad]."""
@@ -164,17 +160,24 @@ class Search:
         """The least mean pull along a web up to the highest speed of the slack-free range [N]."""
         from scipy.optimize import minimize_scalar
 
-        def pull(share: float) -> float:
-            w = share * self.wishes.slack_free_speed
-            return float(np.min(self.columns.values(x, grid(FINE), w, self.pulls)))
+        def pulls(q: Any, shares: Any) -> Any:
+            w = np.repeat(np.atleast_1d(shares) * self.wishes.slack_free_speed, len(q))
+            values = self.columns.values(x, np.tile(q, np.size(shares)), w, self.pulls)
+            return np.min(values, axis=(0, 1)).reshape(np.size(shares), len(q))
 
-        pulls = [pull(share) for share in CHECKED]
-        k = int(np.argmin(pulls))
-        ends = CHECKED[max(k - 1, 0)], CHECKED[min(k + 1, len(CHECKED) - 1)]
+        table = pulls(grid(FINE), CHECKED)
+        k = int(np.argmin(np.min(table, axis=1)))
+        ends = max(k - 1, 0), min(k + 1, len(CHECKED) - 1)
+        around = np.min(table[ends[0] : ends[1] + 1], axis=0)
+        q = grid(FINE)[around <= np.min(around) + 0.1 * np.ptp(around)]
+        low, high = CHECKED[ends[0]], CHECKED[ends[1]]
         between = minimize_scalar(
-            pull, bounds=ends, method="bounded", options={"xatol": 1e-3 * (ends[1] - ends[0])}
+            lambda share: float(np.min(pulls(q, share))),
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 1e-3 * (high - low)},
         )
-        return min(pulls[k], float(between.fun))
+        return min(float(np.min(table)), float(between.fun))
 
     # programs
 
@@ -230,8 +233,10 @@ class Search:
         rows, slacks = self._rows(x, objective, limits, without)
         costs = (0,) if objective is not None else tuple(slacks.values())
         z = np.concatenate([np.clip((x - low) / span, 1e-3, 1.0 - 1e-3), rows.begin])
-        followed, worst = np.zeros((sum(row.kind in OVER_TURN for row in rows.rows), 0, 3)), math.inf
-        point = self._run(rows, costs, z, followed, None)
+        number = sum(row.kind in OVER_TURN for row in rows.rows)
+        nodes = np.stack([grid(COARSE), np.full(COARSE, 1.0 / COARSE)])
+        lanes, worst = Lanes(np.zeros((number, 0, 3)), nodes), math.inf
+        point = self._run(rows, costs, z, lanes, None)
         # a start that ends where another one did has its answer
         begun = self._answers.setdefault((tuple(rows.rows), costs), [])
         for z, answer in begun:
@@ -243,8 +248,7 @@ class Search:
             if not point.converged:
                 break
             z, x = point.z, self._x(point)
-            followed, more, worst = self._followed(rows.rows, point, followed)
-            more |= self._are_means_rough(rows.rows, point)
+            lanes, more, worst = self._followed(rows.rows, point, lanes)
             if any(row.kind == "slope" for row in rows.rows):
                 # another extreme may be the largest one now
                 fresh, _ = self._rows(x, objective, limits, without)
@@ -254,87 +258,99 @@ class Search:
                     z[n + np.array(fresh.angles)] = np.array(fresh.begin)[fresh.angles]
             if not more:
                 break
-            point = self._run(rows, costs, z, followed, point)
+            point = self._run(rows, costs, z, lanes, point)
         begun.append((rough, self._answer(objective, slacks, rows.rows, point, worst)))
         return begun[-1][1]
 
     def _run(
-        self, rows: Rows, costs: tuple[int, ...], z: Any, followed: Any, last: Solution | None
+        self, rows: Rows, costs: tuple[int, ...], z: Any, lanes: Lanes, last: Solution | None
     ) -> Solution:
         """The solution of a program of these rows, which serves for all numbers that they have as upper limits."""
-        key = tuple(replace(row, upper=0.0) for row in rows.rows), costs, followed.shape[1] and (followed.shape[1], self._fine)
+        key = tuple(replace(row, upper=0.0) for row in rows.rows), costs, lanes.sizes
         if key not in self._programs:
             speeds = self.wishes.crank_speed, self.wishes.slack_free_speed
-            sizes = len(rows.begin), self._fine, followed.shape[1]
-            self._programs[key] = Program(self.columns, speeds, rows.rows, costs, *sizes)
+            auxiliary = len(rows.begin)
+            self._programs[key] = Program(self.columns, speeds, rows.rows, costs, auxiliary, lanes.sizes)
         upper = np.array([row.upper for row in rows.rows])
-        point = self._programs[key].solve(z, rows.low, upper, followed, last)
+        point = self._programs[key].solve(z, rows.low, upper, lanes, last)
         self.effort.programs += 1
         self.effort.iterations += point.iterations
         self.effort.evaluations += point.evaluations
         return point
 
-    def _are_means_rough(self, rows: Sequence[Row], point: Solution) -> bool:
-        """Whether the program had too few angles for a mean that is near its limit; the next one has enough."""
-        few, x = self._fine, self._x(point)
-        for row, exceeded in zip(rows, point.exceeded, strict=True):
-            if row.kind in _POWERS and exceeded[0] > -_NEAR:
-                k, power = row.terms[0][1], _POWERS[row.kind]
-                exact = self._mean(x, k, row.kind)
-                while self._fine < _MOST_ANGLES:
-                    rough = np.mean(self._turn(x, [k], self._fine) ** power)
-                    if not abs(rough - exact) > _EXCEEDED * abs(exact):
-                        break
-                    self._fine *= 2
-        return self._fine > few
-
     def _x(self, point: Solution) -> Any:
         return self.columns.low + self.columns.span * point.z[: self.columns.size]
 
-    def _followed(self, rows: Sequence[Row], point: Solution, lanes: Any) -> tuple[Any, bool, float]:
-        """The peaks near or beyond a limit, as a program takes them; whether there must be a further one, as a limit
-        is exceeded between the angles or a peak of its `lanes` has moved too far; and the most by which a limit is
-        exceeded."""
-        columns, highest = self.columns, self.wishes.slack_free_speed
-        x, aux = self._x(point), point.z[columns.size :]
-        peaks, speeds, moved = [], [], False
-        for k, before in zip((k for k, row in enumerate(rows) if row.kind in OVER_TURN), lanes, strict=True):
+    def _followed(self, rows: Sequence[Row], point: Solution, lanes: Lanes) -> tuple[Lanes, bool, float]:
+        """The lanes of a further program; whether there must be one, as a limit is exceeded between the angles, a peak
+        has moved too far, or a mean is rough; and the most by which a limit is exceeded."""
+        x, aux, highest = self._x(point), point.z[self.columns.size :], self.wishes.slack_free_speed
+        peaks, first, more = [], [], not lanes.sizes[0]
+        for k, before in zip((k for k, row in enumerate(rows) if row.kind in OVER_TURN), lanes.peaks, strict=True):
             row, ((_, column, factor),) = rows[k], rows[k].terms
             offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
-            if row.kind == "slack":
-                speeds.append([share * highest for share in CHECKED])
-            else:
-                speeds.append([self.wishes.crank_speed])
-            tops = [self._peaks(x, column, factor, w, -offset - _LOOKED_AT * row.scale) for w in speeds[-1]]
+            is_slack = row.kind == "slack"
+            speeds = [share * highest for share in CHECKED] if is_slack else [self.wishes.crank_speed]
+            tops = [self._peaks(x, column, factor, w, -offset - _LOOKED_AT * row.scale) for w in speeds]
             top = np.concatenate(tops)
             top[:, 0] = (top[:, 0] + offset) / row.scale
             # the largest one stays: the next solution may be near it
             peaks.append(top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))])
+            first.append(speeds[0])
             if len(before):
-                _, (slopes,) = columns.values(x, before[:, 0], before[:, 1], [column], 1)
-                holds = point.exceeded[k] > -_NEAR
-                moved |= bool(np.any(holds & (np.abs(slopes * before[:, 2]) > _WAY)))
-        number = max((len(top) for top in peaks), default=0)
-        followed = np.zeros((len(peaks), max(2 ** math.ceil(math.log2(number or 1)), lanes.shape[1], 2), 3))
-        for place, top, w in zip(followed, peaks, speeds, strict=True):
-            place[:, 1] = w[0]
+                _, (slopes,) = self.columns.values(x, before[:, 0], before[:, 1], [column], 1)
+                holds = point.exceeded[k] > -_MET
+                more |= bool(np.any(holds & (np.abs(slopes * before[:, 2]) > _WAY)))
+        worst = max((float(np.max(top[:, 0])) for top in peaks), default=-math.inf)
+        room = max((2 ** math.ceil(math.log2(len(top))) for top in peaks), default=1)
+        followed = np.zeros((len(peaks), max(room, lanes.sizes[0], 2), 3))
+        for place, top, w in zip(followed, peaks, first, strict=True):
+            place[:, 1] = w
             place[: len(top)] = top[:, 1:]
-        worst = max((float(np.max(top[:, 0], initial=-math.inf)) for top in peaks), default=-math.inf)
-        return followed, not lanes.shape[1] or moved or worst > _EXCEEDED, worst
+        nodes, rough = self._nodes(rows, point, lanes.nodes)
+        return Lanes(followed, nodes), more or rough or worst > _EXCEEDED, worst
+
+    def _nodes(self, rows: Sequence[Row], point: Solution, nodes: Any) -> tuple[Any, bool]:
+        """The nodes for the means that are near their limits, and whether the `nodes` of the program were too few."""
+        x = self._x(point)
+        means = [(row.terms[0][1], _POWERS[row.kind]) for row, g in zip(rows, point.exceeded, strict=True)
+                 if row.kind in _POWERS and g[0] > -_NEAR]
+        if not means:
+            return nodes, False
+
+        def values(q: Any) -> Any:
+            table = self.columns.values(x, q, self.wishes.crank_speed, [k for k, _ in means])[0]
+            return table ** np.array([power for _, power in means])[:, None]
+
+        q, weights = mean_rule(values, 0.0, 2.0 * math.pi, _PARTS)
+        exact, rough = values(q) @ weights, values(nodes[0]) @ nodes[1]
+        if np.all(np.abs(exact - rough) <= _EXCEEDED * np.abs(exact)):
+            return nodes, False
+        room = np.zeros((2, max(2 ** math.ceil(math.log2(len(q))), len(nodes[0]))))
+        room[:, : len(q)] = q, weights
+        return room, True
 
     def _peaks(self, x: Any, column: int, factor: float, w: float, least: float) -> Any:
         """The maxima of a column times `factor` at crank speed `w` that are about `least` or more, and the largest one:
-        its value, the angle, the speed, and 1 / curvature of the column, or 0 for a kink, shape (maxima, 4)."""
+        its value, the angle, the speed, and 1 / curvature of the column, or 0 at a kink, shape (maxima, 4)."""
         y = factor * self.columns.values(x, grid(FINE), w, [column])[0, 0]
-        near = y >= min(least, np.max(y))
-        begin = q = grid(FINE)[near & (y >= np.roll(y, 1)) & (y >= np.roll(y, -1))]
+        is_peak = (y >= least) & (y >= np.roll(y, 1)) & (y > np.roll(y, -1))
+        is_peak[np.argmax(y)] = True
+        places = np.flatnonzero(is_peak)
+        places = places[np.argsort(-y[places])][:_MOST_PEAKS]
+        begin = q = grid(FINE)[places]
+        smooth = np.ones(len(q), bool)
         for _ in range(_ROUNDS):
-            _, slope, bend = self.columns.values(x, q, w, [column], 2)[:, 0]
-            way = -slope / np.where(factor * bend < 0.0, bend, np.inf)
-            q = np.clip(q + way, begin - 2.0 * math.pi / FINE, begin + 2.0 * math.pi / FINE)
-        smooth = (factor * bend < 0.0) & (np.abs(way) < _EXACT)
-        q = np.where(smooth, q, begin)
-        value = factor * self.columns.values(x, q, w, [column])[0, 0]
+            value, slope, bend = self.columns.values(x, q, w, [column], 2)[:, 0]
+            smooth &= factor * bend < 0.0
+            way = np.where(smooth, -slope / np.where(smooth, bend, 1.0), 0.0)
+            smooth &= np.abs(q + way - begin) <= 2.0 * math.pi / FINE
+            if np.all(np.abs(way[smooth]) < _EXACT):
+                break
+            q = np.where(smooth, q + way, begin)
+        # a kink, or a peak that is narrower, counts as the angle of the grid
+        smooth &= (np.abs(way) < _EXACT) & (factor * value >= y[places])
+        value, q = np.where(smooth, factor * value, y[places]), np.where(smooth, q, begin)
         return np.stack([value, q, np.full(len(q), w), smooth / np.where(smooth, bend, 1.0)], axis=1)
 
     def _answer(
