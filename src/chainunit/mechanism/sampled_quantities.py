@@ -104,8 +104,8 @@ def mean_rule(values_at: Callable[[Any], Any], low: float, high: float, parts: i
 
 
 def _parts(values_at: Callable[[Any], Any], low: float, high: float, parts: int) -> tuple[Any, Any, Any, Any]:
-    """Begins and ends of parts of the way, the integral of each quantity over each, shape (quantities, parts), and the
-    integral of its size over the way.
+    """Begins and ends of parts of the way, the integral of each quantity over each of them, shape (quantities,
+    parts), and the integral of its size over the way.
 
     Gauss's rule on parts of the way; a part is halved until both rules agree, so that a load that begins or ends
     sharply counts as it is. One that acts over less than 0.3 degrees of a turn may lie between all points.

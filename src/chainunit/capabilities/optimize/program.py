@@ -12,7 +12,7 @@ from ...work.interrupts import stoppable
 from .columns import Columns
 from .rows import OVER_TURN, Row, grid
 
-COARSE = 48
+COARSE = 32
 """Number of angles at which each limit over the turn stands at first; the pulls stand at half of them."""
 SLACK_SPEEDS = (0.0, 1.0)
 """Speeds at which the pulls are limited at first, in parts of the highest speed of the slack-free range: without a
@@ -79,10 +79,10 @@ class Program:
     """The program of some rows. The variables are the free parameters, each as its place between its bounds (0 to 1),
     and the auxiliary variables.
 
-    The first program from a start is rough: each row over the turn stands at angles of a grid. A further one, which
-    begins from a solution, has so many `peaks` of each row instead. There the column f, which has an extreme near this
-    angle, counts as f - f'^2 / (2 b), with the curvature b of that solution: to the third order in the way of the
-    extreme this is its value, so that the extreme may move with the parameters.
+    The first program from a start is rough: each row over the turn stands at angles of a grid. A further one begins
+    from a solution and has peaks of each row instead. There the column f, which has an extreme near this angle,
+    counts as f - f'^2 / (2 b), with the curvature b of that solution: to the third order in the way of the extreme
+    this is its value, so that the extreme may move with the parameters.
 
     The sum of the auxiliary variables `costs` is to be least; `sizes` are those of its lanes.
     """
@@ -117,9 +117,13 @@ class Program:
         half = grid(COARSE // 2)
         self._grid = {
             "turn": np.stack([grid(COARSE), np.full(COARSE, speed)]),
-            "slack": np.stack([np.tile(half, 2), np.repeat([share * slack_speed for share in SLACK_SPEEDS], len(half))]),
+            "slack": np.stack(
+                [np.tile(half, 2), np.repeat([share * slack_speed for share in SLACK_SPEEDS], len(half))]
+            ),
         }
-        tables = {} if peaks else {kind: table([kind], casadi.DM(lanes)) for kind, lanes in self._grid.items()}
+        tables = (
+            {} if peaks else {kind: table([kind], casadi.DM(lanes)) for kind, lanes in self._grid.items()}
+        )
         at_nodes = casadi.horzcat(nodes[:, 0], casadi.repmat(casadi.MX(speed), fine)).T
         mean, distances = table(["mean", "rms"], at_nodes), columns.distance(x)
         constraints = []
@@ -145,7 +149,8 @@ class Program:
             else:
                 order = int(row.kind == "slope")
                 reached = [
-                    factor * columns.function([column], order)(x, derived, casadi.vertcat(z[n + angle], speed))[-1]
+                    factor
+                    * columns.function([column], order)(x, derived, casadi.vertcat(z[n + angle], speed))[-1]
                     for angle, column, factor in row.terms
                 ]
                 parts = [sum(reached, casadi.MX(0.0))]
@@ -154,7 +159,8 @@ class Program:
         self._row = np.repeat(np.arange(len(rows)), [part.numel() for part in constraints])
         self._equal = np.array([row.equal for row in rows])[self._row]
         self._lifts = {
-            n + place: np.array([any(k == place for k, _ in row.aux) for row in rows])[self._row] for place in costs
+            n + place: np.array([any(k == place for k, _ in row.aux) for row in rows])[self._row]
+            for place in costs
         }
         p, g = casadi.vertcat(upper, casadi.vec(extremes), casadi.vec(nodes)), casadi.vertcat(*constraints)
         cost = sum((z[n + place] for place in costs), casadi.MX(0.0))
@@ -181,7 +187,9 @@ class Program:
             parts = list(last.multipliers)
             for k, before, now in zip(self._over_turn, last.lanes, lanes.peaks, strict=True):
                 parts[k] = np.zeros(len(now))
-                way = np.abs(np.sin(0.5 * (before[0][:, None] - now[:, 0]))) + np.abs(before[1][:, None] - now[:, 1])
+                way = np.abs(np.sin(0.5 * (before[0][:, None] - now[:, 0]))) + np.abs(
+                    before[1][:, None] - now[:, 1]
+                )
                 np.add.at(parts[k], np.argmin(way, axis=1), last.multipliers[k])
             start = {"lam_g0": np.concatenate(parts), "lam_x0": last.bounds}
         else:
@@ -203,7 +211,10 @@ class Program:
         ends = np.flatnonzero(np.diff(self._row)) + 1
         return Solution(
             z=z,
-            lanes=[now[:, :2].T if len(now) else self._grid[kind] for now, kind in zip(lanes.peaks, self._kinds, strict=True)],
+            lanes=[
+                now[:, :2].T if len(now) else self._grid[kind]
+                for now, kind in zip(lanes.peaks, self._kinds, strict=True)
+            ],
             multipliers=np.split(multipliers, ends),
             bounds=bounds,
             exceeded=np.split(np.where(self._equal, np.abs(g), g), ends),

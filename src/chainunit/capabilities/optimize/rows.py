@@ -46,9 +46,11 @@ class Row:
 
 @dataclass
 class Rows:
-    """The rows of limits near a machine: `turn` gives columns over the turn there, shape (columns, angles). `begin` and
-    `low` are the value of each auxiliary variable there, and its lower bound; `angles` the variables that are
-    angles."""
+    """The rows of limits near a machine: `turn` gives columns over the turn there, shape (columns, angles).
+
+    `begin` and `low` are the value of each auxiliary variable there, and its lower bound; `angles` are the variables
+    that are angles.
+    """
 
     columns: Columns
     basis: CycleBasis
@@ -72,9 +74,7 @@ class Rows:
         def add(kind: Kind, column: int, factor: float, times: float = 1.0) -> None:
             aux = () if objective is None else ((objective, -times * scale),)
             term = ((-1, column, factor),)
-            self.rows.append(
-                Row(kind, owner, "max", times * bound, times * scale, term, aux, False, times)
-            )
+            self.rows.append(Row(kind, owner, "max", times * bound, times * scale, term, aux, False, times))
 
         column, reduction = q.integrands[0].column, q.reduction
         if reduction in ("max", "peak"):
@@ -105,9 +105,7 @@ class Rows:
         """Rows by which a quantity is at least, or exactly, `bound`."""
         if (mean := self._mean(q)) is not None:
             kind, column, factor = mean
-            self.rows.append(
-                Row(kind, owner, "min", -bound, scale, ((-1, column, -factor),), (), equal)
-            )
+            self.rows.append(Row(kind, owner, "min", -bound, scale, ((-1, column, -factor),), (), equal))
         elif q.reduction == "min" and not equal:
             self.over_turn("turn", self._smooth(q.integrands[0].column, -1.0), owner, scale, -bound)
         else:
@@ -144,7 +142,11 @@ class Rows:
     def _mean(self, q: CycleQuantity) -> tuple[Kind, int, float] | None:
         """The kind, column and factor of a quantity that is a mean."""
         if q.reduction in ("mean", "rms"):
-            return ("rms" if q.reduction == "rms" else "mean"), self.columns.whole(q.integrands[0].column), 1.0
+            return (
+                ("rms" if q.reduction == "rms" else "mean"),
+                self.columns.whole(q.integrands[0].column),
+                1.0,
+            )
         if q.reduction == "energy_per_year":
             return "mean", self.columns.whole("power"), 3600.0 * self.basis.operating_hours
         return None
@@ -173,7 +175,7 @@ class Rows:
             sign = SIGNS[reduction][0]
             if reduction == "peak":
                 sign = 1.0 if np.max(values) >= -np.min(values) else -1.0
-            place, angle = np.unravel_index(np.argmax(sign * values), values.shape)
+            place, angle = divmod(int(np.argmax(sign * values)), values.shape[1])
             number = self.auxiliary(float(grid(values.shape[1])[angle]))
             self.angles.append(number)
             # a range is the largest less the least value

@@ -165,19 +165,18 @@ class Search:
             values = self.columns.values(x, np.tile(q, np.size(shares)), w, self.pulls)
             return np.min(values, axis=(0, 1)).reshape(np.size(shares), len(q))
 
-        table = pulls(grid(FINE), CHECKED)
-        k = int(np.argmin(np.min(table, axis=1)))
-        ends = max(k - 1, 0), min(k + 1, len(CHECKED) - 1)
-        around = np.min(table[ends[0] : ends[1] + 1], axis=0)
-        q = grid(FINE)[around <= np.min(around) + 0.1 * np.ptp(around)]
-        low, high = CHECKED[ends[0]], CHECKED[ends[1]]
+        coarse = grid(FINE // 3)
+        k, place = divmod(int(np.argmin(pulls(coarse, CHECKED))), len(coarse))
+        low, high = CHECKED[max(k - 1, 0)], CHECKED[min(k + 1, len(CHECKED) - 1)]
+        q = coarse[place] + coarse[2] * np.linspace(-1.0, 1.0, 49)
+
+        def pull(share: float) -> float:
+            return float(np.min(pulls(q, share)))
+
         between = minimize_scalar(
-            lambda share: float(np.min(pulls(q, share))),
-            bounds=(low, high),
-            method="bounded",
-            options={"xatol": 1e-3 * (high - low)},
+            pull, bounds=(low, high), method="bounded", options={"xatol": 1e-3 * (high - low)}
         )
-        return min(float(np.min(table)), float(between.fun))
+        return min(pull(CHECKED[k]), float(between.fun))
 
     # programs
 
@@ -282,11 +281,13 @@ class Search:
         return self.columns.low + self.columns.span * point.z[: self.columns.size]
 
     def _followed(self, rows: Sequence[Row], point: Solution, lanes: Lanes) -> tuple[Lanes, bool, float]:
-        """The lanes of a further program; whether there must be one, as a limit is exceeded between the angles, a peak
+        """The lanes of a further program; whether there must be one: a limit is exceeded between the angles, a peak
         has moved too far, or a mean is rough; and the most by which a limit is exceeded."""
         x, aux, highest = self._x(point), point.z[self.columns.size :], self.wishes.slack_free_speed
         peaks, first, more = [], [], not lanes.sizes[0]
-        for k, before in zip((k for k, row in enumerate(rows) if row.kind in OVER_TURN), lanes.peaks, strict=True):
+        for k, before in zip(
+            (k for k, row in enumerate(rows) if row.kind in OVER_TURN), lanes.peaks, strict=True
+        ):
             row, ((_, column, factor),) = rows[k], rows[k].terms
             offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
             is_slack = row.kind == "slack"
@@ -313,8 +314,11 @@ class Search:
     def _nodes(self, rows: Sequence[Row], point: Solution, nodes: Any) -> tuple[Any, bool]:
         """The nodes for the means that are near their limits, and whether the `nodes` of the program were too few."""
         x = self._x(point)
-        means = [(row.terms[0][1], _POWERS[row.kind]) for row, g in zip(rows, point.exceeded, strict=True)
-                 if row.kind in _POWERS and g[0] > -_NEAR]
+        means = [
+            (row.terms[0][1], _POWERS[row.kind])
+            for row, g in zip(rows, point.exceeded, strict=True)
+            if row.kind in _POWERS and g[0] > -_NEAR
+        ]
         if not means:
             return nodes, False
 
@@ -331,8 +335,10 @@ class Search:
         return room, True
 
     def _peaks(self, x: Any, column: int, factor: float, w: float, least: float) -> Any:
-        """The maxima of a column times `factor` at crank speed `w` that are about `least` or more, and the largest one:
-        its value, the angle, the speed, and 1 / curvature of the column, or 0 at a kink, shape (maxima, 4)."""
+        """The maxima of a column times `factor` at crank speed `w` that are about `least` or more, and the largest.
+
+        Each has its value, the angle, the speed, and 1 / curvature of the column, or 0 at a kink, shape (maxima, 4).
+        """
         y = factor * self.columns.values(x, grid(FINE), w, [column])[0, 0]
         is_peak = (y >= least) & (y >= np.roll(y, 1)) & (y > np.roll(y, -1))
         is_peak[np.argmax(y)] = True
