@@ -17,6 +17,7 @@ from linkage_files import pressed_both_ways
 from reports import plain
 
 from chainunit import Study
+from chainunit.batch import native
 from chainunit.capabilities.optimize import checks, program
 from chainunit.capabilities.optimize.best import find_best, machine_at
 from chainunit.capabilities.optimize.conflict import Conflict, nearest
@@ -160,6 +161,99 @@ def test_sensitivities_are_those_of_perturbed_problems(best):
             moved = search.solve(best.answer.x, objective, limits)
         assert moved.feasible, text
         assert (moved.value - value) / step == pytest.approx(each.slope, rel=0.02), each.name
+
+
+def test_a_search_compiles_nothing_and_refines_each_end_once(monkeypatch):
+    def compiled(*_):
+        raise AssertionError("the search needs no compiler")
+
+    monkeypatch.setattr(native, "compile_code", compiled)
+    search = Search(wishes())
+    starts = search.starts(4)[0]
+    answers = [search.solve(x, search.wishes.objectives[0]) for x in starts]
+    assert all(answer.feasible for answer in answers)
+    assert np.ptp([answer.value for answer in answers]) < 1e-9
+    # a rough program from each start, and further ones for one of them alone
+    assert search.effort.programs <= len(starts) + 6
+
+
+def test_an_exact_limit():
+    """A limit with one value for both sides, and its sensitivity."""
+    search = Search(wishes(**{'"16 deg", max = "20 deg"': '"17 deg", max = "17 deg"'}))
+    objective, swing = search.wishes.objectives[0], search.wishes.limits[0]
+    values = []
+    for step in (-1e-3, 0.0, 1e-3):
+        wanted = swing.low + step
+        limits = (TurnLimit(swing.quantity, wanted, wanted), *search.wishes.limits[1:])
+        answer = search.solve(search.base, objective, limits)
+        assert answer.feasible
+        assert search.value(swing.quantity, answer.x) == pytest.approx(wanted, rel=1e-8)
+        values.append(answer.value)
+        if not step:
+            slope = answer.sensitivities["range(rocker.psi)", "min"]
+    assert (values[2] - values[0]) / 2e-3 == pytest.approx(slope, rel=1e-3)
+
+
+TEN = """
+[optimize]
+slack_free_speed = "4 rad/s"
+starts = 2
+[optimize.free]
+r = { min = "100 mm", max = "200 mm" }
+h = { min = "0.8 m", max = "1.3 m" }
+l = { min = "1.3 m", max = "1.7 m" }
+z = { min = 0.7, max = 1.0 }
+crank.m = { min = "10 kg", max = "200 kg" }
+crank.s = { min = "-0.3 m", max = "0.3 m" }
+coupler.m = { min = "15 kg", max = "40 kg" }
+coupler.s = { min = "0.4 m", max = "1.0 m" }
+rocker.m = { min = "50 kg", max = "80 kg" }
+rocker.s = { min = "0.3 m", max = "0.7 m" }
+[optimize.limits]
+"range(rocker.psi)" = { min = "16 deg", max = "20 deg" }
+"min(margin)" = { min = 0.3 }
+"max(force(crank_bearing))" = { max = "450 N" }
+"rms(power)" = { max = "200 W" }
+"""
+SIX_BAR = """
+[system]
+machine = "FILE"
+[run]
+crank_speed = "60 rpm"
+[optimize]
+starts = 3
+[optimize.free]
+r = { min = "40 mm", max = "60 mm" }
+l = { min = "200 mm", max = "230 mm" }
+shank = { min = "280 mm", max = "320 mm" }
+coupler.mass = { min = "1 kg", max = "2 kg" }
+[optimize.limits]
+"range(y(F))" = { min = "45 mm" }
+"range(x(F))" = { max = "157 mm" }
+"max(force(O2))" = { max = "400 N" }
+"min(margin)" = { min = 0.3 }
+"""
+
+
+@pytest.mark.second
+def test_ten_free_parameters():
+    """The value that the same search reached with values and derivatives in compiled code."""
+    search = Search(wishes(TEN))
+    for x in search.starts(2)[0]:
+        answer = search.solve(x, search.wishes.objectives[0])
+        assert answer.feasible and answer.value == pytest.approx(6.850502593177637, rel=1e-8)
+        assert answer.sensitivities["range(rocker.psi)", "min"] == pytest.approx(28.16788, rel=1e-5)
+
+
+@pytest.mark.second
+def test_a_six_bar_linkage_with_limits_of_both_kinds():
+    """The conflict that the same search found with values and derivatives in compiled code."""
+    file = (LINKAGES / "watt_six_bar.toml").as_posix()
+    own = find_best(wishes(SIX_BAR, FILE=file))
+    assert not own.met and set(own.conflict.alone) == {"max(force(O2))"}
+    assert set(own.conflict.together) == {"range(x(F))", "range(y(F))"}
+    assert own.conflict.nearest.value == pytest.approx(0.8073977446642715, rel=1e-8)
+    assert own.conflict.nearest.x == pytest.approx([0.04, 0.23, 0.28, 2.0], rel=1e-8)
 
 
 def _with(own, **changes):

@@ -75,7 +75,7 @@ class Solution:
     evaluations: int
 
 
-class Program:
+class TurnProgram:
     """The program of some rows. The variables are the free parameters, each as its place between its bounds (0 to 1),
     and the auxiliary variables.
 

@@ -45,7 +45,7 @@ class Row:
 
 
 @dataclass
-class Rows:
+class LimitRows:
     """The rows of limits near a machine: `turn` gives columns over the turn there, shape (columns, angles).
 
     `begin` and `low` are the value of each auxiliary variable there, and its lower bound; `angles` are the variables
@@ -69,7 +69,7 @@ class Rows:
     def at_most(
         self, q: CycleQuantity, owner: str, scale: float, bound: float = 0.0, objective: int | None = None
     ) -> None:
-        """Rows by which a quantity is at most `bound`, or at most `scale` times the variable `objective`."""
+        """LimitRows by which a quantity is at most `bound`, or at most `scale` times the variable `objective`."""
 
         def add(kind: Kind, column: int, factor: float, times: float = 1.0) -> None:
             aux = () if objective is None else ((objective, -times * scale),)
@@ -102,7 +102,7 @@ class Rows:
             self.rows.append(Row("auxiliary", owner, "max", bound, scale, (), extent))
 
     def at_least(self, q: CycleQuantity, owner: str, scale: float, bound: float, equal: bool = False) -> None:
-        """Rows by which a quantity is at least, or exactly, `bound`."""
+        """LimitRows by which a quantity is at least, or exactly, `bound`."""
         if (mean := self._mean(q)) is not None:
             kind, column, factor = mean
             self.rows.append(Row(kind, owner, "min", -bound, scale, ((-1, column, -factor),), (), equal))
@@ -114,11 +114,11 @@ class Rows:
     def over_turn(
         self, kind: Kind, places: Sequence[int], owner: str, scale: float, upper: float = 0.0
     ) -> None:
-        """Rows by which columns are at least ``-upper`` at each angle."""
+        """LimitRows by which columns are at least ``-upper`` at each angle."""
         self.rows += [Row(kind, owner, "min", upper, scale, ((-1, k, -1.0),)) for k in places]
 
     def distances(self, owner: str, clearance: float, sizes: Any, names: Sequence[str]) -> None:
-        """Rows by which the distance from each requirement is at least a share of its size of today."""
+        """LimitRows by which the distance from each requirement is at least a share of its size of today."""
         for k, (size, name) in enumerate(zip(sizes, names, strict=True)):
             term = ((-1, k, -1.0),)
             self.rows.append(Row("distance", owner, name, -clearance * size, size, term, (), False, size))
@@ -165,7 +165,7 @@ class Rows:
         factor: float,
         equal: bool = False,
     ) -> None:
-        """Rows by which `factor` times a quantity is at most `upper`, at angles of its own."""
+        """LimitRows by which `factor` times a quantity is at most `upper`, at angles of its own."""
         terms: list[tuple[int, str, float]] = []
         for reduction in ("max", "min", "peak"):
             names = [i.column for i in q.integrands if i.reduction == reduction]

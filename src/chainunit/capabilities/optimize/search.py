@@ -16,8 +16,8 @@ from ...mechanism.sampled_quantities import mean_rule, means
 from ...reading.results import part, result
 from ...study.cycle_quantities import CycleQuantity
 from .columns import Columns
-from .program import COARSE, Lanes, Program, Solution
-from .rows import OVER_TURN, SIGNS, Row, Rows, grid
+from .program import COARSE, Lanes, Solution, TurnProgram
+from .rows import OVER_TURN, SIGNS, LimitRows, Row, grid
 from .wishes import SLACK, TURNS, TurnLimit, Wishes
 
 FINE = 720
@@ -32,8 +32,11 @@ _MET = 1e-7
 _LOOKED_AT, _NEAR = 0.05, 0.01
 """Shares of its scale by which a limit must be near at an angle of the grid, to be looked at between the angles, and
 at a peak, for which a program then has an angle."""
-_WAY, _EXACT = 1e-3, 1e-9
-"""Way of a peak [rad] that its program describes to the rounding, and step at which its angle is exact."""
+_WAY, _EXACT = 1e-3, 1e-6
+"""Way of a peak [rad] that its program describes to the rounding, and deviation of an angle at which its value is
+exact."""
+_NARROW = 10.0
+"""Share of the way down from a peak over one step of the grid that its curvature may predict."""
 _SAME = 1e-5
 """Distance of two answers of rough programs, in parts of the bounds, that count as one."""
 _POWERS = {"mean": 1, "rms": 2}
@@ -84,7 +87,7 @@ class Search:
         quantities = (*wishes.objectives, *(limit.quantity for limit in wishes.limits))
         self._turning = [self.columns.whole(i.column) for q in quantities for i in q.integrands]
         self._turning += self.pulls
-        self._programs: dict[Any, Program] = {}
+        self._programs: dict[Any, TurnProgram] = {}
         self._answers: dict[Any, list[tuple[Any, Answer]]] = {}
         self.effort = Effort()
         self.base = self._base()
@@ -194,10 +197,10 @@ class Search:
 
     def _rows(
         self, x: Any, objective: CycleQuantity | None, limits: Sequence[TurnLimit], without: frozenset[str]
-    ) -> tuple[Rows, dict[str, int]]:
+    ) -> tuple[LimitRows, dict[str, int]]:
         """The rows near `x`, and, without an objective, the slacks by their limits."""
         wishes, sizes = self.wishes, self.columns.distances(self.base)
-        rows = Rows(self.columns, wishes.basis, partial(self._turn, x))
+        rows = LimitRows(self.columns, wishes.basis, partial(self._turn, x))
         if objective is not None:
             rows.at_most(objective, "", self.scales[objective.name], objective=rows.auxiliary(0.0))
         for limit in limits:
@@ -262,14 +265,14 @@ class Search:
         return begun[-1][1]
 
     def _run(
-        self, rows: Rows, costs: tuple[int, ...], z: Any, lanes: Lanes, last: Solution | None
+        self, rows: LimitRows, costs: tuple[int, ...], z: Any, lanes: Lanes, last: Solution | None
     ) -> Solution:
         """The solution of a program of these rows, which serves for all numbers that they have as upper limits."""
         key = tuple(replace(row, upper=0.0) for row in rows.rows), costs, lanes.sizes
         if key not in self._programs:
             speeds = self.wishes.crank_speed, self.wishes.slack_free_speed
             auxiliary = len(rows.begin)
-            self._programs[key] = Program(self.columns, speeds, rows.rows, costs, auxiliary, lanes.sizes)
+            self._programs[key] = TurnProgram(self.columns, speeds, rows.rows, costs, auxiliary, lanes.sizes)
         upper = np.array([row.upper for row in rows.rows])
         point = self._programs[key].solve(z, rows.low, upper, lanes, last)
         self.effort.programs += 1
@@ -344,18 +347,19 @@ class Search:
         is_peak[np.argmax(y)] = True
         places = np.flatnonzero(is_peak)
         places = places[np.argsort(-y[places])][:_MOST_PEAKS]
-        begin = q = grid(FINE)[places]
-        smooth = np.ones(len(q), bool)
+        q = begin = grid(FINE)[places]
+        step = reach = 2.0 * math.pi / FINE
         for _ in range(_ROUNDS):
-            value, slope, bend = self.columns.values(x, q, w, [column], 2)[:, 0]
-            smooth &= factor * bend < 0.0
-            way = np.where(smooth, -slope / np.where(smooth, bend, 1.0), 0.0)
-            smooth &= np.abs(q + way - begin) <= 2.0 * math.pi / FINE
-            if np.all(np.abs(way[smooth]) < _EXACT):
-                break
-            q = np.where(smooth, q + way, begin)
-        # a kink, or a peak that is narrower, counts as the angle of the grid
-        smooth &= (np.abs(way) < _EXACT) & (factor * value >= y[places])
+            near = q[:, None] + reach * np.linspace(-1.0, 1.0, 9)
+            values = factor * self.columns.values(x, near.ravel(), w, [column])[0, 0].reshape(near.shape)
+            q, reach = near[np.arange(len(q)), np.argmax(values, axis=1)], 0.25 * reach
+        (value, *beside), (slope, *_), (bend, *_) = self.columns.values(
+            x, np.concatenate([q, q - step, q + step]), w, [column], 2
+        )[:, 0].reshape(3, 3, -1)
+        least_drop = np.min(factor * (value - beside), axis=0)
+        # a kink, or a peak that is narrower than the grid, counts as the angle of the grid
+        smooth = (factor * bend < 0.0) & (np.abs(slope) < _EXACT * np.abs(bend))
+        smooth &= 0.5 * np.abs(bend) * step**2 < _NARROW * least_drop
         value, q = np.where(smooth, factor * value, y[places]), np.where(smooth, q, begin)
         return np.stack([value, q, np.full(len(q), w), smooth / np.where(smooth, bend, 1.0)], axis=1)
 
