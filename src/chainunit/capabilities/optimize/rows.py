@@ -19,6 +19,8 @@ from .columns import Columns
 
 Kind = Literal["turn", "slack", "mean", "rms", "reached", "slope", "distance", "auxiliary"]
 OVER_TURN = ("turn", "slack")
+_MARGIN = 1e-3
+"""Margin of the ends of a range at first, as a share of its scale: IPOPT begins inside the limits."""
 SIGNS = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
 
 
@@ -92,8 +94,9 @@ class LimitRows:
             add(*mean)
         else:
             places = [self.columns.whole(name) for name in dict.fromkeys(i.column for i in q.integrands)]
-            ends = [float(end(self.turn(places))) / scale for end in (np.max, np.min)]
-            high, low = map(self.auxiliary, ends)
+            values = self.turn(places) / scale
+            high = self.auxiliary(float(np.max(values)) + _MARGIN)
+            low = self.auxiliary(float(np.min(values)) - _MARGIN)
             for k in places:
                 for sign, aux in ((1.0, high), (-1.0, low)):
                     ends_at = (aux, -sign * scale)

@@ -36,9 +36,11 @@ _WAY, _EXACT = 1e-3, 1e-6
 """Way of a peak [rad] that its program describes to the rounding, and deviation of an angle at which its value is
 exact."""
 _NARROW = 10.0
-"""Share of the way down from a peak over one step of the grid that its curvature may predict."""
+"""How many times the way down from a peak over one step of the grid its curvature may predict."""
 _SAME = 1e-5
 """Distance of two answers of rough programs, in parts of the bounds, that count as one."""
+_SIGNED = ("max", "min", "mean", "energy_per_year")
+"""Reductions whose value may be below 0."""
 _POWERS = {"mean": 1, "rms": 2}
 CHECKED = tuple(k / 16.0 for k in range(17))
 """Parts of the highest speed of the slack-free range at which the pulls are looked over; a processing force lowers
@@ -75,15 +77,14 @@ class Effort:
 
 
 class Search:
-    """The programs of some wishes."""
+    """The programs of some wishes; `pulls` are the mean pulls along the webs of the loaded sides, if the wishes limit
+    them."""
 
     def __init__(self, wishes: Wishes) -> None:
         self.wishes, self.today = wishes, wishes.today
         self.columns = Columns(wishes)
-        self.webs = [f"mean_pull({side}.web)" for side in wishes.machine.loaded_sides(wishes.feed)]
-        if not wishes.slack_free_speed:
-            self.webs = []
-        self.pulls = [self.columns.whole(name) for name in self.webs]
+        sides = wishes.machine.loaded_sides(wishes.feed) if wishes.slack_free_speed else ()
+        self.pulls = [self.columns.whole(f"mean_pull({side}.web)") for side in sides]
         quantities = (*wishes.objectives, *(limit.quantity for limit in wishes.limits))
         self._turning = [self.columns.whole(i.column) for q in quantities for i in q.integrands]
         self._turning += self.pulls
@@ -149,8 +150,8 @@ class Search:
 
     def _extreme(self, x: Any, k: int, reduction: str) -> tuple[float, float]:
         """The crank angle [rad] and the value of an extreme of a column."""
-        w = self.wishes.crank_speed
-        peaks = np.concatenate([self._peaks(x, k, sign, w, -math.inf) for sign in SIGNS[reduction]])
+        speeds = [self.wishes.crank_speed]
+        peaks = np.concatenate([self._peaks(x, k, sign, speeds, -math.inf) for sign in SIGNS[reduction]])
         top, angle, *_ = peaks[np.argmax(peaks[:, 0])]
         return float(angle), float(-top if reduction == "min" else top)
 
@@ -202,7 +203,8 @@ class Search:
         wishes, sizes = self.wishes, self.columns.distances(self.base)
         rows = LimitRows(self.columns, wishes.basis, partial(self._turn, x))
         if objective is not None:
-            rows.at_most(objective, "", self.scales[objective.name], objective=rows.auxiliary(0.0))
+            least = -math.inf if objective.reduction in _SIGNED else 0.0
+            rows.at_most(objective, "", self.scales[objective.name], objective=rows.auxiliary(0.0, least))
         for limit in limits:
             if limit.name in without:
                 continue
@@ -237,6 +239,9 @@ class Search:
         z = np.concatenate([np.clip((x - low) / span, 1e-3, 1.0 - 1e-3), rows.begin])
         number = sum(row.kind in OVER_TURN for row in rows.rows)
         nodes = np.stack([grid(COARSE), np.full(COARSE, 1.0 / COARSE)])
+        # a mean at its limit leaves no room for a rough one
+        tight = [row for row in rows.rows if row.kind in _POWERS and row.owner and self._is_tight(row, x)]
+        nodes, _ = self._nodes(tight, x, nodes)
         lanes, worst = Lanes(np.zeros((number, 0, 3)), nodes), math.inf
         point = self._run(rows, costs, z, lanes, None)
         # a start that ends where another one did has its answer
@@ -295,8 +300,7 @@ class Search:
             offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
             is_slack = row.kind == "slack"
             speeds = [share * highest for share in CHECKED] if is_slack else [self.wishes.crank_speed]
-            tops = [self._peaks(x, column, factor, w, -offset - _LOOKED_AT * row.scale) for w in speeds]
-            top = np.concatenate(tops)
+            top = self._peaks(x, column, factor, speeds, -offset - _LOOKED_AT * row.scale)
             top[:, 0] = (top[:, 0] + offset) / row.scale
             # the largest one stays: the next solution may be near it
             peaks.append(top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))])
@@ -311,17 +315,20 @@ class Search:
         for place, top, w in zip(followed, peaks, first, strict=True):
             place[:, 1] = w
             place[: len(top)] = top[:, 1:]
-        nodes, rough = self._nodes(rows, point, lanes.nodes)
+        near = [row for row, exceeded in zip(rows, point.exceeded, strict=True) if exceeded[0] > -_NEAR]
+        nodes, rough = self._nodes(near, x, lanes.nodes)
         return Lanes(followed, nodes), more or rough or worst > _EXCEEDED, worst
 
-    def _nodes(self, rows: Sequence[Row], point: Solution, nodes: Any) -> tuple[Any, bool]:
-        """The nodes for the means that are near their limits, and whether the `nodes` of the program were too few."""
-        x = self._x(point)
-        means = [
-            (row.terms[0][1], _POWERS[row.kind])
-            for row, g in zip(rows, point.exceeded, strict=True)
-            if row.kind in _POWERS and g[0] > -_NEAR
-        ]
+    def _is_tight(self, row: Row, x: Any) -> bool:
+        """Whether a mean is near its limit at a machine."""
+        ((_, k, factor),) = row.terms
+        mean = self._mean(x, k, row.kind)
+        value = factor * (math.sqrt(mean) if row.kind == "rms" else mean)
+        return abs(value - row.upper) < _NEAR * row.scale
+
+    def _nodes(self, rows: Sequence[Row], x: Any, nodes: Any) -> tuple[Any, bool]:
+        """Nodes for the means of some rows, and whether the `nodes` of the program were too few."""
+        means = [(row.terms[0][1], _POWERS[row.kind]) for row in rows if row.kind in _POWERS]
         if not means:
             return nodes, False
 
@@ -337,31 +344,33 @@ class Search:
         room[:, : len(q)] = q, weights
         return room, True
 
-    def _peaks(self, x: Any, column: int, factor: float, w: float, least: float) -> Any:
-        """The maxima of a column times `factor` at crank speed `w` that are about `least` or more, and the largest.
+    def _peaks(self, x: Any, column: int, factor: float, speeds: Sequence[float], least: float) -> Any:
+        """The maxima of a column times `factor` at crank speeds that are about `least` or more, and the largest one.
 
         Each has its value, the angle, the speed, and 1 / curvature of the column, or 0 at a kink, shape (maxima, 4).
         """
-        y = factor * self.columns.values(x, grid(FINE), w, [column])[0, 0]
-        is_peak = (y >= least) & (y >= np.roll(y, 1)) & (y > np.roll(y, -1))
+        lanes = np.stack([np.tile(grid(FINE), len(speeds)), np.repeat(speeds, FINE)])
+        y = factor * self.columns.values(x, *lanes, [column]).reshape(len(speeds), FINE)
+        is_peak = ((y >= least) & (y >= np.roll(y, 1, axis=1)) & (y > np.roll(y, -1, axis=1))).ravel()
         is_peak[np.argmax(y)] = True
         places = np.flatnonzero(is_peak)
-        places = places[np.argsort(-y[places])][:_MOST_PEAKS]
-        q = begin = grid(FINE)[places]
-        step = reach = 2.0 * math.pi / FINE
-        for _ in range(_ROUNDS):
-            near = q[:, None] + reach * np.linspace(-1.0, 1.0, 9)
-            values = factor * self.columns.values(x, near.ravel(), w, [column])[0, 0].reshape(near.shape)
-            q, reach = near[np.arange(len(q)), np.argmax(values, axis=1)], 0.25 * reach
+        places = places[np.argsort(-y.ravel()[places])][:_MOST_PEAKS]
+        (begin, w), top = lanes[:, places], y.ravel()[places]
+        q, step = begin, 2.0 * math.pi / FINE
+        for k in range(_ROUNDS):
+            near = q[:, None] + step * 0.25**k * np.linspace(-1.0, 1.0, 9)
+            values = self.columns.values(x, near.ravel(), np.repeat(w, 9), [column]).reshape(near.shape)
+            q = near[np.arange(len(q)), np.argmax(factor * values, axis=1)]
+        around = np.concatenate([q, q - step, q + step])
         (value, *beside), (slope, *_), (bend, *_) = self.columns.values(
-            x, np.concatenate([q, q - step, q + step]), w, [column], 2
-        )[:, 0].reshape(3, 3, -1)
+            x, around, np.tile(w, 3), [column], 2
+        ).reshape(3, 3, -1)
         least_drop = np.min(factor * (value - beside), axis=0)
         # a kink, or a peak that is narrower than the grid, counts as the angle of the grid
         smooth = (factor * bend < 0.0) & (np.abs(slope) < _EXACT * np.abs(bend))
         smooth &= 0.5 * np.abs(bend) * step**2 < _NARROW * least_drop
-        value, q = np.where(smooth, factor * value, y[places]), np.where(smooth, q, begin)
-        return np.stack([value, q, np.full(len(q), w), smooth / np.where(smooth, bend, 1.0)], axis=1)
+        value, q = np.where(smooth, factor * value, top), np.where(smooth, q, begin)
+        return np.stack([value, q, w, smooth / np.where(smooth, bend, 1.0)], axis=1)
 
     def _answer(
         self,
