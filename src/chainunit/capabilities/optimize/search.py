@@ -22,9 +22,9 @@ from .wishes import SLACK, TURNS, TurnLimit, Wishes
 
 FINE = 720
 """Number of angles at which the answer of a program is looked over."""
-_PARTS, _MOST_PEAKS = 8, 8
-"""Parts of the turn at first for means, and largest number of peaks of a column at a speed: a constant column has
-peaks of rounding."""
+_PARTS, _ROOM, _MOST_PEAKS = 8, 64, 8
+"""Parts of the turn at first for means, the number of nodes of which that of a program is a multiple, and the largest
+number of peaks of a column at a speed: a constant column has peaks of rounding."""
 _EXCEEDED = 1e-9
 """Share of its scale by which a limit may be exceeded between the angles."""
 _MET = 1e-7
@@ -340,7 +340,7 @@ class Search:
         exact, rough = values(q) @ weights, values(nodes[0]) @ nodes[1]
         if np.all(np.abs(exact - rough) <= _EXCEEDED * np.abs(exact)):
             return nodes, False
-        room = np.zeros((2, max(2 ** math.ceil(math.log2(len(q))), len(nodes[0]))))
+        room = np.zeros((2, max(_ROOM * math.ceil(len(q) / _ROOM), len(nodes[0]))))
         room[:, : len(q)] = q, weights
         return room, True
 
@@ -350,7 +350,7 @@ class Search:
         Each has its value, the angle, the speed, and 1 / curvature of the column, or 0 at a kink, shape (maxima, 4).
         """
         lanes = np.stack([np.tile(grid(FINE), len(speeds)), np.repeat(speeds, FINE)])
-        y = factor * self.columns.values(x, *lanes, [column]).reshape(len(speeds), FINE)
+        y = factor * self.columns.values(x, lanes[0], lanes[1], [column]).reshape(len(speeds), FINE)
         is_peak = ((y >= least) & (y >= np.roll(y, 1, axis=1)) & (y > np.roll(y, -1, axis=1))).ravel()
         is_peak[np.argmax(y)] = True
         places = np.flatnonzero(is_peak)
