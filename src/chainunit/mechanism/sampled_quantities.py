@@ -89,7 +89,23 @@ def roots(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> list[Any]
 
 
 def means(values_at: Callable[[Any], Any], low: float, high: float) -> tuple[Any, Any]:
-    """The mean of each quantity from the place `low` to `high`, and that of its size, each of shape (quantities,).
+    """The mean of each quantity from the place `low` to `high`, and that of its size, each of shape (quantities,)."""
+    _, _, integrals, size = _parts(values_at, low, high, _PARTS)
+    return np.sum(integrals, axis=1) / (high - low), size / (high - low)
+
+
+def mean_rule(values_at: Callable[[Any], Any], low: float, high: float, parts: int) -> tuple[Any, Any]:
+    """Places and weights by which the sum of the values is the mean of each quantity from the place `low` to `high`,
+    each of shape (places,); the way has so many `parts` at first."""
+    begin, end, *_ = _parts(values_at, low, high, parts)
+    half = 0.5 * (end - begin)[:, None]
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    return (begin[:, None] + half * (1.0 + nodes)).ravel(), (half * weights).ravel() / (high - low)
+
+
+def _parts(values_at: Callable[[Any], Any], low: float, high: float, parts: int) -> tuple[Any, Any, Any, Any]:
+    """Begins and ends of parts of the way, the integral of each quantity over each of them, shape (quantities,
+    parts), and the integral of its size over the way.
 
     Gauss's rule on parts of the way; a part is halved until both rules agree, so that a load that begins or ends
     sharply counts as it is. One that acts over less than 0.3 degrees of a turn may lie between all points.
@@ -102,24 +118,25 @@ def means(values_at: Callable[[Any], Any], low: float, high: float) -> tuple[Any
         values = np.asarray(values_at(at.ravel())).reshape(-1, *at.shape)
         return (values @ weights) * half, (np.abs(values) @ weights) * half
 
-    edges = np.linspace(low, high, _PARTS + 1)
+    edges = np.linspace(low, high, parts + 1)
     begin, end = edges[:-1], edges[1:]
     whole, sizes = integrals(begin, end)
     size = np.sum(sizes, axis=1)
-    total = np.zeros(len(whole))
+    done: list[tuple[Any, Any, Any]] = []
     for k in range(_DEEPEST):
         middle = 0.5 * (begin + end)
         halves = [integrals(begin, middle)[0], integrals(middle, end)[0]]
-        better = halves[0] + halves[1]
-        differs = np.abs(better - whole) > _AGREE * size[:, None]
+        differs = np.abs(halves[0] + halves[1] - whole) > _AGREE * size[:, None]
         differs &= np.count_nonzero(differs, axis=1, keepdims=True) <= _MOST_ROUGH
         rough = np.any(differs, axis=0) & (k < _DEEPEST - 1)
-        total += np.sum(better[:, ~rough], axis=1)
+        done += [(begin[~rough], middle[~rough], halves[0][:, ~rough])]
+        done += [(middle[~rough], end[~rough], halves[1][:, ~rough])]
         if not np.any(rough):
             break
         begin, end = (np.concatenate([x[rough], y[rough]]) for x, y in ((begin, middle), (middle, end)))
         whole = np.concatenate([half[:, rough] for half in halves], axis=1)
-    return total / (high - low), size / (high - low)
+    begins, ends, values = zip(*done, strict=True)
+    return np.concatenate(begins), np.concatenate(ends), np.concatenate(values, axis=1), size
 
 
 def _own(values_at: Callable[[Any], Any], at: Any) -> Any:

@@ -52,14 +52,14 @@ class ProgressBar:
     def __init__(self, shell: Any) -> None:
         self._display, self._id = shell.display_pub, f"chainunit-{id(self)}"
         self._begin, self._last = monotonic(), -_EVERY
-        self._is_shown = False
+        self._is_shown, self._task = False, ""
 
     def __call__(self, what: str, done: float, total: float) -> None:
         """Show the share of a task, see `TaskProgress`."""
         now = monotonic() - self._begin
-        if now - self._last < _EVERY and done < total:
+        if now - self._last < _EVERY and done < total and what == self._task:
             return
-        self._last = now
+        self._last, self._task = now, what
         share = min(max(done / total, 0.0), 1.0) if total > 0.0 else 0.0
         words = printable(what)
         self._publish(

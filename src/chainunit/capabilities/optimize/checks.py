@@ -17,7 +17,7 @@ from ...reading.results import result
 from ...study.cycle_quantities import CycleQuantity, evaluate
 from ...system.instance import Fmu, Instance
 from ...work.interrupts import stoppable
-from .extremes import grid
+from .rows import grid
 from .search import FINE, Search
 from .wishes import TurnLimit, Wishes
 
@@ -40,13 +40,13 @@ class Neighbours:
 
 def around(search: Search, x: Any) -> Any:
     """Free parameters around `x`, shape (neighbours, free): each one alone to both sides, and random directions."""
-    space, n = search.space, search.space.n
+    columns, n = search.columns, search.columns.size
     rng = np.random.default_rng(search.wishes.seed)
     directions = rng.normal(size=(_RANDOM, n))
     directions /= np.max(np.abs(directions), axis=1, keepdims=True)
     directions = np.concatenate([np.eye(n), -np.eye(n), directions])
-    points = np.concatenate([x + step * space.span * directions for step in STEPS])
-    return np.clip(points, space.low, space.low + space.span)
+    points = np.concatenate([x + step * columns.span * directions for step in STEPS])
+    return np.clip(points, columns.low, columns.low + columns.span)
 
 
 def neighbours(
@@ -81,8 +81,8 @@ def neighbours(
 
 
 def _clear(search: Search, x: Any) -> bool:
-    today = search.space.requirements.values(search.base)
-    return bool(np.all(search.space.requirements.values(x) >= search.wishes.clearance * today * (1.0 - 1e-9)))
+    today = search.columns.distances(search.base)
+    return bool(np.all(search.columns.distances(x) >= search.wishes.clearance * today * (1.0 - 1e-9)))
 
 
 def _widened(limit: TurnLimit, value: float) -> TurnLimit:

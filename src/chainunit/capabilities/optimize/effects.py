@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.errors import InputError
-from .extremes import grid
 from .program import COARSE
+from .rows import grid
 from .search import Search
 from .wishes import Wishes
 
@@ -57,33 +57,25 @@ def _changes(search: Search) -> np.ndarray:
     """The largest change of any quantity, pull or requirement by each free parameter over the distance between its
     bounds, as a share of its size, shape (free,); 0 where all exact derivatives are 0, at some machines within the
     bounds."""
-    space, wishes, q = search.space, search.wishes, grid(COARSE)
-    quantities = (*wishes.objectives, *(limit.quantity for limit in wishes.limits))
+    columns, wishes, q = search.columns, search.wishes, grid(COARSE)
     # the installed power is that of the shaft, whatever its gear
-    columns = [
-        ["power"] if each.name == "installed_power" else [i.column for i in each.integrands]
-        for each in quantities
+    names = [
+        ["power"] if quantity.name == "installed_power" else [i.column for i in quantity.integrands]
+        for quantity in (*wishes.objectives, *(limit.quantity for limit in wishes.limits))
     ]
-    blocks = [([search.columns.whole(name) for name in names], space.speed) for names in columns]
-    relative = [len(names) > 1 for names in columns]
-    if wishes.slack_free_speed:
-        blocks.append((search.mean_pulls, space.slack_speed))
-        relative.append(False)
-    largest = np.zeros(space.n)
+    blocks = [([columns.whole(name) for name in group], wishes.crank_speed) for group in names]
+    blocks += [(search.pulls, wishes.slack_free_speed)] if search.pulls else []
+    largest = np.zeros(columns.size)
     for x in [search.base, *search.starts(_MACHINES)[0]]:
-        by_speed = {w: space.kernel.slopes(x, q, np.full(len(q), w)) for w in {w for _, w in blocks}}
-        for (rows, w), is_relative in zip(blocks, relative, strict=True):
-            values, slopes = (each[rows] for each in by_speed[w])
-            slopes = slopes[:, : space.n]
-            if is_relative:
-                # a range does not change where all values change alike
-                values, slopes = (
-                    values - np.mean(values),
-                    slopes - np.mean(slopes, axis=(0, 2), keepdims=True),
-                )
+        for places, w in blocks:
+            values = columns.values(x, q, w, places)[0]
+            slopes = columns.slopes(x, q, w, places)
+            if len(places) > 1 and places is not search.pulls:
+                # a range does not change if all values change alike
+                values, slopes = values - np.mean(values), slopes - np.mean(slopes, axis=(0, 1))
             size = np.max(np.abs(values)) or 1.0
-            largest = np.maximum(largest, space.span * np.max(np.abs(slopes), axis=(0, 2)) / size)
-        met = np.abs(space.requirements.values(x))[:, None]
-        shares = np.abs(space.requirements.slopes(x)) * space.span / np.where(met > 0.0, met, 1.0)
+            largest = np.maximum(largest, columns.span * np.max(np.abs(slopes), axis=(0, 1)) / size)
+        met = np.abs(columns.distances(x))[:, None]
+        shares = np.abs(np.array(columns.distance_slopes(x))) * columns.span / np.where(met > 0.0, met, 1.0)
         largest = np.maximum(largest, np.max(shares, axis=0, initial=0.0))
     return largest

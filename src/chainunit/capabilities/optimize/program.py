@@ -1,321 +1,249 @@
-"""A nonlinear program over fixed angles: rows, their derivatives, and the bend of their sum.
-
-The variables are the free parameters, each as its place between its bounds (0 to 1), and auxiliary variables, each
-as a multiple of its scale.
-"""
+"""A nonlinear program from rows: IPOPT solves it with CasADi's derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from .extremes import TurnValues, grid, stationary
-from .kernel import Kernel
-from .requirements import Requirements
-from .rows import ExtremeRow, MeanRow, PointRow, RequirementRow, Row
+from ...work.interrupts import stoppable
+from .columns import Columns
+from .rows import OVER_TURN, Row, grid
 
-COARSE = 48
-"""Number of angles with which the search begins; those at which a limit is exceeded between them are added."""
-_APART = 1e-3
-"""Distance of two angles that count as one [rad]."""
+COARSE = 32
+"""Number of angles at which each limit over the turn stands at first; the pulls stand at half of them."""
 SLACK_SPEEDS = (0.0, 1.0)
-"""Speeds at which the pulls are limited, in parts of the highest speed of the slack-free range: without a processing
-force the pull is linear in the square of the speed, so that it is least at one end."""
+"""Speeds at which the pulls are limited at first, in parts of the highest speed of the slack-free range: without a
+processing force the pull is linear in the square of the speed, so that it is least at one end."""
+_DONE = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+_OPTIONS: dict[str, Any] = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "no_nlp_grad": True,
+    "calc_lam_p": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.bound_relax_factor": 0.0,
+    "ipopt.max_iter": 300,
+    "ipopt.mu_strategy": "monotone",
+    "ipopt.acceptable_tol": 1e-8,
+    "ipopt.acceptable_constr_viol_tol": 1e-9,
+}
+_ROUGH = {f"ipopt.{name}": 1e-7 for name in ("tol", "constr_viol_tol", "compl_inf_tol")}
+_EXACT = {f"ipopt.{name}": 1e-10 for name in ("tol", "constr_viol_tol", "compl_inf_tol")}
+_WARM = {
+    **_EXACT,
+    "ipopt.warm_start_init_point": "yes",
+    "ipopt.mu_init": 1e-6,
+    "ipopt.warm_start_bound_push": 1e-9,
+    "ipopt.warm_start_slack_bound_push": 1e-9,
+    "ipopt.warm_start_mult_bound_push": 1e-9,
+}
 
 
-@dataclass
-class Space:
-    """What all programs of a search share: the machine's columns and requirements, bounds and scales."""
-
-    kernel: Kernel
-    requirements: Requirements
-    low: Any
-    span: Any
-    speed: float
-    """crank speed [rad/s]"""
-    slack_speed: float
-
-    @property
-    def n(self) -> int:
-        """Number of free parameters."""
-        return len(self.low)
-
-    def x(self, z: Any) -> Any:
-        """The free parameters of a point."""
-        return self.low + self.span * z[: self.n]
-
-
-Followed: TypeAlias = tuple[int, bool, float]
-"""A column, whether at the speeds of the slack-free range, and its sign."""
-
-
-@dataclass
+@dataclass(frozen=True)
 class Lanes:
-    """The angles and speeds of a program: `coarse` angles, `fine` ones for means, and, by column and sign, maxima
-    that are followed as they move with the parameters, from an angle at a speed on."""
+    """Angles of a program: `peaks`, shape (rows over the turn, peaks, 3), has the angle, the speed and 1 / b of each
+    peak, or 0 for a column without such a curvature; `nodes`, shape (2, nodes), the angles for means and their
+    weights."""
 
-    coarse: int = COARSE
-    fine: int = 256
-    followed: dict[Followed, list[tuple[float, float]]] = field(default_factory=dict)
+    peaks: Any
+    nodes: Any
 
-    def add(self, key: Followed, q: float, w: float) -> bool:
-        """Add a maximum; whether it is new."""
-        there = self.followed.setdefault(key, [])
-        new = all(abs(q - angle) > _APART or w != speed for angle, speed in there)
-        if new:
-            there.append((q, w))
-        return new
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """The numbers of peaks and of nodes."""
+        return self.peaks.shape[1], self.nodes.shape[1]
 
 
-class AngleProgram:
-    """The rows over some lanes."""
+@dataclass(frozen=True)
+class Solution:
+    """A solution: the variables `z`, the multipliers of each row at its angles, and those of the bounds of the
+    variables (positive at an upper bound, negative at a lower one)."""
 
-    def __init__(self, space: Space, rows: Sequence[Row], aux: Sequence[float], lanes: Lanes) -> None:
-        self.space, self.rows, self.scales = space, tuple(rows), np.array(aux, float)
-        self.size = space.n + len(aux)
-        points = [(float(q), space.speed) for q in grid(lanes.coarse)]
-        self._coarse = np.arange(lanes.coarse)
-        self._fine = np.arange(0)
-        if any(isinstance(row, MeanRow) for row in rows):
-            self._fine = len(points) + np.arange(lanes.fine)
-            points += [(float(q), space.speed) for q in grid(lanes.fine)]
-        slack = np.arange(0)
-        if any(isinstance(row, PointRow) and row.slack for row in rows):
-            speeds = [part * space.slack_speed for part in SLACK_SPEEDS]
-            slack = len(points) + np.arange(lanes.coarse * len(speeds))
-            points += [(float(q), w) for w in speeds for q in grid(lanes.coarse)]
-        more: dict[Followed, list[int]] = {}
-        first, columns, signs = len(points), [], []
-        for key, extra in lanes.followed.items():
-            more[key] = list(range(len(points), len(points) + len(extra)))
-            columns += [key[0]] * len(extra)
-            signs += [key[2]] * len(extra)
-            points += extra
-        self.begin, self.w = np.array(points).T
-        self.q = self.begin.copy()
-        self._followed = np.arange(first, len(points))
-        self._followed_columns, self._signs = np.array(columns, int), np.array(signs)
-        self._reach = 2.0 * np.pi / lanes.coarse
-        self._turn = TurnValues(space.kernel, space.speed)
-        self._arrange(slack, more)
-        self._key = b""
-        self.evaluations = 0
+    z: Any
+    lanes: list[Any]
+    """angles and speeds of each row over the turn, shape (2, angles)"""
+    multipliers: list[Any]
+    bounds: Any
+    exceeded: list[Any]
+    """by how much each row is exceeded at its angles, in parts of its scale"""
+    converged: bool
+    iterations: int
+    evaluations: int
 
-    def _arrange(self, slack: Any, more: dict[Followed, list[int]]) -> None:
-        """Number the rows: point rows one for each angle, then the others one each."""
-        column, lane, owner, self._others = [], [], [], []
-        for k, row in enumerate(self.rows):
-            if not isinstance(row, PointRow):
-                self._others.append(k)
-                continue
-            at = [*(slack if row.slack else self._coarse), *more.get(key_of(row), [])]
-            lane += at
-            column += [row.column] * len(at)
-            owner += [k] * len(at)
-        self._column, self._lane = np.array(column, int), np.array(lane, int)
-        self.row_of = np.array(owner + self._others, int)
-        """the row of each constraint"""
-        points = len(owner)
-        self._points = points
-        factors = [row.factor for row in self.rows if isinstance(row, PointRow)]
-        scaled = dict(
-            zip((k for k, row in enumerate(self.rows) if isinstance(row, PointRow)), factors, strict=True)
+
+class TurnProgram:
+    """The program of some rows. The variables are the free parameters, each as its place between its bounds (0 to 1),
+    and the auxiliary variables.
+
+    The first program from a start is rough: each row over the turn stands at angles of a grid. A further one begins
+    from a solution and has peaks of each row instead. There the column f, which has an extreme near this angle,
+    counts as f - f'^2 / (2 b), with the curvature b of that solution: to the third order in the way of the extreme
+    this is its value, so that the extreme may move with the parameters.
+
+    The sum of the auxiliary variables `costs` is to be least; `sizes` are those of its lanes.
+    """
+
+    def __init__(
+        self,
+        columns: Columns,
+        speeds: tuple[float, float],
+        rows: Sequence[Row],
+        costs: Sequence[int],
+        auxiliary: int,
+        sizes: tuple[int, int],
+    ) -> None:
+        import casadi
+
+        n = columns.size
+        z = casadi.MX.sym("z", n + auxiliary)
+        over_turn = [k for k, row in enumerate(rows) if row.kind in OVER_TURN]
+        upper = casadi.MX.sym("upper", len(rows))
+        peaks, fine = sizes
+        extremes, nodes = casadi.MX.sym("peaks", 3, peaks * len(over_turn)), casadi.MX.sym("nodes", fine, 2)
+        x = casadi.DM(columns.low) + casadi.DM(columns.span) * z[:n]
+        derived = columns.derived(x)
+
+        def table(kinds: Sequence[str], lanes: Any) -> dict[int, Any]:
+            """The values of the columns of these rows, one row each."""
+            places = sorted({row.terms[0][1] for row in rows if row.kind in kinds})
+            values = columns.function(places)(x, derived, lanes)
+            return {k: values[i, :].T for i, k in enumerate(places)}
+
+        speed, slack_speed = speeds
+        half = grid(COARSE // 2)
+        self._grid = {
+            "turn": np.stack([grid(COARSE), np.full(COARSE, speed)]),
+            "slack": np.stack(
+                [np.tile(half, 2), np.repeat([share * slack_speed for share in SLACK_SPEEDS], len(half))]
+            ),
+        }
+        tables = (
+            {} if peaks else {kind: table([kind], casadi.DM(lanes)) for kind, lanes in self._grid.items()}
         )
-        self._factor = np.array([scaled[k] / self.rows[k].scale for k in owner])
-        self._constant = np.array([-self.rows[k].upper / self.rows[k].scale for k in self.row_of], float)
-        self._aux = np.zeros((len(self.row_of), len(self.scales)))
-        for i, k in enumerate(self.row_of):
-            for a, factor in self.rows[k].aux.items():
-                self._aux[i, a] = factor * self.scales[a] / self.rows[k].scale
-        self.equal = np.array([self.rows[k].equal for k in self.row_of], bool)
+        at_nodes = casadi.horzcat(nodes[:, 0], casadi.repmat(casadi.MX(speed), fine)).T
+        mean, distances = table(["mean", "rms"], at_nodes), columns.distance(x)
+        constraints = []
+        for k, row in enumerate(rows):
+            parts: list[Any] = []
+            if row.kind in OVER_TURN:
+                ((_, column, factor),) = row.terms
+                if peaks:
+                    place = peaks * over_turn.index(k)
+                    lanes = extremes[:, place : place + peaks]
+                    value, slope = casadi.vertsplit(columns.function([column], 1)(x, derived, lanes[:2, :]))
+                    parts = [factor * (value - 0.5 * slope**2 * lanes[2, :]).T]
+                else:
+                    parts = [factor * tables[row.kind][column]]
+            elif row.kind in ("mean", "rms"):
+                ((_, column, factor),) = row.terms
+                power = 2 if row.kind == "rms" else 1
+                size = casadi.dot(nodes[:, 1], mean[column] ** power)
+                parts = [factor * (casadi.sqrt(size) if power == 2 else size)]
+            elif row.kind == "distance":
+                ((_, place, factor),) = row.terms
+                parts = [factor * distances[place]]
+            else:
+                order = int(row.kind == "slope")
+                reached = [
+                    factor
+                    * columns.function([column], order)(x, derived, casadi.vertcat(z[n + angle], speed))[-1]
+                    for angle, column, factor in row.terms
+                ]
+                parts = [sum(reached, casadi.MX(0.0))]
+            rest = sum((factor * z[n + place] for place, factor in row.aux), -upper[k])
+            constraints.append((casadi.vertcat(*parts) + rest) / row.scale)
+        self._row = np.repeat(np.arange(len(rows)), [part.numel() for part in constraints])
+        self._equal = np.array([row.equal for row in rows])[self._row]
+        self._lifts = {
+            n + place: np.array([any(k == place for k, _ in row.aux) for row in rows])[self._row]
+            for place in costs
+        }
+        p, g = casadi.vertcat(upper, casadi.vec(extremes), casadi.vec(nodes)), casadi.vertcat(*constraints)
+        cost = sum((z[n + place] for place in costs), casadi.MX(0.0))
+        self._constraints = casadi.Function("constraints", [z, p], [g])
+        self._watch = _watch(z.numel(), g.numel(), p.numel())
+        options = {**_OPTIONS, **(_WARM if peaks else _ROUGH), "iteration_callback": self._watch}
+        self._solver = casadi.nlpsol("best", "ipopt", {"x": z, "p": p, "f": cost, "g": g}, options)
+        self._free, self._over_turn = n, over_turn
+        self._kinds = [rows[k].kind for k in over_turn]
 
-    @property
-    def constraints(self) -> int:
-        """Number of constraints."""
-        return len(self.row_of)
+    def solve(self, z: Any, low: Any, upper: Any, lanes: Lanes, last: Solution | None) -> Solution:
+        """The solution near `z`, or near the `last` one, with the lower bounds `low` of the auxiliary variables and
+        the numbers `upper` of the rows.
 
-    def _compute(self, z: Any) -> None:
-        """Values and slopes of all constraints at a point; the values at the last point are kept."""
-        if z.tobytes() == self._key:
-            return
-        space, n = self.space, self.space.n
-        self.evaluations += 1
-        x = space.x(z)
-        self._x = x
-        if len(self._followed):
-            at = self._followed
-            those = self._followed_columns, self.begin[at], self.w[at], self._signs
-            self._maxima = stationary(space.kernel, x, *those, self._reach)
-            self.q[at] = self._maxima.q
-        columns, slopes = space.kernel.slopes(x, self.q, self.w)
-        self._columns, self._slopes = columns, slopes
-        g = self._constant + self._aux @ z[n:]
-        J = np.zeros((self.constraints, self.size))
-        J[:, n:] = self._aux
-        if self._points:
-            g[: self._points] += self._factor * columns[self._column, self._lane]
-            J[: self._points, :n] = self._factor[:, None] * slopes[self._column, :n, self._lane]
-        self._extremes: dict[int, list[Any]] = {}
-        self._met = (
-            (space.requirements.values(x), space.requirements.slopes(x)) if self._needs_requirements else None
+        Raises
+        ------
+        KeyboardInterrupt
+            if Ctrl-C or SIGTERM came in the meantime.
+        """
+        z, p = z.copy(), np.concatenate([upper, np.ravel(lanes.peaks), np.ravel(lanes.nodes)])
+        start: dict[str, Any] = {}
+        if last is not None:
+            # each peak begins with the multipliers of the nearest angles
+            parts = list(last.multipliers)
+            for k, before, now in zip(self._over_turn, last.lanes, lanes.peaks, strict=True):
+                parts[k] = np.zeros(len(now))
+                way = np.abs(np.sin(0.5 * (before[0][:, None] - now[:, 0]))) + np.abs(
+                    before[1][:, None] - now[:, 1]
+                )
+                np.add.at(parts[k], np.argmin(way, axis=1), last.multipliers[k])
+            start = {"lam_g0": np.concatenate(parts), "lam_x0": last.bounds}
+        else:
+            exceeded = np.array(self._constraints(z, p)).ravel()
+            for place, those in self._lifts.items():
+                most = np.max(exceeded[those & np.isfinite(exceeded)], initial=0.0)
+                z[place] = most + 1e-3 * (1.0 + most)
+        least = np.concatenate([np.zeros(self._free), low])
+        most = np.where(np.arange(len(z)) < self._free, 1.0, np.inf)
+        # Python drops an interrupt that it raises inside the solver
+        with stoppable() as self._watch.stopped:
+            out = self._solver(
+                x0=z, p=p, lbx=least, ubx=most, lbg=np.where(self._equal, 0.0, -np.inf), ubg=0.0, **start
+            )
+            if self._watch.stopped():
+                raise KeyboardInterrupt
+        stats = self._solver.stats()
+        z, g, multipliers, bounds = (np.array(out[name]).ravel() for name in ("x", "g", "lam_g", "lam_x"))
+        ends = np.flatnonzero(np.diff(self._row)) + 1
+        return Solution(
+            z=z,
+            lanes=[
+                now[:, :2].T if len(now) else self._grid[kind]
+                for now, kind in zip(lanes.peaks, self._kinds, strict=True)
+            ],
+            multipliers=np.split(multipliers, ends),
+            bounds=bounds,
+            exceeded=np.split(np.where(self._equal, np.abs(g), g), ends),
+            converged=stats["return_status"] in _DONE,
+            iterations=int(stats["iter_count"]),
+            evaluations=int(stats["n_call_nlp_jac_g"] + stats["n_call_nlp_hess_l"]),
         )
-        for i, k in enumerate(self._others, self._points):
-            value, gradient = self._other(k, x)
-            g[i] += value / self.rows[k].scale
-            J[i, :n] = gradient / self.rows[k].scale
-        J[:, :n] *= space.span
-        self._g, self._J, self._key = g, J, z.tobytes()
-
-    @property
-    def _needs_requirements(self) -> bool:
-        return any(isinstance(self.rows[k], RequirementRow) for k in self._others)
-
-    def _other(self, k: int, x: Any) -> tuple[float, Any]:
-        """Value and gradient of a row that is no point row."""
-        row, n = self.rows[k], self.space.n
-        if isinstance(row, RequirementRow):
-            assert self._met is not None
-            return -self._met[0][row.place], -self._met[1][row.place]
-        if isinstance(row, MeanRow):
-            c, dc = self._columns[row.column, self._fine], self._slopes[row.column, :n][:, self._fine]
-            if not row.rms:
-                return row.factor * float(np.mean(c)), row.factor * np.mean(dc, axis=1)
-            rms = float(np.sqrt(np.mean(c * c)))
-            return row.factor * rms, row.factor * np.mean(dc * c, axis=1) / rms
-        if isinstance(row, ExtremeRow):
-            value, gradient = 0.0, np.zeros(n)
-            found = []
-            for columns, sense, factor in row.terms:
-                at = self._turn.extreme(x, columns, sense, len(self._coarse), self._columns[:, self._coarse])
-                factor *= at.sign if sense == "peak" else 1.0
-                value += factor * at.value
-                if np.isfinite(at.value):
-                    lane = np.array([at.angle]), np.array([self.space.speed])
-                    gradient += factor * self.space.kernel.slopes(x, *lane)[1][at.column, :n, 0]
-                found.append((at, factor))
-            self._extremes[k] = found
-            return value, gradient
-        return 0.0, np.zeros(n)
-
-    def constraint_values(self, z: Any) -> Any:
-        """The constraints, each to be at most 0 or exactly 0, shape (constraints,)."""
-        self._compute(z)
-        return self._g
-
-    def constraint_slopes(self, z: Any) -> Any:
-        """Their derivatives, shape (constraints, size)."""
-        self._compute(z)
-        return self._J
-
-    def violation(self, z: Any) -> Any:
-        """By how much each constraint is exceeded, in parts of its scale."""
-        g = self.constraint_values(z)
-        return np.where(self.equal, np.abs(g), g)
-
-    def lifted(self, z: Any, last: Sequence[int]) -> Any:
-        """The point with auxiliary variables that meet the constraints, as far as they can: first all others, then
-        the `last` ones, which may depend on them."""
-        z, n = z.copy(), self.space.n
-        for those in ([k for k in range(len(self.scales)) if k not in last], last):
-            z[[n + k for k in those]] = 0.0
-            g = self.constraint_values(z)
-            for k in those:
-                factors = self._aux[:, k]
-                above, below = (factors < 0.0) & np.isfinite(g), (factors > 0.0) & np.isfinite(g)
-                alone = np.sum(self._aux != 0.0, axis=1) == 1
-                if k in last:
-                    least = np.max(g[above] / -factors[above], initial=0.0)
-                    z[n + k] = least + 1e-3 * (1.0 + abs(least))
-                elif np.any(above & alone):
-                    z[n + k] = np.max((g / -np.where(factors == 0.0, 1.0, factors))[above & alone]) + 1e-3
-                elif np.any(below & alone):
-                    z[n + k] = np.min((-g / np.where(factors == 0.0, 1.0, factors))[below & alone]) - 1e-3
-        return z
-
-    def from_other(self, other: AngleProgram, multipliers: Any) -> Any:
-        """The multipliers of the same rows over other angles; 0 for new angles."""
-        known = dict(zip(other.keys, multipliers, strict=True))
-        return np.array([known.get(key, 0.0) for key in self.keys])
-
-    @property
-    def keys(self) -> list[tuple[int, float, float]]:
-        """Row, angle and speed of each constraint."""
-        at = [(float(self.begin[i]), float(self.w[i])) for i in self._lane]
-        at += [(0.0, 0.0)] * len(self._others)
-        return [(int(k), *pair) for k, pair in zip(self.row_of, at, strict=True)]
-
-    def offset(self, z: Any, row: Row) -> float:
-        """The part of a row that does not depend on the machine, over its scale."""
-        own = sum(factor * self.scales[a] * z[self.space.n + a] for a, factor in row.aux.items())
-        return float((own - row.upper) / row.scale)
-
-    def mean_of(self, z: Any, row: MeanRow) -> float:
-        """The mean, or the mean square, of a column over the angles for means."""
-        self._compute(z)
-        return float(np.mean(self._columns[row.column, self._fine] ** (2 if row.rms else 1)))
-
-    def bend(self, z: Any, multipliers: Any) -> Any:
-        """The second derivatives of their sum with `multipliers`, shape (size, size)."""
-        self._compute(z)
-        self.evaluations += 1
-        space, n, x = self.space, self.space.n, self._x
-        weights = np.zeros((space.kernel.rows, len(self.q)))
-        own = multipliers[: self._points] * self._factor if self._points else np.zeros(0)
-        np.add.at(weights, (self._column, self._lane), own)
-        matrix, of_requirements = np.zeros((n, n)), np.zeros(len(space.requirements))
-        for i, k in enumerate(self._others, self._points):
-            row, factor = self.rows[k], multipliers[i] / self.rows[k].scale
-            if factor == 0.0:
-                continue
-            if isinstance(row, RequirementRow):
-                of_requirements[row.place] -= factor
-            elif isinstance(row, MeanRow):
-                matrix += self._mean_bend(row, factor, weights)
-            elif isinstance(row, ExtremeRow):
-                matrix += self._extreme_bend(k, x, factor)
-        matrix += space.kernel.bend(x, self.q, self.w, weights)[:n, :n]
-        if len(self._followed):
-            # the angle of a maximum moves with the parameters
-            maxima = self._maxima
-            own = np.where(maxima.good, weights[self._followed_columns, self._followed], 0.0)
-            own = own / np.where(maxima.good, maxima.curvature, 1.0)
-            mixed = np.where(maxima.good, maxima.mixed, 0.0)
-            matrix -= (mixed * own) @ mixed.T
-        if np.any(of_requirements):
-            matrix += space.requirements.bend(x, of_requirements)
-        whole = np.zeros((self.size, self.size))
-        whole[:n, :n] = matrix * np.outer(space.span, space.span)
-        return whole
-
-    def _mean_bend(self, row: MeanRow, factor: float, weights: Any) -> Any:
-        """The part of a mean's bend that the slopes give; the rest is added to the `weights`."""
-        n, factor = self.space.n, factor * row.factor / len(self._fine)
-        if not row.rms:
-            weights[row.column, self._fine] += factor
-            return np.zeros((n, n))
-        c, dc = self._columns[row.column, self._fine], self._slopes[row.column, :n][:, self._fine]
-        rms = np.sqrt(np.mean(c * c))
-        weights[row.column, self._fine] += factor * c / rms
-        gradient = dc @ c
-        return factor * (dc @ dc.T / rms - np.outer(gradient, gradient) / (rms**3 * len(self._fine)))
-
-    def _extreme_bend(self, k: int, x: Any, factor: float) -> Any:
-        """The bend of extremes, whose angle moves with the parameters."""
-        n, kernel = self.space.n, self.space.kernel
-        matrix = np.zeros((n, n))
-        for at, own in self._extremes[k]:
-            weights = np.zeros((kernel.rows, 1))
-            weights[at.column] = 1.0
-            H = kernel.bend(x, np.array([at.angle]), np.array([self.space.speed]), weights)
-            matrix += own * factor * H[:n, :n]
-            if H[n, n] * at.sign < 0.0:  # else the extreme is at a kink
-                matrix -= own * factor * np.outer(H[:n, n], H[n, :n]) / H[n, n]
-        return matrix
 
 
-def key_of(row: PointRow) -> Followed:
-    """The maxima that the row follows."""
-    return row.column, row.slack, float(np.sign(row.factor))
+def _watch(variables: int, constraints: int, parameters: int) -> Any:
+    """A function that IPOPT calls after each iteration, and that ends it if `stopped` says so."""
+    import casadi
+
+    sizes = {"f": 1, "x": variables, "lam_x": variables, "lam_p": parameters}
+
+    class Watch(casadi.Callback):
+        stopped: Callable[[], bool]
+
+        def __init__(self) -> None:
+            casadi.Callback.__init__(self)
+            self.construct("watch", {})
+
+        def get_n_in(self) -> int:
+            return int(casadi.nlpsol_n_out())
+
+        def get_sparsity_in(self, k: int) -> Any:
+            return casadi.Sparsity.dense(sizes.get(casadi.nlpsol_out(k), constraints), 1)
+
+        def eval(self, arguments: Any) -> list[int]:
+            return [int(self.stopped())]
+
+    return Watch()

@@ -1,217 +1,201 @@
-"""The rows of a nonlinear program: each is a function of the machine, plus auxiliary variables, and is at most 0.
+"""The rows of a nonlinear program: each is a sum of a machine's columns and of auxiliary variables, and at most 0.
 
 A peak or a range is no smooth function of the parameters. A limit above it is one row for each crank angle; as an
-objective it becomes an auxiliary variable that no angle exceeds. A limit below it is a row with the extreme itself,
-whose derivatives follow from those at its angle.
+objective it becomes an auxiliary variable that no angle exceeds. A limit below it needs one angle at which it is
+reached: this angle is an auxiliary variable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
-from ...core.errors import InputError
-from ...machines.machine import Machine
+import numpy as np
+
 from ...study.cycle_quantities import CycleBasis, CycleQuantity
-from .extremes import Sense
-from .kernel import pieces, symbols_of
+from .columns import Columns
+
+Kind = Literal["turn", "slack", "mean", "rms", "reached", "slope", "distance", "auxiliary"]
+OVER_TURN = ("turn", "slack")
+_MARGIN = 1e-3
+"""Margin of the ends of a range at first, as a share of its scale: IPOPT begins inside the limits."""
+SIGNS = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row: its value plus the sum of `aux` (factors by auxiliary variable), minus `upper`, over `scale`, is at
-    most 0, or exactly 0 where it is `equal`. `owner` is the limit that it belongs to, and `side` "min" or "max"."""
+    """The sum of `terms` (number of an angle, column, factor) and of `aux` (number, factor), minus `upper`, over
+    `scale`, is at most 0, or exactly 0 if it is `equal`. `owner` is the limit that it belongs to, and `side` "min" or
+    "max"; `times` the factor of the limit in `upper`.
 
+    A row "turn" or "slack" has one term and stands at each angle of the turn, at the speed or at those of the
+    slack-free range; "mean" and "rms" are over the turn; in "reached" and "slope" the angles are auxiliary variables,
+    and "slope" is the derivative by them; the term of "distance" is one of the model's requirements.
+    """
+
+    kind: Kind
     owner: str
     side: str
     upper: float
     scale: float
-    aux: Mapping[int, float] = field(default_factory=dict)
+    terms: tuple[tuple[int, int, float], ...] = ()
+    aux: tuple[tuple[int, float], ...] = ()
     equal: bool = False
     times: float = 1.0
-    """factor of the limit in `upper`"""
-
-    @property
-    def per_unit(self) -> float:
-        """Change of the row by one unit of the limit, without its sign."""
-        return self.times / self.scale
-
-
-@dataclass(frozen=True)
-class PointRow(Row):
-    """A column times `factor` at each angle; `slack` rows stand at the speeds of the slack-free range."""
-
-    column: int = 0
-    factor: float = 1.0
-    slack: bool = False
-
-
-@dataclass(frozen=True)
-class MeanRow(Row):
-    """The mean of a column, or its RMS, times `factor`."""
-
-    column: int = 0
-    factor: float = 1.0
-    rms: bool = False
-
-
-@dataclass(frozen=True)
-class ExtremeRow(Row):
-    """The sum of extremes of columns, each with its factor."""
-
-    terms: tuple[tuple[tuple[int, ...], Sense, float], ...] = ()
-
-
-@dataclass(frozen=True)
-class AuxRow(Row):
-    """Auxiliary variables alone."""
-
-
-@dataclass(frozen=True)
-class RequirementRow(Row):
-    """A distance of a requirement of the model, by its place among all of them, times -1."""
-
-    place: int = 0
-
-
-class Columns:
-    """The columns that some quantities need, as expressions for a `Kernel`: the columns themselves, and the smooth
-    pieces of the rows that are a choice."""
-
-    def __init__(self, machine: Machine) -> None:
-        self._machine = machine
-        self.expressions: list[Any] = []
-        self._places: dict[tuple[str, str], tuple[int, ...]] = {}
-
-    def whole(self, column: str) -> int:
-        """The place of a column."""
-        return self._of(column, "")[0]
-
-    def lower(self, column: str) -> tuple[int, ...]:
-        """The places of the pieces whose least value a column is."""
-        return self._of(column, "FMIN")
-
-    def mean(self, column: str) -> int:
-        """The place of the mean of the pieces whose least value a column is."""
-        if (column, "mean") not in self._places:
-            own = [self.expressions[k] for k in self.lower(column)]
-            self._places[column, "mean"] = (len(self.expressions),)
-            self.expressions.append(sum(own[1:], own[0]) / len(own))
-        return self._places[column, "mean"][0]
-
-    def upper(self, column: str) -> tuple[int, ...]:
-        """The places of the pieces whose largest value a column is."""
-        return self._of(column, "FMAX")
-
-    def _of(self, column: str, kind: str) -> tuple[int, ...]:
-        if (column, kind) not in self._places:
-            (expression,) = symbols_of(self._machine, [column])
-            own = pieces(expression, kind) if kind else [expression]
-            if len(own) == 1 and kind:
-                self._places[column, kind] = self._of(column, "")
-            else:
-                first = len(self.expressions)
-                self.expressions += own
-                self._places[column, kind] = tuple(range(first, len(self.expressions)))
-        return self._places[column, kind]
 
 
 @dataclass
-class RowMaker:
-    """Makes the rows of limits. `new_aux` makes an auxiliary variable of that scale and returns its number."""
+class LimitRows:
+    """The rows of limits near a machine: `turn` gives columns over the turn there, shape (columns, angles).
+
+    `begin` and `low` are the value of each auxiliary variable there, and its lower bound; `angles` are the variables
+    that are angles.
+    """
 
     columns: Columns
     basis: CycleBasis
-    new_aux: Any
+    turn: Callable[[Sequence[int]], Any]
     rows: list[Row] = field(default_factory=list)
+    begin: list[float] = field(default_factory=list)
+    low: list[float] = field(default_factory=list)
+    angles: list[int] = field(default_factory=list)
+
+    def auxiliary(self, begin: float, low: float = -math.inf) -> int:
+        """The number of a new auxiliary variable."""
+        self.begin.append(begin)
+        self.low.append(low)
+        return len(self.begin) - 1
 
     def at_most(
         self, q: CycleQuantity, owner: str, scale: float, bound: float = 0.0, objective: int | None = None
     ) -> None:
-        """Rows by which a quantity is at most `bound`, or at most the auxiliary variable `objective`."""
-        own: dict[str, Any] = {"owner": owner, "side": "max", "scale": scale}
+        """LimitRows by which a quantity is at most `bound`, or at most `scale` times the variable `objective`."""
 
-        def less(factor: float = 1.0) -> dict[str, Any]:
-            aux = {} if objective is None else {objective: -factor}
-            return own | {"upper": factor * bound, "aux": aux}
+        def add(kind: Kind, column: int, factor: float, times: float = 1.0) -> None:
+            aux = () if objective is None else ((objective, -times * scale),)
+            term = ((-1, column, factor),)
+            self.rows.append(Row(kind, owner, "max", times * bound, times * scale, term, aux, False, times))
 
-        column = q.integrands[0].column
-        reduction = q.reduction
-        if reduction == "max":
-            self.rows += [PointRow(**less(), column=k) for k in self.columns.upper(column)]
-        elif reduction == "peak":
-            places = (self.columns.upper(column), 1.0), (self.columns.lower(column), -1.0)
-            self.rows += [PointRow(**less(), column=k, factor=f) for those, f in places for k in those]
-        elif reduction in ("mean", "rms"):
-            self._mean(less(), column, 1.0, reduction == "rms")
-        elif reduction == "energy_per_year":
-            self._mean(less(), "power", 3600.0 * self.basis.operating_hours, False)
+        column, reduction = q.integrands[0].column, q.reduction
+        if reduction in ("max", "peak"):
+            for sign in SIGNS[reduction]:
+                for k in self._smooth(column, sign):
+                    add("turn", k, sign)
         elif reduction == "installed_power":
-            self._mean(less(), "power", 1.0, True)
             power = self.columns.whole("power")
-            over = self.basis.overload
-            self.rows += [
-                PointRow(**less(over) | {"scale": over * scale, "times": over}, column=power, factor=f)
-                for f in (1.0, -1.0)
-            ]
-        elif reduction in ("range", "box.width", "box.height"):
-            high, low = self.new_aux(scale), self.new_aux(scale)
-            own |= {"upper": 0.0}
-            for column in dict.fromkeys(each.column for each in q.integrands):
-                k = self.columns.whole(column)
-                self.rows.append(PointRow(**own, aux={high: -1.0}, column=k))
-                self.rows.append(PointRow(**own, aux={low: 1.0}, column=k, factor=-1.0))
-            aux = {high: 1.0, low: -1.0} | ({} if objective is None else {objective: -1.0})
-            self.rows.append(AuxRow(**own | {"upper": bound, "aux": aux}))
+            add("rms", power, 1.0)
+            for sign in SIGNS["peak"]:
+                add("turn", power, sign, self.basis.overload)
+        elif reduction == "min":
+            self._reached(q, owner, "max", scale, bound, 1.0)
+        elif (mean := self._mean(q)) is not None:
+            add(*mean)
         else:
-            self.rows.append(ExtremeRow(**less(), terms=self._terms(q, 1.0)))
+            places = [self.columns.whole(name) for name in dict.fromkeys(i.column for i in q.integrands)]
+            values = self.turn(places) / scale
+            high = self.auxiliary(float(np.max(values)) + _MARGIN)
+            low = self.auxiliary(float(np.min(values)) - _MARGIN)
+            for k in places:
+                for sign, aux in ((1.0, high), (-1.0, low)):
+                    ends_at = (aux, -sign * scale)
+                    self.rows.append(Row("turn", "", "max", 0.0, scale, ((-1, k, sign),), (ends_at,)))
+            extent = ((high, scale), (low, -scale)) + (() if objective is None else ((objective, -scale),))
+            self.rows.append(Row("auxiliary", owner, "max", bound, scale, (), extent))
 
-    def at_least(self, q: CycleQuantity, owner: str, scale: float, bound: float) -> None:
-        """Rows by which a quantity is at least `bound`."""
-        own: dict[str, Any] = {"owner": owner, "side": "min", "scale": scale, "upper": -bound}
-        column = q.integrands[0].column
-        reduction = q.reduction
-        if reduction == "min":
-            self.rows += [PointRow(**own, column=k, factor=-1.0) for k in self.columns.lower(column)]
-        elif reduction in ("mean", "rms"):
-            self._mean(own, column, -1.0, reduction == "rms")
-        elif reduction == "energy_per_year":
-            self._mean(own, "power", -3600.0 * self.basis.operating_hours, False)
-        elif reduction == "installed_power":
-            raise InputError("installed_power: has an upper limit only; leave min out")
+    def at_least(self, q: CycleQuantity, owner: str, scale: float, bound: float, equal: bool = False) -> None:
+        """LimitRows by which a quantity is at least, or exactly, `bound`."""
+        if (mean := self._mean(q)) is not None:
+            kind, column, factor = mean
+            self.rows.append(Row(kind, owner, "min", -bound, scale, ((-1, column, -factor),), (), equal))
+        elif q.reduction == "min" and not equal:
+            self.over_turn("turn", self._smooth(q.integrands[0].column, -1.0), owner, scale, -bound)
         else:
-            self.rows.append(ExtremeRow(**own, terms=self._terms(q, -1.0)))
+            self._reached(q, owner, "min", scale, -bound, -1.0, equal)
 
-    def exactly(self, q: CycleQuantity, owner: str, scale: float, bound: float) -> None:
-        """The row by which a quantity is equal to `bound`."""
-        first = len(self.rows)
-        if q.reduction in ("mean", "rms", "energy_per_year", "installed_power"):
-            self.at_least(q, owner, scale, bound)
-            self.rows[first] = _equal(self.rows[first])
-            return
-        self.rows.append(ExtremeRow(owner, "min", -bound, scale, equal=True, terms=self._terms(q, -1.0)))
+    def over_turn(
+        self, kind: Kind, places: Sequence[int], owner: str, scale: float, upper: float = 0.0
+    ) -> None:
+        """LimitRows by which columns are at least ``-upper`` at each angle."""
+        self.rows += [Row(kind, owner, "min", upper, scale, ((-1, k, -1.0),)) for k in places]
 
-    def slack_free(self, columns: Sequence[str], owner: str, scale: float) -> None:
-        """Rows by which the mean pull along each web, of those at its two ends, stays above 0 at the speeds of the
-        slack-free range."""
-        places = map(self.columns.mean, columns)
-        self.rows += [PointRow(owner, "min", 0.0, scale, column=k, factor=-1.0, slack=True) for k in places]
+    def distances(self, owner: str, clearance: float, sizes: Any, names: Sequence[str]) -> None:
+        """LimitRows by which the distance from each requirement is at least a share of its size of today."""
+        for k, (size, name) in enumerate(zip(sizes, names, strict=True)):
+            term = ((-1, k, -1.0),)
+            self.rows.append(Row("distance", owner, name, -clearance * size, size, term, (), False, size))
 
-    def _mean(self, own: dict[str, Any], column: str, factor: float, rms: bool) -> None:
-        self.rows.append(MeanRow(**own, column=self.columns.whole(column), factor=factor, rms=rms))
+    def loosen(self) -> dict[str, int]:
+        """Give each limit a slack, by which all its rows may be exceeded; returns the numbers of the slacks."""
+        slacks: dict[str, int] = {}
+        tight, self.rows = self.rows, []
+        for row in tight:
+            if row.owner:
+                if row.owner not in slacks:
+                    slacks[row.owner] = self.auxiliary(0.0, 0.0)
+                slack = slacks[row.owner], -row.scale
+                if row.equal:
+                    terms = tuple((angle, k, -factor) for angle, k, factor in row.terms)
+                    self.rows.append(replace(row, upper=-row.upper, terms=terms, aux=(slack,), equal=False))
+                row = replace(row, aux=(*row.aux, slack), equal=False)
+            self.rows.append(row)
+        return slacks
 
-    def _terms(self, q: CycleQuantity, factor: float) -> tuple[tuple[tuple[int, ...], Sense, float], ...]:
-        terms = []
-        for sense, sign in (("max", 1.0), ("min", -1.0), ("peak", 1.0)):
-            places = tuple(self.columns.whole(i.column) for i in q.integrands if i.reduction == sense)
-            if places:
-                # a range is the largest less the least value
-                terms.append((places, sense, factor * (sign if len(q.integrands) > 1 else 1.0)))
-        return tuple(terms)  # type: ignore[arg-type]
+    def _mean(self, q: CycleQuantity) -> tuple[Kind, int, float] | None:
+        """The kind, column and factor of a quantity that is a mean."""
+        if q.reduction in ("mean", "rms"):
+            return (
+                ("rms" if q.reduction == "rms" else "mean"),
+                self.columns.whole(q.integrands[0].column),
+                1.0,
+            )
+        if q.reduction == "energy_per_year":
+            return "mean", self.columns.whole("power"), 3600.0 * self.basis.operating_hours
+        return None
+
+    def _smooth(self, column: str, factor: float) -> tuple[int, ...]:
+        """The numbers of the columns that are all at most a bound, times `factor`, if the column is."""
+        return self.columns.pieces(column, "FMAX" if factor > 0.0 else "FMIN")
+
+    def _reached(
+        self,
+        q: CycleQuantity,
+        owner: str,
+        side: str,
+        scale: float,
+        upper: float,
+        factor: float,
+        equal: bool = False,
+    ) -> None:
+        """LimitRows by which `factor` times a quantity is at most `upper`, at angles of its own."""
+        terms: list[tuple[int, str, float]] = []
+        for reduction in ("max", "min", "peak"):
+            names = [i.column for i in q.integrands if i.reduction == reduction]
+            if not names:
+                continue
+            values = self.turn([self.columns.whole(name) for name in names])
+            sign = SIGNS[reduction][0]
+            if reduction == "peak":
+                sign = 1.0 if np.max(values) >= -np.min(values) else -1.0
+            place, angle = divmod(int(np.argmax(sign * values)), values.shape[1])
+            number = self.auxiliary(float(grid(values.shape[1])[angle]))
+            self.angles.append(number)
+            # a range is the largest less the least value
+            weight = sign if len(q.integrands) > 1 or reduction == "peak" else 1.0
+            terms.append((number, names[place], factor * weight))
+        whole = tuple((angle, self.columns.whole(name), weight) for angle, name, weight in terms)
+        if equal:
+            slopes = [Row("slope", "", "", 0.0, scale, (term,), (), True) for term in whole]
+            self.rows += [Row("reached", owner, side, upper, scale, whole, (), True), *slopes]
+        elif len(terms) > 1:
+            self.rows.append(Row("reached", owner, side, upper, scale, whole))
+        else:
+            ((angle, name, weight),) = terms
+            for k in self._smooth(name, weight):
+                self.rows.append(Row("reached", owner, side, upper, scale, ((angle, k, weight),)))
 
 
-def _equal(row: Row) -> Row:
-    import dataclasses
-
-    return dataclasses.replace(row, equal=True)
+def grid(points: int) -> Any:
+    """Angles evenly over the turn [rad], shape (points,)."""
+    return np.arange(points) * (2.0 * math.pi / points)

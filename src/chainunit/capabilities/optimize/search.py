@@ -1,35 +1,47 @@
-"""The search for the best machine: starts within the bounds, and programs whose angles grow until no limit is
-exceeded between them."""
+"""The search for the best machine: starts within the bounds, and programs whose peaks move until no limit is exceeded
+between the angles."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...core.errors import InputError, RunError
+from ...mechanism.sampled_quantities import mean_rule, means
 from ...reading.results import part, result
 from ...study.cycle_quantities import CycleQuantity
-from .extremes import MOST_ANGLES, TurnValues, grid, peaks_of, stationary
-from .ipopt import Solution, solve
-from .kernel import Kernel
-from .program import COARSE, AngleProgram, Lanes, Space, key_of
-from .requirements import Requirements
-from .rows import AuxRow, Columns, ExtremeRow, MeanRow, PointRow, RequirementRow, Row, RowMaker
+from .columns import Columns
+from .program import COARSE, Lanes, Solution, TurnProgram
+from .rows import OVER_TURN, SIGNS, LimitRows, Row, grid
 from .wishes import SLACK, TURNS, TurnLimit, Wishes
 
 FINE = 720
 """Number of angles at which the answer of a program is looked over."""
+_PARTS, _ROOM, _MOST_PEAKS = 8, 64, 8
+"""Parts of the turn at first for means, the number of nodes of which that of a program is a multiple, and the largest
+number of peaks of a column at a speed: a constant column has peaks of rounding."""
 _EXCEEDED = 1e-9
 """Share of its scale by which a limit may be exceeded between the angles."""
 _MET = 1e-7
 """Share of its scale by which a limit counts as met."""
-_NEAR = 0.05
-"""Share of its scale by which a limit must be near at an angle of the grid, to be looked at between the angles."""
+_LOOKED_AT, _NEAR = 0.05, 0.01
+"""Shares of its scale by which a limit must be near at an angle of the grid, to be looked at between the angles, and
+at a peak, for which a program then has an angle."""
+_WAY, _EXACT = 1e-3, 1e-6
+"""Way of a peak [rad] that its program describes to the rounding, and deviation of an angle at which its value is
+exact."""
+_NARROW = 10.0
+"""How many times the way down from a peak over one step of the grid its curvature may predict."""
+_SAME = 1e-5
+"""Distance of two answers of rough programs, in parts of the bounds, that count as one."""
+_SIGNED = ("max", "min", "mean", "energy_per_year")
+"""Reductions whose value may be below 0."""
+_POWERS = {"mean": 1, "rms": 2}
 CHECKED = tuple(k / 16.0 for k in range(17))
 """Parts of the highest speed of the slack-free range at which the pulls are looked over; a processing force lowers
 the pull between the ends."""
@@ -47,7 +59,6 @@ class Answer:
     x: Any
     value: float
     feasible: bool
-    point: Solution
     sensitivities: dict[tuple[str, str], float] = field(default_factory=dict)
     at_bounds: dict[tuple[str, str], float] = field(default_factory=dict)
     misses: dict[str, float] = field(default_factory=dict)
@@ -66,50 +77,22 @@ class Effort:
 
 
 class Search:
-    """The programs of some wishes."""
+    """The programs of some wishes; `pulls` are the mean pulls along the webs of the loaded sides, if the wishes limit
+    them."""
 
     def __init__(self, wishes: Wishes) -> None:
-        self.wishes = wishes
-        machine, low_high = wishes.machine, np.array(list(wishes.free.values()), float)
-        self.columns = Columns(machine)
-        self.today = wishes.today
+        self.wishes, self.today = wishes, wishes.today
+        self.columns = Columns(wishes)
+        sides = wishes.machine.loaded_sides(wishes.feed) if wishes.slack_free_speed else ()
+        self.pulls = [self.columns.whole(f"mean_pull({side}.web)") for side in sides]
         quantities = (*wishes.objectives, *(limit.quantity for limit in wishes.limits))
-        # all columns are known before the kernel is made
-        maker = self._maker([])
-        for q in sorted(quantities, key=lambda q: q.name):
-            maker.at_most(q, "", 1.0)
-            if q.name != "installed_power":
-                maker.at_least(q, "", 1.0, 0.0)
-            for each in q.integrands:
-                self.columns.whole(each.column)
-        if wishes.slack_free_speed:
-            maker.slack_free(self.webs, SLACK, 1.0)
-        kernel = Kernel(machine, wishes.feed, self.columns.expressions, wishes.names)
-        requirements = Requirements(machine, wishes.names)
-        low, high = low_high.T
-        self.space = Space(kernel, requirements, low, high - low, wishes.crank_speed, wishes.slack_free_speed)
-        self.turn = TurnValues(kernel, wishes.crank_speed)
+        self._turning = [self.columns.whole(i.column) for q in quantities for i in q.integrands]
+        self._turning += self.pulls
+        self._programs: dict[Any, TurnProgram] = {}
+        self._answers: dict[Any, list[tuple[Any, Answer]]] = {}
+        self.effort = Effort()
         self.base = self._base()
         self.scales = {q.name: abs(self.value(q, self.base)) or 1.0 for q in quantities}
-        self.effort = Effort()
-
-    @property
-    def webs(self) -> list[str]:
-        """The outputs with the least pulls at the ends of the webs of the loaded sides."""
-        machine = self.wishes.machine
-        return [f"{side}.web_pull" for side in machine.loaded_sides(self.wishes.feed)]
-
-    @property
-    def mean_pulls(self) -> list[int]:
-        """The places of the mean pulls along these webs."""
-        return [self.columns.mean(column) for column in self.webs]
-
-    def _maker(self, aux: list[float]) -> RowMaker:
-        def new_aux(scale: float) -> int:
-            aux.append(scale)
-            return len(aux) - 1
-
-        return RowMaker(self.columns, self.wishes.basis, new_aux)
 
     def _base(self) -> Any:
         """A machine within the bounds that can be assembled: today's, as far as the bounds admit it, or the first
@@ -118,161 +101,127 @@ class Search:
         Raises
         ------
         RunError
-            where there is none.
+            if there is none.
         """
-        inside = np.clip(self.today, self.space.low, self.space.low + self.space.span)
-        if self.turns(inside):
-            return inside
-        for y in _sobol(self.space.n, 4096, self.wishes.seed):
-            x = self.space.low + self.space.span * y
+        low, span = self.columns.low, self.columns.span
+        inside = np.clip(self.today, low, low + span)
+        for x in (inside, *(low + span * _sobol(len(low), 4096, self.wishes.seed))):
             if self.turns(x):
                 return x
-        raise RunError(f"No machine within the bounds of optimize.free turns. {self._obstacle(inside)}")
-
-    def _obstacle(self, x: Any) -> str:
-        """Why a machine does not turn."""
+        obstacle = " cannot be assembled at each angle."
         try:
-            self.wishes.machine.replace(dict(zip(self.wishes.names, map(float, x), strict=True)))
+            self.wishes.machine.replace(dict(zip(self.wishes.names, map(float, inside), strict=True)))
         except InputError as error:
-            return f"The one nearest to today's: {error}"
-        return "The one nearest to today's cannot be assembled at each angle."
+            obstacle = f": {error}"
+        raise RunError(
+            f"No machine within the bounds of optimize.free turns. The one nearest to today's{obstacle}"
+        )
 
     def turns(self, x: Any) -> bool:
         """Whether a machine meets the requirements of its model, and can be assembled at each angle."""
-        met = self.space.requirements.values(x)
-        if not np.all(met > 0.0):
-            return False
-        q = grid(COARSE)
-        return bool(np.all(np.isfinite(self.space.kernel.values(x, q, np.full(len(q), self.space.speed)))))
+        met = np.all(self.columns.distances(x) > 0.0)
+        return bool(met and np.all(np.isfinite(self._turn(x, self._turning))))
+
+    def _turn(self, x: Any, places: Sequence[int]) -> Any:
+        """Columns over the turn, shape (places, COARSE)."""
+        return self.columns.values(x, grid(COARSE), self.wishes.crank_speed, places)[0]
 
     # quantities
 
-    def value(self, q: CycleQuantity, x: Any, points: int = FINE) -> float:
+    def value(self, q: CycleQuantity, x: Any) -> float:
         """A quantity of the continuous turn."""
         parts = []
-        for each in q.integrands:
-            k = self.columns.whole(each.column)
-            if each.reduction in ("mean", "rms"):
-                mean = self.turn.mean(x, k, 2 if each.reduction == "rms" else 1)
-                parts.append(math.sqrt(mean) if each.reduction == "rms" else mean)
+        for integrand in q.integrands:
+            k, reduction = self.columns.whole(integrand.column), integrand.reduction
+            if reduction in SIGNS:
+                parts.append(self._extreme(x, k, reduction)[1])
             else:
-                at = self.turn.extreme(x, [k], each.reduction, points)  # type: ignore[arg-type]
-                parts.append(abs(at.value) if each.reduction == "peak" else at.value)
-        ratio = self.ratio(x)
-        return float(q.combine(parts, self.wishes.crank_speed * ratio, self.wishes.basis))
+                mean = self._mean(x, k, reduction)
+                parts.append(math.sqrt(mean) if reduction == "rms" else mean)
+        return float(q.combine(parts, self.wishes.crank_speed * self.columns.ratio(x), self.wishes.basis))
+
+    def _mean(self, x: Any, k: int, reduction: str) -> float:
+        """The mean of a column over the turn, or, for "rms", that of its square."""
+
+        def values(q: Any) -> Any:
+            return self.columns.values(x, q, self.wishes.crank_speed, [k])[0] ** _POWERS[reduction]
+
+        return float(means(values, 0.0, 2.0 * math.pi)[0][0])
+
+    def _extreme(self, x: Any, k: int, reduction: str) -> tuple[float, float]:
+        """The crank angle [rad] and the value of an extreme of a column."""
+        speeds = [self.wishes.crank_speed]
+        peaks = np.concatenate([self._peaks(x, k, sign, speeds, -math.inf) for sign in SIGNS[reduction]])
+        top, angle, *_ = peaks[np.argmax(peaks[:, 0])]
+        return float(angle), float(-top if reduction == "min" else top)
 
     def extreme_angles(self, q: CycleQuantity, x: Any) -> list[float]:
-        """The crank angles of the extremes behind a quantity [rad]."""
-        extremes = [each for each in q.integrands if each.reduction in ("max", "min", "peak")]
-        return [
-            self.turn.extreme(x, [self.columns.whole(each.column)], each.reduction, FINE).angle  # type: ignore[arg-type]
-            for each in extremes
-        ]
+        """The crank angles of the extremes of a quantity [rad]."""
+        extremes = [i for i in q.integrands if i.reduction in SIGNS]
+        return [self._extreme(x, self.columns.whole(i.column), i.reduction)[0] for i in extremes]
 
     def least_pull(self, x: Any) -> float:
         """The least mean pull along a web up to the highest speed of the slack-free range [N]."""
         from scipy.optimize import minimize_scalar
 
-        places = self.mean_pulls
-        q, highest = grid(FINE), self.wishes.slack_free_speed
+        def pulls(q: Any, shares: Any) -> Any:
+            w = np.repeat(np.atleast_1d(shares) * self.wishes.slack_free_speed, len(q))
+            values = self.columns.values(x, np.tile(q, np.size(shares)), w, self.pulls)
+            return np.min(values, axis=(0, 1)).reshape(np.size(shares), len(q))
 
-        def pull(part: float) -> float:
-            return float(np.min(self.space.kernel.values(x, q, np.full(FINE, part * highest))[places]))
+        coarse = grid(FINE // 3)
+        k, place = divmod(int(np.argmin(pulls(coarse, CHECKED))), len(coarse))
+        low, high = CHECKED[max(k - 1, 0)], CHECKED[min(k + 1, len(CHECKED) - 1)]
+        q = coarse[place] + coarse[2] * np.linspace(-1.0, 1.0, 49)
 
-        pulls = [pull(part) for part in CHECKED]
-        k = int(np.argmin(pulls))
-        ends = CHECKED[max(k - 1, 0)], CHECKED[min(k + 1, len(CHECKED) - 1)]
+        def pull(share: float) -> float:
+            return float(np.min(pulls(q, share)))
+
         between = minimize_scalar(
-            pull, bounds=ends, method="bounded", options={"xatol": 1e-3 * (ends[1] - ends[0])}
+            pull, bounds=(low, high), method="bounded", options={"xatol": 1e-3 * (high - low)}
         )
-        return min(pulls[k], float(between.fun))
-
-    def ratio(self, x: Any) -> float:
-        """Motor turns per crank turn."""
-        names = self.wishes.machine.model.parameter_layout.names
-        return float(self.space.kernel.parameters(x)[names.index("ratio")])
+        return min(pull(CHECKED[k]), float(between.fun))
 
     # programs
-
-    def rows(
-        self, objective: CycleQuantity | None, limits: Sequence[TurnLimit], without: frozenset[str]
-    ) -> tuple[list[Row], list[float], dict[str, int]]:
-        """Rows, scales of the auxiliary variables, and, without an objective, the slacks by their limits."""
-        aux: list[float] = []
-        maker = self._maker(aux)
-        if objective is not None:
-            scale = self.scales[objective.name]
-            maker.at_most(objective, "", scale, objective=maker.new_aux(scale))
-        for limit in limits:
-            if limit.name in without:
-                continue
-            q, low, high = limit.quantity, limit.low, limit.high
-            scale = max(abs(low or 0.0), abs(high or 0.0)) or self.scales[q.name]
-            if low is not None and low == high:
-                maker.exactly(q, limit.name, scale, low)
-                continue
-            if low is not None:
-                maker.at_least(q, limit.name, scale, low)
-            if high is not None:
-                maker.at_most(q, limit.name, scale, high)
-        if self.wishes.slack_free_speed and SLACK not in without:
-            maker.slack_free(self.webs, SLACK, self._pull_scale)
-        maker.rows += self._clearances("", 0.0)
-        if TURNS not in without:
-            maker.rows += self._clearances(TURNS, self.wishes.clearance)
-        slacks = self._loosen(maker) if objective is None else {}
-        return maker.rows, aux, slacks
-
-    @property
-    def _pull_scale(self) -> float:
-        places = self.mean_pulls
-        q = grid(COARSE)
-        return float(np.max(np.abs(self.space.kernel.values(self.base, q, np.zeros(len(q)))[places]))) or 1.0
-
-    def _clearances(self, owner: str, clearance: float) -> list[Row]:
-        """Rows by which the machine keeps its distance from the requirements of its model."""
-        machine, requirements = self.wishes.machine, self.space.requirements
-        sizes = requirements.values(self.base)
-        return [
-            RequirementRow(
-                owner, machine.model.required[subject].subject, -clearance * size, size, times=size, place=k
-            )
-            for k, (subject, size) in enumerate(zip(requirements.subjects, sizes, strict=True))
-        ]
-
-    @staticmethod
-    def _loosen(maker: RowMaker) -> dict[str, int]:
-        """Give each limit a slack, by which all its rows may be exceeded; returns the numbers of the slacks."""
-        slacks: dict[str, int] = {}
-        rows: list[Row] = []
-        for row in maker.rows:
-            if row.owner and not (_is_helper(row, maker.rows)):
-                k = slacks.setdefault(row.owner, -1)
-                if k < 0:
-                    k = slacks[row.owner] = maker.new_aux(1.0)
-                if row.equal:
-                    # from both sides
-                    row = dataclasses.replace(row, equal=False)
-                    rows.append(dataclasses.replace(_reversed(row), aux={k: -row.scale}))
-                row = dataclasses.replace(row, aux={**row.aux, k: -row.scale})
-            rows.append(row)
-        maker.rows = rows
-        return slacks
-
-    # solutions
 
     def starts(self, number: int, seed: int = 0) -> tuple[list[Any], int]:
         """Points that fill the bounds evenly, each moved towards `base` until the machine can be assembled; and the
         number of points that were moved."""
         points, moved = [], 0
-        for y in _sobol(self.space.n, number, self.wishes.seed + seed):
-            x = self.space.low + self.space.span * y
-            part = 1.0
-            while not self.turns(self.base + part * (x - self.base)):
-                part *= 0.5
-            moved += part < 1.0
-            points.append(self.base + part * (x - self.base))
+        for y in _sobol(self.columns.size, number, self.wishes.seed + seed):
+            way, share = self.columns.low + self.columns.span * y - self.base, 1.0
+            while not self.turns(self.base + share * way):
+                share *= 0.5
+            moved += share < 1.0
+            points.append(self.base + share * way)
         return points, moved
+
+    def _rows(
+        self, x: Any, objective: CycleQuantity | None, limits: Sequence[TurnLimit], without: frozenset[str]
+    ) -> tuple[LimitRows, dict[str, int]]:
+        """The rows near `x`, and, without an objective, the slacks by their limits."""
+        wishes, sizes = self.wishes, self.columns.distances(self.base)
+        rows = LimitRows(self.columns, wishes.basis, partial(self._turn, x))
+        if objective is not None:
+            least = -math.inf if objective.reduction in _SIGNED else 0.0
+            rows.at_most(objective, "", self.scales[objective.name], objective=rows.auxiliary(0.0, least))
+        for limit in limits:
+            if limit.name in without:
+                continue
+            q, low, high = limit.quantity, limit.low, limit.high
+            scale = max(abs(low or 0.0), abs(high or 0.0)) or self.scales[q.name]
+            if low is not None:
+                rows.at_least(q, limit.name, scale, low, equal=low == high)
+            if high is not None and low != high:
+                rows.at_most(q, limit.name, scale, high)
+        if self.pulls and SLACK not in without:
+            at_rest = self.columns.values(self.base, grid(COARSE), 0.0, self.pulls)
+            rows.over_turn("slack", self.pulls, SLACK, float(np.max(np.abs(at_rest))) or 1.0)
+        names = [wishes.machine.model.required[subject].subject for subject in self.columns.subjects]
+        rows.distances("", 0.0, sizes, names)
+        if TURNS not in without:
+            rows.distances(TURNS, wishes.clearance, sizes, names)
+        return rows, rows.loosen() if objective is None else {}
 
     def solve(
         self,
@@ -283,114 +232,175 @@ class Search:
     ) -> Answer:
         """The machine near `x` with the least objective under the limits, which are by default the limits of the
         wishes; or, without an objective, the one that misses the limits by the least sum of shares."""
-        rows, aux, slacks = self.rows(objective, self.wishes.limits if limits is None else limits, without)
-        n, space, lanes = self.space.n, self.space, Lanes()
-        cost = np.zeros(n + len(aux))
-        cost[[n + k for k in slacks.values()] if objective is None else n] = 1.0
-        low, high = np.full(len(cost), -np.inf), np.full(len(cost), np.inf)
-        low[:n], high[:n] = 0.0, 1.0
-        low[[n + k for k in slacks.values()]] = 0.0
-        z = np.zeros(len(cost))
-        z[:n] = np.clip((x - space.low) / space.span, 1e-3, 1.0 - 1e-3)
-        warm: Solution | None = None
-        last: AngleProgram | None = None
-        first = [*slacks.values()] if objective is None else [0]
+        low, span, n = self.columns.low, self.columns.span, self.columns.size
+        limits = self.wishes.limits if limits is None else limits
+        rows, slacks = self._rows(x, objective, limits, without)
+        costs = (0,) if objective is not None else tuple(slacks.values())
+        z = np.concatenate([np.clip((x - low) / span, 1e-3, 1.0 - 1e-3), rows.begin])
+        number = sum(row.kind in OVER_TURN for row in rows.rows)
+        nodes = np.stack([grid(COARSE), np.full(COARSE, 1.0 / COARSE)])
+        # a mean at its limit leaves no room for a rough one
+        tight = [row for row in rows.rows if row.kind in _POWERS and row.owner and self._is_tight(row, x)]
+        nodes, _ = self._nodes(tight, x, nodes)
+        lanes, worst = Lanes(np.zeros((number, 0, 3)), nodes), math.inf
+        point = self._run(rows, costs, z, lanes, None)
+        # a start that ends where another one did has its answer
+        begun = self._answers.setdefault((tuple(rows.rows), costs), [])
+        for z, answer in begun:
+            if np.max(np.abs(point.z - z)) < _SAME:
+                return answer
+        rough = point.z
         for _ in range(_ROUNDS):
-            program = AngleProgram(space, rows, aux, lanes)
-            if warm is not None and last is not None:
-                warm = dataclasses.replace(warm, multipliers=program.from_other(last, warm.multipliers))
-            point = solve(program, cost, low, high, program.lifted(z, first), warm)
-            self.effort.programs += 1
-            self.effort.iterations += point.iterations
-            self.effort.evaluations += program.evaluations
+            worst = math.inf
             if not point.converged:
                 break
-            if not self._add_lanes(program, point.z, lanes):
+            z, x = point.z, self._x(point)
+            lanes, more, worst = self._followed(rows.rows, point, lanes)
+            if any(row.kind == "slope" for row in rows.rows):
+                # another extreme may be the largest one now
+                fresh, _ = self._rows(x, objective, limits, without)
+                turns = np.abs(np.sin(0.5 * (z[n:] - fresh.begin)))[fresh.angles]
+                if fresh.rows != rows.rows or np.any(turns > math.pi / COARSE):
+                    rows, more, worst = fresh, True, math.inf
+                    z[n + np.array(fresh.angles)] = np.array(fresh.begin)[fresh.angles]
+            if not more:
                 break
-            z, warm, last = point.z, point, program
-        return self._answer(objective, slacks, program, point)
+            point = self._run(rows, costs, z, lanes, point)
+        begun.append((rough, self._answer(objective, slacks, rows.rows, point, worst)))
+        return begun[-1][1]
 
-    def _add_lanes(self, program: AngleProgram, z: Any, lanes: Lanes) -> bool:
-        """Add the angles at which a limit is exceeded between the angles of the program; whether there are any."""
-        space, more = self.space, False
-        x = space.x(z)
-        for row in program.rows:
-            if isinstance(row, MeanRow):
-                exact = self.turn.mean(x, row.column, 2 if row.rms else 1)
-                rough = program.mean_of(z, row)
-                if abs(exact - rough) > _EXCEEDED * abs(exact) and lanes.fine < MOST_ANGLES:
-                    lanes.fine, more = 2 * lanes.fine, True
-                    break
-        q, step = grid(FINE), 2.0 * math.pi / FINE
-        values: dict[float, Any] = {}
-        for row in program.rows:
-            if not isinstance(row, PointRow):
-                continue
-            for w in [share * space.slack_speed for share in CHECKED] if row.slack else [space.speed]:
-                if w not in values:
-                    values[w] = space.kernel.values(x, q, np.full(FINE, w))[:, 0]
-                offset = program.offset(z, row)
-                rest = row.factor * values[w][row.column] / row.scale + offset
-                places = peaks_of(rest, 1.0, -_NEAR)
-                if not len(places):
-                    continue
-                sign, number = float(np.sign(row.factor)), len(places)
-                at = stationary(
-                    space.kernel,
-                    x,
-                    np.full(number, row.column),
-                    q[places],
-                    np.full(number, w),
-                    sign,
-                    2.0 * step,
-                )
-                for angle, value in zip(at.q, row.factor * at.values / row.scale + offset, strict=True):
-                    if value > _EXCEEDED:
-                        more |= lanes.add(key_of(row), float(angle), w)
-        return more
+    def _run(
+        self, rows: LimitRows, costs: tuple[int, ...], z: Any, lanes: Lanes, last: Solution | None
+    ) -> Solution:
+        """The solution of a program of these rows, which serves for all numbers that they have as upper limits."""
+        key = tuple(replace(row, upper=0.0) for row in rows.rows), costs, lanes.sizes
+        if key not in self._programs:
+            speeds = self.wishes.crank_speed, self.wishes.slack_free_speed
+            auxiliary = len(rows.begin)
+            self._programs[key] = TurnProgram(self.columns, speeds, rows.rows, costs, auxiliary, lanes.sizes)
+        upper = np.array([row.upper for row in rows.rows])
+        point = self._programs[key].solve(z, rows.low, upper, lanes, last)
+        self.effort.programs += 1
+        self.effort.iterations += point.iterations
+        self.effort.evaluations += point.evaluations
+        return point
+
+    def _x(self, point: Solution) -> Any:
+        return self.columns.low + self.columns.span * point.z[: self.columns.size]
+
+    def _followed(self, rows: Sequence[Row], point: Solution, lanes: Lanes) -> tuple[Lanes, bool, float]:
+        """The lanes of a further program; whether there must be one: a limit is exceeded between the angles, a peak
+        has moved too far, or a mean is rough; and the most by which a limit is exceeded."""
+        x, aux, highest = self._x(point), point.z[self.columns.size :], self.wishes.slack_free_speed
+        peaks, first, more = [], [], not lanes.sizes[0]
+        for k, before in zip(
+            (k for k, row in enumerate(rows) if row.kind in OVER_TURN), lanes.peaks, strict=True
+        ):
+            row, ((_, column, factor),) = rows[k], rows[k].terms
+            offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
+            is_slack = row.kind == "slack"
+            speeds = [share * highest for share in CHECKED] if is_slack else [self.wishes.crank_speed]
+            top = self._peaks(x, column, factor, speeds, -offset - _LOOKED_AT * row.scale)
+            top[:, 0] = (top[:, 0] + offset) / row.scale
+            # the largest one stays: the next solution may be near it
+            peaks.append(top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))])
+            first.append(speeds[0])
+            if len(before):
+                _, (slopes,) = self.columns.values(x, before[:, 0], before[:, 1], [column], 1)
+                holds = point.exceeded[k] > -_MET
+                more |= bool(np.any(holds & (np.abs(slopes * before[:, 2]) > _WAY)))
+        worst = max((float(np.max(top[:, 0])) for top in peaks), default=-math.inf)
+        room = max((2 ** math.ceil(math.log2(len(top))) for top in peaks), default=1)
+        followed = np.zeros((len(peaks), max(room, lanes.sizes[0], 2), 3))
+        for place, top, w in zip(followed, peaks, first, strict=True):
+            place[:, 1] = w
+            place[: len(top)] = top[:, 1:]
+        near = [row for row, exceeded in zip(rows, point.exceeded, strict=True) if exceeded[0] > -_NEAR]
+        nodes, rough = self._nodes(near, x, lanes.nodes)
+        return Lanes(followed, nodes), more or rough or worst > _EXCEEDED, worst
+
+    def _is_tight(self, row: Row, x: Any) -> bool:
+        """Whether a mean is near its limit at a machine."""
+        ((_, k, factor),) = row.terms
+        mean = self._mean(x, k, row.kind)
+        value = factor * (math.sqrt(mean) if row.kind == "rms" else mean)
+        return abs(value - row.upper) < _NEAR * row.scale
+
+    def _nodes(self, rows: Sequence[Row], x: Any, nodes: Any) -> tuple[Any, bool]:
+        """Nodes for the means of some rows, and whether the `nodes` of the program were too few."""
+        means = [(row.terms[0][1], _POWERS[row.kind]) for row in rows if row.kind in _POWERS]
+        if not means:
+            return nodes, False
+
+        def values(q: Any) -> Any:
+            table = self.columns.values(x, q, self.wishes.crank_speed, [k for k, _ in means])[0]
+            return table ** np.array([power for _, power in means])[:, None]
+
+        q, weights = mean_rule(values, 0.0, 2.0 * math.pi, _PARTS)
+        exact, rough = values(q) @ weights, values(nodes[0]) @ nodes[1]
+        if np.all(np.abs(exact - rough) <= _EXCEEDED * np.abs(exact)):
+            return nodes, False
+        room = np.zeros((2, max(_ROOM * math.ceil(len(q) / _ROOM), len(nodes[0]))))
+        room[:, : len(q)] = q, weights
+        return room, True
+
+    def _peaks(self, x: Any, column: int, factor: float, speeds: Sequence[float], least: float) -> Any:
+        """The maxima of a column times `factor` at crank speeds that are about `least` or more, and the largest one.
+
+        Each has its value, the angle, the speed, and 1 / curvature of the column, or 0 at a kink, shape (maxima, 4).
+        """
+        lanes = np.stack([np.tile(grid(FINE), len(speeds)), np.repeat(speeds, FINE)])
+        y = factor * self.columns.values(x, lanes[0], lanes[1], [column]).reshape(len(speeds), FINE)
+        is_peak = ((y >= least) & (y >= np.roll(y, 1, axis=1)) & (y > np.roll(y, -1, axis=1))).ravel()
+        is_peak[np.argmax(y)] = True
+        places = np.flatnonzero(is_peak)
+        places = places[np.argsort(-y.ravel()[places])][:_MOST_PEAKS]
+        (begin, w), top = lanes[:, places], y.ravel()[places]
+        q, step = begin, 2.0 * math.pi / FINE
+        for k in range(_ROUNDS):
+            near = q[:, None] + step * 0.25**k * np.linspace(-1.0, 1.0, 9)
+            values = self.columns.values(x, near.ravel(), np.repeat(w, 9), [column]).reshape(near.shape)
+            q = near[np.arange(len(q)), np.argmax(factor * values, axis=1)]
+        around = np.concatenate([q, q - step, q + step])
+        (value, *beside), (slope, *_), (bend, *_) = self.columns.values(
+            x, around, np.tile(w, 3), [column], 2
+        ).reshape(3, 3, -1)
+        least_drop = np.min(factor * (value - beside), axis=0)
+        # a kink, or a peak that is narrower than the grid, counts as the angle of the grid
+        smooth = (factor * bend < 0.0) & (np.abs(slope) < _EXACT * np.abs(bend))
+        smooth &= 0.5 * np.abs(bend) * step**2 < _NARROW * least_drop
+        value, q = np.where(smooth, factor * value, top), np.where(smooth, q, begin)
+        return np.stack([value, q, w, smooth / np.where(smooth, bend, 1.0)], axis=1)
 
     def _answer(
-        self, objective: CycleQuantity | None, slacks: dict[str, int], program: AngleProgram, point: Solution
+        self,
+        objective: CycleQuantity | None,
+        slacks: dict[str, int],
+        rows: Sequence[Row],
+        point: Solution,
+        worst: float,
     ) -> Answer:
-        n, y = self.space.n, point.z[: self.space.n]
+        n, span = self.columns.size, self.columns.span
         # the inner points of IPOPT end a little off the bounds
-        y = np.where(y < _AT_BOUND, 0.0, np.where(y > 1.0 - _AT_BOUND, 1.0, y))
-        x = self.space.low + self.space.span * y
-        misses = {owner: float(point.z[n + k]) for owner, k in slacks.items()}
+        y = point.z[:n]
+        x = self.columns.low + span * np.where(y < _AT_BOUND, 0.0, np.where(y > 1.0 - _AT_BOUND, 1.0, y))
         scale = self.scales[objective.name] if objective is not None else 1.0
-        at_bounds = {}
-        for name, factor, span in zip(self.wishes.names, point.bounds, self.space.span, strict=False):
-            at_bounds[name, "max" if factor > 0.0 else "min"] = -float(factor) * scale / float(span)
+        at_bounds = {
+            (name, "max" if factor > 0.0 else "min"): -float(factor) * scale / width
+            for name, factor, width in zip(self.wishes.names, point.bounds, span, strict=False)
+        }
         if objective is None:
-            return Answer(x, sum(misses.values()), point.converged, point, at_bounds=at_bounds, misses=misses)
-        feasible = point.converged and float(np.max(program.violation(point.z), initial=0.0)) < _MET
+            misses = {owner: float(point.z[n + k]) for owner, k in slacks.items()}
+            return Answer(x, sum(misses.values()), point.converged, at_bounds=at_bounds, misses=misses)
         value = self.value(objective, x) if np.all(np.isfinite(x)) and self.turns(x) else math.nan
         sensitivities: dict[tuple[str, str], float] = {}
-        for factor, k in zip(point.multipliers, program.row_of, strict=True):
-            row = program.rows[k]
-            if row.owner and not _is_helper(row, program.rows):
-                sign = -1.0 if row.side == "max" else 1.0
-                key = row.owner, row.side
-                sensitivities[key] = sensitivities.get(key, 0.0) + sign * float(factor) * row.per_unit * scale
-        return Answer(x, value, bool(feasible), point, sensitivities, at_bounds)
-
-
-def _is_helper(row: Row, rows: Sequence[Row]) -> bool:
-    """Whether a row only holds an auxiliary variable of a range, whose limit is a row of its own."""
-    return (
-        isinstance(row, PointRow)
-        and bool(row.aux)
-        and any(isinstance(r, AuxRow) and r.owner == row.owner for r in rows)
-    )
-
-
-def _reversed(row: Row) -> Row:
-    """The row from the other side."""
-    if isinstance(row, ExtremeRow):
-        terms = tuple((columns, sense, -factor) for columns, sense, factor in row.terms)
-        return dataclasses.replace(row, upper=-row.upper, terms=terms)
-    assert isinstance(row, MeanRow)
-    return dataclasses.replace(row, upper=-row.upper, factor=-row.factor)
+        for row, factors in zip(rows, point.multipliers, strict=True):
+            if row.owner:
+                key, sign = (row.owner, row.side), -1.0 if row.side == "max" else 1.0
+                slope = sign * float(np.sum(factors)) * row.times / row.scale * scale
+                sensitivities[key] = sensitivities.get(key, 0.0) + slope
+        feasible = max(worst, *(np.max(part) for part in point.exceeded)) < _MET
+        return Answer(x, value, point.converged and feasible, sensitivities, at_bounds)
 
 
 def _sobol(size: int, number: int, seed: int) -> Any:
