@@ -183,16 +183,15 @@ def unusual_values(
             given: Any = data
             for name in variable.name.split("."):
                 given = given.get(name) if isinstance(given, Mapping) else None
-            here = usual.get(variable.name, variable.quantity.usual)
-            quantity = dataclasses.replace(variable.quantity, usual=here)
-            variable = dataclasses.replace(variable, quantity=quantity)
-            if given is not None:
-                value = UnusualValue.of(variable, given, to_number(variable, given))
-                if value:
-                    yield value
-            elif variable.name in usual and not quantity.is_usual(start := float(quantity.start or 0.0)):
-                template = f"{variable.template}; not in the file"
-                yield UnusualValue(dataclasses.replace(variable, template=template), start, "", None)
+            if variable.name in usual:
+                quantity = dataclasses.replace(variable.quantity, usual=usual[variable.name])
+                variable = dataclasses.replace(variable, quantity=quantity)
+                start = float(quantity.start or 0.0)
+                if given is None and not quantity.is_usual(start):
+                    template = f"{variable.template}; not in the file"
+                    yield UnusualValue(dataclasses.replace(variable, template=template), start, "", None)
+            if given is not None and (value := UnusualValue.of(variable, given, to_number(variable, given))):
+                yield value
 
 
 def _meant(variable: Variable, given: Any) -> str | None:

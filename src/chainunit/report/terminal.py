@@ -129,8 +129,12 @@ def line_of(text: str, width: int) -> str:
 
 def _with_units(text: str) -> str:
     """The text with a mark in place of each blank between a number and its unit."""
-    names = {match[0]: re.split(r"[ /.:²³]", match[1])[0] for match in _UNIT.finditer(text)}
-    return _UNIT.sub(lambda m: m[0].replace(" ", _KEPT) if names[m[0]] in UNITS else m[0], text)
+
+    def kept(match: re.Match[str]) -> str:
+        name, *_ = re.split(r"[ /.:²³]", match[1])
+        return match[0].replace(" ", _KEPT) if name in UNITS else match[0]
+
+    return _UNIT.sub(kept, text)
 
 
 def _printed(console: Console, show: Callable[[], None]) -> str:

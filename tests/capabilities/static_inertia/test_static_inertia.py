@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chainunit import InputError
 from chainunit.capabilities.static_inertia import CAPABILITY, StaticInertiaAnalysis, StaticInertiaFindings
 from chainunit.machines.api import ChainUnitMachine
 from chainunit.machines.knife_drive import KnifeDrive
@@ -79,8 +78,3 @@ def test_a_study_has_it_if_it_chooses_the_motor_of_a_machine_with_an_inertia_of_
 ):
     drive, plans = drive_of(parse(organ)), parse(f"{organ}\n{sizing}").plans
     assert StaticInertiaAnalysis.applies(drive, plans) == applies
-
-
-def test_its_former_key_is_refused():
-    with pytest.raises(InputError, match="static_inertia_runs"):
-        parse('static_inertia_runs = "never"\n')

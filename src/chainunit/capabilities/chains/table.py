@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...machines.api import ChainUnitMachine
 from ...machines.chain_organs import LEAST, MOST, USUAL, OrganLaw
+from ...machines.chain_unit import Parameters
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.organ_limits import slack_and_mode
@@ -89,14 +91,14 @@ def damping_of_organ(machine: ChainUnitMachine) -> dict[str, float]:
     """The damping of the pins of the heavier organ, by its names in `OrganLaw`: it damps the small vibration of any
     organ as much as that of the packaged machine. The moment of the weight is m g l and the time of the vibration
     sqrt(l/g), so that the damping of a pin grows as m l^1.5, and `eta` once more with the length."""
-    usual, law = ChainUnitMachine(), OrganLaw()
-    mass, length = (_mass(machine) / _mass(usual), machine.p.l1 / usual.p.l1)
+    usual, law = Parameters(), OrganLaw()
+    mass, length = _mass(machine.p) / _mass(usual), machine.p.l1 / usual.l1
     return {"eta": law.eta * mass * length**2.5, "end_damping": law.end_damping * mass * length**1.5}
 
 
-def _mass(machine: ChainUnitMachine) -> float:
+def _mass(p: Any) -> float:
     """The mass of the heavier organ without material [kg]."""
-    return max(side.wall_mass + side.web_mass for side in (machine.p.left, machine.p.right))
+    return max(side.wall_mass + side.web_mass for side in (p.left, p.right))
 
 
 CHAIN = FileSection(

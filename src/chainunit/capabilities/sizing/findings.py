@@ -176,8 +176,7 @@ class SizingFindings(Findings):
         if (needed := self._gear_needed(study, setting)) is not None:
             order, remedy = needed
             decides = order.decides
-            rated = number(order.rated, "N.m", digits=5, full=False)
-            words = f"{decides.words}{decides.rule} takes one that permits {rated} in running"
+            words = f"{decides.words}{decides.rule} takes one that permits {number(order.rated, 'N.m')} in running"
             listed = replace(listed, open=[f"The gear is too weak: {words}; {remedy}.", *listed.open])
         if best.motor.is_packaged:
             words = "The motor is one of the packaged table, which is typical data: nobody sells it."
