@@ -107,14 +107,12 @@ class OptimizedStudy(NamedTuple):
 def _compute(
     config: Config, folder: Path | None, progress: TaskProgress, *, backend: Backend | None = None
 ) -> OptimizedStudy:
-    """Search for the best machine of a study. A refusal begins with the name of the study file, if there is one."""
-    with config.file.refusals():
-        return OptimizedStudy(config, find_best(wishes_of(config.plans), progress, backend))
+    """Search for the best machine of a study."""
+    return OptimizedStudy(config, find_best(wishes_of(config.plans), progress, backend))
 
 
 def _accept(config: Config, **options: Any) -> None:
-    with config.file.refusals():
-        wishes_of(config.plans)
+    wishes_of(config.plans)
 
 
 def _writers(
