@@ -229,7 +229,7 @@ def test_dependencies_are_true(fmus):
     assert seen == declared
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_same_model_same_file(fmus, tmp_path):
     for name, model in MODELS.items():
         again = export(model, tmp_path / "again.fmu")

@@ -101,7 +101,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     assert warnings["no reserve"].text.endswith(f"{said}; take a larger motor or a heavier flywheel.")
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_above_its_breakdown_speed_has_the_speed_of_ratio_and_slip(tmp_path):
     """Overloads start from there."""
     text = JAM + '[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n[gear]\nratio = 55\n[run]\nturns = 1\n'

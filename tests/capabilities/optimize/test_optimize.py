@@ -268,7 +268,7 @@ def _moved(limit, each, step):
     return _with(limit, **{"low" if each.side == "min" else "high": each.value + step})
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_one_parameter_without_limits():
     """A counterweight alone: the RMS torque is a smooth function of one number."""
     text = '[optimize]\nobjectives = ["rms(crank_torque)"]\n[optimize.free.crank]\ns = { min = -1, max = 1 }'
@@ -375,7 +375,7 @@ def test_small_powers_are_in_watts(best):
         assert units_of(found, chosen.file.tables, chosen.units)["power"] == ("kW",)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_two_wishes_that_conflict():
     """A swing and a speed of slack, each of which can be met alone."""
     pair = {'"16 deg"': '"19 deg"', "4 rad/s": "8 rad/s", "starts = 4": "starts = 2"}
@@ -413,7 +413,7 @@ def press(tmp_path):
     return PRESS.replace('"PRESS"', f'"{pressed_both_ways(tmp_path).as_posix()}"')
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_linkage_file(press):
     """The best of three parameters is that of a map over all of them; a fourth one, on which nothing depends, keeps
     its value."""

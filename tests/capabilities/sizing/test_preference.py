@@ -357,6 +357,7 @@ def ranked(*candidates, larger=2.0):
     return candidates
 
 
+@pytest.mark.second
 def test_no_fluctuation_is_a_limit_unless_it_is_given(tmp_path):
     """A limit of 5 % that nobody asked for doubled the motor."""
     assert parse("[sizing]\n").plans["sizing"].demands.fluctuation == math.inf
@@ -643,7 +644,7 @@ def check_order(config, first, name, tmp_path, monkeypatch, *motors, more=""):
     assert used > 0.95
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch):
     """It got 0.55 kW with 2 poles, a ratio of 199, a flywheel of 200 rotors, and a start of 7.3 s; with the gear that
     was ordered for 0.75 kW it got that again."""
@@ -907,7 +908,7 @@ def pressed(tmp_path, monkeypatch, more="", *designations):
     return sized_by(parse(PRESS + more, str(folder / "press.toml")), tmp_path)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypatch):
     """The press takes 200 W in the mean and 837 W by the RMS torque: 1.1 kW was chosen as the smallest. Without a
     flywheel the motor of 0.55 kW stalls where the ram meets the workpiece."""

@@ -440,7 +440,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     assert "times running (all feed on the right), " in said
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [Way.SOFT_STARTER, Way.INVERTER], ids=["soft", "inverter"])
 def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way, tmp_path):
     """With starter and setting as the sentence gives them the coupling stays shut in the start and in running, and
@@ -478,7 +478,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     assert not [warning for warning in trial.warnings if warning.kind == "coupling opens in start"]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "way", [Way.SOFT_STARTER, Way.INVERTER, Way.SLIP_CLUTCH], ids=["soft", "inverter", "clutch"]
 )
@@ -968,7 +968,7 @@ def test_the_largest_torque_is_that_of_voltage_frequency_and_a_warm_winding():
     assert pull_out_torque(drive, run.isel(time=[0]), T) < result[0] * drive.ratio
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_behind_an_open_coupling_the_machine_has_its_chains(tmp_path):
     """It goes on from the rods' angles and speeds at that instant, and its energy from there on is only lost."""
     text = """organ = "chain"

@@ -1342,7 +1342,7 @@ def test_a_chain_has_no_limits_of_two_bars(tmp_path):
 LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tipper", "scissor_lift", "cylinder_lift", "slider_crank_press"])
 def test_a_linkage_with_any_driver_balances(own, tmp_path, name):
     """A crank, a ram, a cylinder: their inputs move together, so that the energy balances."""
