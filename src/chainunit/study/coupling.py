@@ -9,7 +9,7 @@ from typing import Any
 from ..reading.text import number
 from .event import Role
 from .event_torques import from_event_on, peaks_in_events
-from .ram_force import TIMES, rams
+from .ram_force import TIMES, RamForce, rams
 from .readings import pull_out_torque
 from .record import StudyRecord
 from .starts import StartFindings, transient_words
@@ -80,6 +80,16 @@ def pull_out(study: StudyRecord) -> float:
     return pull_out_torque(study.drive, study.steady, study.window(Phase.STEADY, study.steady).warm)
 
 
+def at_motor_shaft(study: StudyRecord, torque: float) -> float:
+    """Torque at the motor's shaft [N m] for one at the crank [N m], with the loss of the gear by load."""
+    gear = study.config.drive.gear
+    return torque / study.drive.ratio / (gear.efficiency if study.drive.is_geared else 1.0)
+
+
+LESS_TORQUE = 0.1
+"""Part by which the pull-out torque of a motor may be less than that of its catalogue, by IEC 60034-1."""
+
+
 def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     """Warn where a given coupling, set to `trip` [N m], does not protect the drive as it should."""
     # the limit of a foreign motor is not known
@@ -133,17 +143,19 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
             steady=(on_coupling(study.drive, study.steady), "N.m"),
             **amounts,
         )
-    elif most is not None and trip > most:
+    elif most is not None and trip > (least := (1.0 - LESS_TORQUE) * most if study.plate else most):
+        tolerance = " (by IEC 60034-1 it may be as little as {least})" if study.plate else ""
         warn(
             "coupling above motor",
-            "The torque limiter is set to {trip} and the motor gives {motor} at most: a load that rises "
-            "slowly stalls the motor and does not open it.",
+            f"The torque limiter is set to {{trip}} and the motor gives {{motor}} at most{tolerance}: a load that "
+            "rises slowly may stall the motor and not open it.",
+            least=(least, "N.m"),
             **amounts,
         )
 
 
 _RAM = (
-    "A coupling {set_for}that opens at {trip} does not limit the force on the link {ram} near its dead centre, at "
+    "A coupling {set_for}that opens at {trip} does not limit the force on {ram} near the dead centre, at "
     "{a driver} angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg "
     "and {ten} at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin "
     "pushes with {working} at most; "
@@ -151,14 +163,18 @@ _RAM = (
 _RAM_WITHIN, _RAM_ALWAYS = "within {angle}, the last {way}, ", "at every angle "
 _RAM_END = (
     "it can push with more than {times} times that while the coupling stays shut. A device at the link protects it "
-    "there, such as a hydraulic overload cushion or a shear plate."
+    "there, such as an overload cushion or a shear plate of a press, or the relief valve of a pump."
 )
 
 
 def remark_on_rams(study: StudyRecord, torque: float, set_for: str = "") -> None:
-    """Note for each ram of a linkage what a coupling of that setting, the `torque` [N m], means at it; `set_for` says
-    for which torques it is set."""
+    """Note for each ram of a linkage what a coupling of that setting, the `torque` [N m], means at it, once for rams
+    that differ in their dead centres alone; `set_for` says for which torques it is set."""
+    alike: dict[tuple[str, str], list[RamForce]] = {}
     for ram in rams(study):
+        alike.setdefault((f"{ram.least(torque):.4g}", f"{ram.working:.4g}"), []).append(ram)
+    for group in alike.values():
+        ram, names = group[0], [ram.ram for ram in group]
         overloaded = ram.overloaded(torque)
         quantities: dict[str, Any] = {}
         if overloaded is not None:
@@ -168,8 +184,8 @@ def remark_on_rams(study: StudyRecord, torque: float, set_for: str = "") -> None
             _RAM + (_RAM_WITHIN if quantities else _RAM_ALWAYS) + _RAM_END,
             trip=(torque, "N.m"),
             set_for=set_for,
-            ram=ram.ram,
-            dead=(ram.dead, "rad"),
+            ram=f"the link{'s' if names[1:] else ''} {' and '.join(names)}",
+            dead=" and ".join(number(ram.dead, "rad") for ram in group),
             fastest=(ram.least(torque), "N"),
             thirty=(ram.before(torque, math.radians(30.0)), "N"),
             ten=(ram.before(torque, math.radians(10.0)), "N"),

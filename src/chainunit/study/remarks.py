@@ -13,7 +13,7 @@ from .arrays import peak
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .inverter import inverter_need
-from .judgement import lasts, model_verdict, motor_limits, no_reserve
+from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
 from .measures import STARTED, Answers
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
 from .record import LOAD_CYCLE, Amount, StudyRecord
@@ -64,6 +64,7 @@ def conclude(study: StudyRecord) -> None:
         part.remark(study)
     if STEADY in study.answers:
         _on_start(study)
+        _on_star(study)
         _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
         if study.drive.foreign is None:
@@ -275,11 +276,39 @@ _REFUSED = (
 )
 
 
+_FULL_STAR = 0.8
+"""Share of the synchronous speed from which on a motor in star may be changed over to delta: below it the current
+jumps almost to the one of a start direct on line."""
+
+
+def _on_star(study: StudyRecord) -> None:
+    """Warn of a change from star to delta at too low a speed."""
+    drive, time = study.drive, study.drive.time_in_star
+    if not time or study.plate is None:
+        return
+    run = study.runs["start_up"]
+    times, speeds = run["time"].values, run["motor.w"].values
+    current = np.abs(run[f"motor.{drive.motor.current}"].values)
+    share = float(np.interp(time, times, speeds)) / study.plate.nameplate.synchronous
+    if share < _FULL_STAR and times[-1] > drive.switched_until:
+        study.warn(
+            "star too short",
+            "start-up: after {time} in star the motor has {share} of its synchronous speed, and the current jumps "
+            "from {star} to {delta}. Take more time in star (starter.star_delta.time), less load, or another start.",
+            START,
+            time=(time, "s"),
+            share=(share, "1", "percent"),
+            star=(float(np.interp(time, times, current)), "A"),
+            delta=(peak(current[times >= drive.switched_until]), "A"),
+        )
+
+
 _HAPPENINGS = {
     "rod end pushed": "An end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer to a "
     "chain",
     "current limit": "The motor runs into its current limit of {limit}",
     "stall": "The {driver} stands after the event",
+    "slowed": "The motor is pulled below half its speed, as in a stall",
     "trip": "The torque limiter opens after the event",
     "not recovered": "The speed does not return to its steady band within the time followed",
 }
@@ -321,6 +350,8 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         late = answers.stall_time > 10.0 * config.run.step
         after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"
         yield "stall", after, {"stall_time": (answers.stall_time, "s")}
+    if (dip := slowed(study).get(name)) is not None:
+        yield "slowed", f"by {number(dip, '1', 'percent')}", {"speed_dip": (dip, "1", "percent")}
     if answers.coupling_trip_time is not None:
         units = {"coupling_trip_time": "s", "energy_after_trip": "J", "energy_behind": "J"}
         amounts: dict[str, Amount] = {each: (getattr(answers, each), unit) for each, unit in units.items()}
