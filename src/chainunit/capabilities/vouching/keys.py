@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +16,7 @@ from ...core.inputs import MIB, file_bytes
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-_PUBLIC = ".pub"
+_HINT = "chainunit vouch key makes"
 
 
 def _library() -> tuple[Any, Any]:
@@ -23,7 +25,7 @@ def _library() -> tuple[Any, Any]:
     Raises
     ------
     InputError
-        where the package is not installed.
+        if the package is not installed.
     """
     try:
         from cryptography.hazmat.primitives import serialization
@@ -43,22 +45,22 @@ def make_key(file: Path) -> tuple[Path, str]:
     Raises
     ------
     InputError
-        where one of the two files is there already: a key is never written over.
+        if one of the two files is there already: a key is never written over.
     WriteError
-        where a file cannot be written; then neither is there.
+        if a file cannot be written; then neither is there.
     """
     ed25519, forms = _library()
-    public_file = file.with_name(file.name + _PUBLIC)
-    for each in (file, public_file):
-        if each.exists() or each.is_symlink():
-            raise InputError(f"{each}: is there already; a key is never written over: name another with -o")
+    public_file = file.with_name(f"{file.name}.pub")
+    for path in (file, public_file):
+        if path.exists() or path.is_symlink():
+            raise InputError(f"{path}: is there already; a key is never written over: name another with -o")
     key = ed25519.Ed25519PrivateKey.generate()
-    text = key.private_bytes(forms.Encoding.PEM, forms.PrivateFormat.PKCS8, forms.NoEncryption())
+    secret = key.private_bytes(forms.Encoding.PEM, forms.PrivateFormat.PKCS8, forms.NoEncryption())
     public = key.public_key()
-    words = public.public_bytes(forms.Encoding.PEM, forms.PublicFormat.SubjectPublicKeyInfo)
+    text = public.public_bytes(forms.Encoding.PEM, forms.PublicFormat.SubjectPublicKeyInfo)
     made: list[Path] = []
     try:
-        for path, content, mode in ((file, text, 0o600), (public_file, words, 0o644)):
+        for path, content, mode in ((file, secret, 0o600), (public_file, text, 0o644)):
             with writing(path):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
@@ -78,26 +80,14 @@ def private_key(file: Path) -> Ed25519PrivateKey:
     Raises
     ------
     InputError
-        where the file has none.
+        if the file has none.
     """
     ed25519, forms = _library()
     text = _text(file)
-    try:
-        key = forms.load_pem_private_key(text, password=None)
-    except (ValueError, TypeError) as error:
-        hint = "; it has a public key: name the file without .pub" if b"PUBLIC KEY" in text else ""
-        raise InputError(
-            f"{file}: has no private key in PEM without password{hint}; chainunit vouch key makes one"
-        ) from error
-    except Exception as error:  # of kinds of keys that the library does not know
-        raise InputError(
-            f"{file}: has no private key of a known kind; chainunit vouch key makes one"
-        ) from error
-    if not isinstance(key, ed25519.Ed25519PrivateKey):
-        raise InputError(
-            f"{file}: is a key of another kind; must be Ed25519, as chainunit vouch key makes it"
-        )
-    return key
+    hint = "; it has a public key: name the file without .pub" if b"PUBLIC KEY" in text else ""
+    load = partial(forms.load_pem_private_key, text, None)
+    kind = f"private key in PEM without password{hint}"
+    return _loaded(file, kind, load, ed25519.Ed25519PrivateKey)
 
 
 def readable_by_others(file: Path) -> bool:
@@ -111,30 +101,31 @@ def public_key(file: Path) -> bytes:
     Raises
     ------
     InputError
-        where the file has neither.
+        if the file has neither.
     """
     ed25519, forms = _library()
     text = _text(file)
     if b"PRIVATE KEY" in text:
         return private_key(file).public_key().public_bytes_raw()
-    try:
-        key = forms.load_pem_public_key(text)
-    except Exception as error:  # the library has several, by the kind of fault
-        raise InputError(
-            f"{file}: has no public key in PEM; chainunit vouch key writes one beside the key"
-        ) from error
-    if not isinstance(key, ed25519.Ed25519PublicKey):
-        raise InputError(
-            f"{file}: is a key of another kind; must be Ed25519, as chainunit vouch key makes it"
-        )
-    return bytes(key.public_bytes_raw())
+    load = partial(forms.load_pem_public_key, text)
+    return bytes(_loaded(file, "public key in PEM", load, ed25519.Ed25519PublicKey).public_bytes_raw())
 
 
 def _text(file: Path) -> bytes:
     try:
         return file_bytes(file, MIB)
     except InputError as error:
-        raise InputError(f"{error}; chainunit vouch key makes a file with a key") from error
+        raise InputError(f"{error}; {_HINT} a file with a key") from error
+
+
+def _loaded(file: Path, kind: str, load: Callable[[], Any], key_class: type) -> Any:
+    try:
+        key = load()
+    except Exception as error:  # the library has several, by the kind of fault
+        raise InputError(f"{file}: has no {kind}; {_HINT} one") from error
+    if not isinstance(key, key_class):
+        raise InputError(f"{file}: is a key of another kind; must be Ed25519, as {_HINT} it")
+    return key
 
 
 def fingerprint(public: bytes) -> str:
