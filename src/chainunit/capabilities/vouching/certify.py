@@ -27,8 +27,7 @@ from .runs import TYPES, UnpackedFmu, make_runnable, unpacked
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-DESCRIPTION = "modelDescription.xml"
-LEFT_OUT = "left out: points, as the model is not one of this package by its name; name its file by --of"
+_DESCRIPTION = "modelDescription.xml"
 _TOOL = f"chainunit {__version__}"
 
 
@@ -40,53 +39,24 @@ class Certified(NamedTuple):
 
 
 def members_of(file: Path) -> dict[str, bytes]:
-    """The members of a file without those of an earlier certification.
+    """The members of a file.
 
     Raises
     ------
     InputError
         if the file is no sound archive.
     """
-    return _without_evidence(contents(file_bytes(file, ARCHIVE), str(file)))
+    return contents(file_bytes(file, ARCHIVE), str(file))
 
 
-def _without_evidence(members: Mapping[str, bytes]) -> dict[str, bytes]:
-    kept = {name: data for name, data in members.items() if name != EVIDENCE}
-    return _related(kept) if len(kept) < len(members) else kept
-
-
-def _related(members: dict[str, bytes]) -> dict[str, bytes]:
-    """The members with or without the evidence, as they have it, in the manifest of FMI-LS-REF."""
-    root = related_files(members.get(RELATED))
-    source = EVIDENCE.removeprefix(f"{REFERENCE}/")
-    for node in root.findall(f"Related[@source='{source}']"):
-        root.remove(node)
-    if EVIDENCE in members:
-        text = "Experiments of this FMU and its deviations from their results; signed in the comment of the archive"
-        node = Element("Related", type="application/json", source=source, role="report", description=text)
-        # what follows the related files, by the schema, is annotations
-        root.insert(len(root.findall("Related")), node)
-    others = {name: data for name, data in members.items() if name != RELATED}
-    return others | ({RELATED: xml_bytes(root)} if len(root) else {})
-
-
-def kind_of(members: Mapping[str, bytes], name: str) -> str:
-    """The kind of a file with these members, "fmu" or "ssp"; `name` is its file, for errors.
-
-    Raises
-    ------
-    InputError
-        for another file.
-    """
-    for member, kind in ((DESCRIPTION, "fmu"), ("SystemStructure.ssd", "ssp")):
-        if member in members:
-            return kind
-    raise InputError(f"{name}: is neither an FMU ({DESCRIPTION}) nor an SSP package (SystemStructure.ssd)")
+def is_system(members: Mapping[str, bytes]) -> bool:
+    """Whether these are the members of an SSP package."""
+    return "SystemStructure.ssd" in members and _DESCRIPTION not in members
 
 
 def is_of_this_version(members: Mapping[str, bytes]) -> bool:
     """Whether these are the members of an FMU that this version of the package made."""
-    return _TOOL.encode() in members.get(DESCRIPTION, b"")
+    return _TOOL.encode() in members.get(_DESCRIPTION, b"")
 
 
 def certified(
@@ -106,21 +76,34 @@ def certified(
     RunError
         if the FMU does not run on this machine, or does not give its results.
     """
-    if kind_of(members, name) == "fmu":
+    if not is_system(members):
         evidence, sentences = _evidence(members, name, model)
         data = json.dumps(evidence, indent=1, sort_keys=True, allow_nan=False).encode() + b"\n"
-        return Certified(signed(_related({**members, EVIDENCE: data}), key), sentences)
+        return Certified(signed({**members, EVIDENCE: data, RELATED: _related(members)}, key), sentences)
     sentences, inside = [], {}
     for member in archives_in(members):
-        place = f"{name}: {printable(member)}"
-        content = contents(members[member], place)
-        if is_of_this_version(content):
-            fmu = certified(_without_evidence(content), place, key, None)
-            inside[member] = fmu.data
-            sentences += [f"{printable(member)}: {sentence}" for sentence in fmu.sentences]
-        else:
-            sentences.append(f"{printable(member)}: is not of this version of chainunit, and not judged")
+        place = printable(member)
+        content = contents(members[member], f"{name}: {place}")
+        if not is_of_this_version(content):
+            sentences.append(f"{place}: is not of this version of chainunit, and not judged")
+            continue
+        fmu = certified(content, f"{name}: {place}", key, None)
+        inside[member] = fmu.data
+        sentences += [f"{place}: {sentence}" for sentence in fmu.sentences]
     return Certified(signed({**members, **inside}, key), sentences)
+
+
+def _related(members: Mapping[str, bytes]) -> bytes:
+    """The manifest of FMI-LS-REF with the evidence in it."""
+    root, source = related_files(members.get(RELATED)), EVIDENCE.removeprefix(f"{REFERENCE}/")
+    if root.find(f"Related[@source='{source}']") is None:
+        text = (
+            "Deviations of this FMU from the results of its experiments; signed in the comment of the archive"
+        )
+        node = Element("Related", type="application/json", source=source, role="report", description=text)
+        # what follows the related files, by the schema, is annotations
+        root.insert(len(root.findall("Related")), node)
+    return xml_bytes(root)
 
 
 def _evidence(
@@ -128,33 +111,24 @@ def _evidence(
 ) -> tuple[dict[str, Any], list[str]]:
     """The content of evidence.json of an FMU, and the same in sentences."""
     with unpacked(members, name) as fmu:
-        if (tool := str(fmu.description.generationTool or "")) != _TOOL:
-            remedy = (
-                "export it anew first" if tool.startswith("chainunit ") else "must be an FMU of chainunit"
-            )
-            maker = printable(tool) or "an unknown tool"
-            raise InputError(f"{name}: was made by {maker}, this is {_TOOL}; {remedy}")
+        if (tool := str(fmu.description.generationTool or "an unknown tool")) != _TOOL:
+            raise InputError(f"{name}: was made by {printable(tool)}; must be by {_TOOL}: export it anew")
         interface = interface_in(fmu, model)
-        if interface is None and (model or packaged_model(fmu.name)):
-            remedy = "name another file by --of" if model else "export it anew"
-            model_name = model.name if model else fmu.name
-            raise InputError(f"{name}: is no FMU of {model_name}, or its start values make none; {remedy}")
         # an importer reads the results of the equations in the file: the FMU must give these
         experiments = ex.Experiments(ex.tables_in(fmu), ex.chosen_points(interface) if interface else ())
         make_runnable(fmu)
         deviations = ex.measured(fmu, experiments)
-    tolerance = ex.tolerance(interface)
-    sentences = [f"{topic}: {gap.sentence()}, allowed are {tolerance:g}" for topic, gap in deviations.items()]
-    for sentence, gap in zip(sentences, deviations.values(), strict=True):
-        if not gap.value <= tolerance:
-            raise RunError(f"{name}: is not certified: {sentence}")
+    limit, sentences = ex.tolerance(interface), []
+    for topic, gap in deviations.items():
+        sentences.append(f"{topic}: {gap.sentence(limit)}")
+        if not gap.value <= limit:
+            raise RunError(f"{name}: is not certified: {sentences[-1]}")
     if not experiments.reference:
         sentences.append("reference experiment: the FMU has none, as its states are too fast or run away")
-    evidence: dict[str, Any] = {"model": fmu.name, "chainunit": __version__, "tolerance": tolerance}
-    evidence["deviations"] = {topic: gap.value for topic, gap in deviations.items()}
     if interface is None:
-        sentences.append(LEFT_OUT)
-        evidence["left_out"] = LEFT_OUT
+        sentences.append("left out: points, as the model is no packaged one; name its file by --of")
+    numbers = {topic: gap.value for topic, gap in deviations.items()}
+    evidence = {"model": fmu.name, "chainunit": __version__, "tolerance": limit, "deviations": numbers}
     return evidence, sentences
 
 
@@ -172,7 +146,13 @@ def packaged_model(name: str) -> type[Model] | None:
 
 def interface_in(fmu: UnpackedFmu, model: type[Model] | None = None) -> Interface | None:
     """The interface of the model with the start values of the FMU, whose variables get the names of the model; None
-    for a model that this package does not know, and if the variables are not those of the model."""
+    for a model that this package does not know.
+
+    Raises
+    ------
+    InputError
+        if variables or start values are not those of the model.
+    """
     names: Names = "flat" if fmu.description.variableNamingConvention == "flat" else "structured"
     if fmu.name == "ChainUnitFlexible" and model is None:
         from ...machines.flexible import with_rods
@@ -185,9 +165,13 @@ def interface_in(fmu: UnpackedFmu, model: type[Model] | None = None) -> Interfac
         fmu.rename({s.name: name_in_fmu(s.name, names) for s in Interface(model, {}).signals})
     try:
         interface = interface_of(model, fmu.start("parameter") | fmu.start("input"))
+        if all(_is_in(fmu, signal) for signal in interface.signals):
+            return interface
     except (KeyError, InputError):
-        return None
-    return interface if all(_is_in(fmu, signal) for signal in interface.signals) else None
+        pass
+    raise InputError(
+        f"the FMU is none of {model.name}, or its start values make none; name another file by --of"
+    )
 
 
 def _is_in(fmu: UnpackedFmu, signal: Signal) -> bool:

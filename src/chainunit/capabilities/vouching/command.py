@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ...core.errors import InputError, printable
-from ...report.console import show_remark, study_file, terminal_console
+from ...core.errors import printable
+from ...report.console import study_file, terminal_console
 from ...report.result_kind import ResultKind
 
 _KEY = Path("chainunit.key")
@@ -42,17 +42,10 @@ def certify(
 ) -> None:
     """Run the experiments of an FMU or SSP package, write what they gave into it, and sign it."""
     from ...core.files import write_file
-    from .certify import certified, kind_of, members_of
-    from .keys import private_key, readable_by_others
+    from .certify import certified, members_of
+    from .keys import private_key
 
-    secret = private_key(key_file)
-    if readable_by_others(key_file):
-        show_remark(f"{key_file}: other users of this machine can read this key; chmod 600 {key_file}")
-    members = members_of(file)
-    target, ending = output or file, f".{kind_of(members, str(file))}"
-    if target.suffix.lower() != ending:
-        option, remedy = ("-o ", "") if output else ("", "; name one with -o")
-        raise InputError(f"{option}{target}: must be a file name that ends in {ending}{remedy}")
+    secret, members, target = private_key(key_file), members_of(file), output or file
     with terminal_console(stderr=True).status("certifying") as status:
         made = certified(members, target.name, secret, _model(of, status.update))
         write_file(target, made.data)
@@ -97,10 +90,10 @@ def verify(
 
 def _model(file: Path | None, progress: Any) -> Any:
     """The model of a study file or linkage file."""
-    from ...study.package import is_study_file, model_and_start
-
     if file is None:
         return None
+    from ...study.package import is_study_file, model_and_start
+
     loaded = study_file(file) if is_study_file(str(file)) else None
     return model_and_start(str(file), loaded, progress=progress)[0]
 

@@ -80,16 +80,11 @@ def tables_in(fmu: UnpackedFmu) -> Tables | None:
     names = [f"{REFERENCE}/{fmu.name}_{end}.csv" for end in (INPUTS, STEPPED, READ)]
     if not all((fmu.folder / name).is_file() for name in names):
         return None
-    return tuple(_table_in(fmu, name) for name in names)
-
-
-def _table_in(fmu: UnpackedFmu, name: str) -> TimeTable:
-    table = fmu.table(name)
-    if unknown := [column for column in table.names if column not in fmu.variables]:
-        raise InputError(f"{name}: {unknown[0]}: is no variable of the FMU")
-    if table.time.shape != (ROWS,) or not np.allclose(table.time, STEP * np.arange(ROWS)):
-        raise InputError(f"{name}: must have {ROWS} rows, one in {STEP:g} s from 0 s on")
-    return table
+    tables = tuple(fmu.table(name) for name in names)
+    for name, table in zip(names, tables, strict=True):
+        if table.time.shape != (ROWS,) or not np.allclose(table.time, STEP * np.arange(ROWS)):
+            raise InputError(f"{name}: must have {ROWS} rows, one in {STEP:g} s from 0 s on")
+    return tables
 
 
 class Deviation(NamedTuple):
@@ -98,11 +93,12 @@ class Deviation(NamedTuple):
     value: float
     name: str
 
-    def sentence(self) -> str:
-        """What the deviation is."""
-        return (
+    def sentence(self, limit: float) -> str:
+        """The deviation and its limit."""
+        most = (
             f"largest deviation {self.value:.2g} of the size of {self.name}" if self.value else "no deviation"
         )
+        return f"{most}, allowed are {limit:g}"
 
 
 def deviation(table: TimeTable, wanted: TimeTable, fmu: UnpackedFmu) -> Deviation:
@@ -155,9 +151,8 @@ def _at_point(fmu: UnpackedFmu, point: StatePoint) -> Deviation:
     """The deviation at a point; each output is compared at its own size, at least that of its variable."""
     run = simulated(fmu, point.start, list(point.outputs))
     gaps = dict(zip(run.names, np.abs(run.values[0] - list(point.outputs.values())), strict=True))
-    return _largest(
-        gaps, {name: max(abs(x), fmu.variables[name].nominal) for name, x in point.outputs.items()}
-    )
+    sizes = {name: max(abs(x), fmu.variables[name].nominal) for name, x in point.outputs.items()}
+    return _largest(gaps, sizes)
 
 
 # -- points

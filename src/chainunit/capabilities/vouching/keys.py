@@ -16,8 +16,6 @@ from ...core.inputs import MIB, file_bytes
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-_HINT = "chainunit vouch key makes"
-
 
 def _library() -> tuple[Any, Any]:
     """The modules of Ed25519 and of the forms of keys.
@@ -83,48 +81,35 @@ def private_key(file: Path) -> Ed25519PrivateKey:
         if the file has none.
     """
     ed25519, forms = _library()
-    text = _text(file)
-    hint = "; it has a public key: name the file without .pub" if b"PUBLIC KEY" in text else ""
-    load = partial(forms.load_pem_private_key, text, None)
-    kind = f"private key in PEM without password{hint}"
-    return _loaded(file, kind, load, ed25519.Ed25519PrivateKey)
-
-
-def readable_by_others(file: Path) -> bool:
-    """Whether other users of this machine can read a file; never on systems without such modes."""
-    return os.name == "posix" and bool(file.stat().st_mode & 0o077)
+    load = partial(forms.load_pem_private_key, password=None)
+    return _loaded(file, load, "private key in PEM without password", ed25519.Ed25519PrivateKey)
 
 
 def public_key(file: Path) -> bytes:
-    """The public key of a file, 32 B; of a private key its public one.
+    """The public key of a file, 32 B.
 
     Raises
     ------
     InputError
-        if the file has neither.
+        if the file has none.
     """
     ed25519, forms = _library()
-    text = _text(file)
-    if b"PRIVATE KEY" in text:
-        return private_key(file).public_key().public_bytes_raw()
-    load = partial(forms.load_pem_public_key, text)
-    return bytes(_loaded(file, "public key in PEM", load, ed25519.Ed25519PublicKey).public_bytes_raw())
+    key = _loaded(file, forms.load_pem_public_key, "public key in PEM", ed25519.Ed25519PublicKey)
+    return bytes(key.public_bytes_raw())
 
 
-def _text(file: Path) -> bytes:
+def _loaded(file: Path, load: Callable[[bytes], Any], kind: str, key_class: type) -> Any:
     try:
-        return file_bytes(file, MIB)
+        key = load(file_bytes(file, MIB))
     except InputError as error:
-        raise InputError(f"{error}; {_HINT} a file with a key") from error
-
-
-def _loaded(file: Path, kind: str, load: Callable[[], Any], key_class: type) -> Any:
-    try:
-        key = load()
+        raise InputError(f"{error}; chainunit vouch key makes a file with a key") from error
     except Exception as error:  # the library has several, by the kind of fault
-        raise InputError(f"{file}: has no {kind}; {_HINT} one") from error
+        hint = "makes it, and the public one beside it with .pub"
+        raise InputError(f"{file}: has no {kind}; chainunit vouch key {hint}") from error
     if not isinstance(key, key_class):
-        raise InputError(f"{file}: is a key of another kind; must be Ed25519, as {_HINT} it")
+        raise InputError(
+            f"{file}: is a key of another kind; must be Ed25519, as chainunit vouch key makes it"
+        )
     return key
 
 

@@ -24,7 +24,7 @@ TYPES: Mapping[str, Type] = {
     "Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Integer", "Boolean": "Boolean",
 }  # fmt: skip
 """By the name of a type in FMI 2.0 or 3.0, the type of this package."""
-_SWITCH = {"true": 1.0, "false": 0.0}
+_SWITCH = {"true": "1", "false": "0"}
 
 
 @dataclass
@@ -43,11 +43,6 @@ class UnpackedFmu:
         """The name of the model."""
         return str(self.description.modelName)
 
-    @property
-    def fmi(self) -> int:
-        """The version of FMI, 2 or 3."""
-        return 2 if self.description.fmiVersion.startswith("2") else 3
-
     def rename(self, names: Mapping[str, str]) -> None:
         """Give the variables the names of the model; `names` has by them those in the FMU."""
         self.renamed = {name: model for model, name in names.items()}
@@ -64,7 +59,7 @@ class UnpackedFmu:
         }
 
     def table(self, member: str) -> TimeTable:
-        """A member that is a table in CSV with the time in its first column; its names are those of the model.
+        """A member that is a table in CSV of variables over the time, with the names of the model.
 
         Raises
         ------
@@ -73,14 +68,14 @@ class UnpackedFmu:
         """
         try:
             head, *rows = csv.reader(io.StringIO((self.folder / member).read_text("utf-8")))
-            values = np.array(
-                [[_SWITCH[x] if x in _SWITCH else float(x) for x in row] for row in rows], float
-            )
+            values = np.array([[float(_SWITCH.get(x, x)) for x in row] for row in rows], float)
             if values.ndim != 2 or values.shape[1] != len(head) or head[0] != "time":
                 raise ValueError("the rows do not fit the head")
         except (ValueError, csv.Error) as error:
             raise InputError(f"{member}: is no table in CSV ({printable(str(error))})") from error
         names = tuple(self.renamed.get(name, name) for name in head[1:])
+        if unknown := [name for name in names if name not in self.variables]:
+            raise InputError(f"{member}: {printable(unknown[0])}: is no variable of the FMU")
         return TimeTable(names, values[:, 0], values[:, 1:])
 
 
@@ -114,29 +109,21 @@ def unpacked(members: Mapping[str, bytes], name: str) -> Iterator[UnpackedFmu]:
         if description.coSimulation is None or description.fmiVersion[:2] not in ("2.", "3."):
             version = printable(str(description.fmiVersion))
             raise InputError(f"{name}: is FMI {version}; must be FMI 2.0 or 3.0 with Co-Simulation")
-        _refuse_libraries(description, name)
+        libraries = [x.modelIdentifier for x in (description.coSimulation, description.modelExchange) if x]
+        if len(set(libraries)) > 1 or re.fullmatch(r"[A-Za-z_]\w*", libraries[0], re.ASCII) is None:
+            names = printable(" and ".join(libraries))
+            raise InputError(
+                f"{name}: modelIdentifier {names}: must be one name in C, as one library is judged"
+            )
         variables = [v for v in description.modelVariables if v.type in TYPES]
         for variable in variables:
             variable.start, variable.nominal = _number(variable.start), _number(variable.nominal) or 1.0
         yield UnpackedFmu(folder, description, {v.name: v for v in variables})
 
 
-def _refuse_libraries(description: Any, name: str) -> None:
-    """Refuse an identifier that is no part of a path, and two libraries, of which one would not be judged."""
-    identifier = str(description.coSimulation.modelIdentifier)
-    if re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII) is None:
-        raise InputError(f"{name}: modelIdentifier {printable(identifier)!r}: must be a name in C")
-    exchange = description.modelExchange and str(description.modelExchange.modelIdentifier)
-    if exchange and exchange != identifier:
-        raise InputError(
-            f"{name}: modelIdentifier {printable(exchange)!r} of Model Exchange: must be that of Co-Simulation, "
-            f"{identifier!r}, as one library is judged"
-        )
-
-
 def _number(text: Any) -> float | None:
     try:
-        return None if text is None else _SWITCH[text] if text in _SWITCH else float(text)
+        return None if text is None else float(_SWITCH.get(text, text))
     except ValueError:
         return None
 
@@ -161,20 +148,21 @@ def make_runnable(fmu: UnpackedFmu) -> str:
         if not script.with_name(name).is_file():
             raise NoLibraryError(f"resources/{printable(name, 100)} is missing")
     identifier = str(fmu.description.coSimulation.modelIdentifier)
-    system = fmpy.platform if fmu.fmi == 2 else fmpy.platform_tuple
+    fmi = 2 if fmu.description.fmiVersion.startswith("2") else 3
+    system = fmpy.platform if fmi == 2 else fmpy.platform_tuple
     library = fmu.folder / "binaries" / system / f"{identifier}{fmpy.sharedLibraryExtension}"
     if library.exists():
         return ""
     reason = f"the FMU has no library for this machine, {library.relative_to(fmu.folder)}"
     sources = {path.name: path.read_bytes() for path in (fmu.folder / "sources").glob("*.[ch]")}
-    if not set(units_of(fmu.fmi)) <= set(sources):
+    if not set(units_of(fmi)) <= set(sources):
         raise NoLibraryError(f"{reason}, and no sources of one")
     if (tool := compiler()) is None:
         raise NoLibraryError(
             f"{reason}; a C compiler makes one from the sources in the FMU: install {COMPILERS}"
         )
     try:
-        content = build_here(tool, fmu.fmi, identifier, sources)
+        content = build_here(tool, fmi, identifier, sources)
     except (RunError, LookupError) as error:
         cause = printable(str(error), 300)
         raise NoLibraryError(f"{reason}; its sources cannot be compiled here: {cause}") from error
@@ -213,7 +201,9 @@ def simulated(
     signals, end, step = None, 0.0, 1.0
     if inputs is not None:
         end, step = float(inputs.time[-1]), float(inputs.time[1])
-        signals = np.rec.fromarrays([inputs.time, *inputs.values.T], names=["time", *inputs.names])
+        signals = np.rec.fromarrays(
+            [inputs.time, *inputs.values.T], dtype=[(name, float) for name in ("time", *inputs.names)]
+        )
     try:
         with loading():
             result = simulate_fmu(
