@@ -156,8 +156,8 @@ def test_other_members_stay_to_the_bit_and_importers_take_it(made, data, members
 def test_to_certify_is_deterministic_and_replaces_an_earlier_one(made, data, own):
     """From the FMU as it was exported, and from the certified one, with the same bytes."""
     for name in ("plain.fmu", "it.fmu"):
-        again = certify.certified(certify.members_of(made / name), "it.fmu", own, None)
-        assert again.data == data
+        again, _ = certify.certified(certify.members_of(made / name), "it.fmu", own, None)
+        assert again == data
     plain = members_in(made / "plain.fmu")
     again = certify.members_of(made / "it.fmu")
     assert {name for name in again if again[name] != plain.get(name)} == {EVIDENCE, RELATED}
@@ -432,7 +432,7 @@ def test_without_a_library_for_this_machine_it_is_built_from_the_sources(tmp_pat
         pytest.skip("no C compiler")
     native(Accelerator, tmp_path / "plain.fmu", fmi=fmi)
     plain = certify.members_of(tmp_path / "plain.fmu")
-    whole = certify.certified(plain, "it.fmu", own, None).data
+    whole = certify.certified(plain, "it.fmu", own, None)[0]
     bare = without(archive.contents(whole, "it.fmu"), "binaries/")
     before = checked(tmp_path, whole)
     found = checked(tmp_path, signed(bare, own))
@@ -925,8 +925,8 @@ def test_an_ssp_package_with_its_fmus(made, tmp_path):
 @pytest.mark.parametrize("name", list(MODELS))
 def test_every_model_is_certified_and_holds(native_fmus, own, tmp_path, name, fmi):
     file = native_fmus[name, fmi][0]
-    made = certify.certified(certify.members_of(file), file.name, own, None)
-    (tmp_path / file.name).write_bytes(made.data)
+    made, _ = certify.certified(certify.members_of(file), file.name, own, None)
+    (tmp_path / file.name).write_bytes(made)
     public = own.public_key().public_bytes_raw()
     found = {each.topic: each for each in verify(tmp_path / file.name, public)}
     assert all(each.holds for each in found.values()), found
@@ -938,7 +938,7 @@ def test_every_model_is_certified_and_holds(native_fmus, own, tmp_path, name, fm
 def test_an_fmu_with_flat_names_is_certified_as_any_other(own, tmp_path):
     """Its names in tables are those of the FMU; points are there, and a changed start value is found."""
     export(ChamberForces, tmp_path / "plain.fmu", {"left.material_mass": 45.0}, names="flat")
-    whole = certify.certified(certify.members_of(tmp_path / "plain.fmu"), "it.fmu", own, None).data
+    whole = certify.certified(certify.members_of(tmp_path / "plain.fmu"), "it.fmu", own, None)[0]
     members = archive.contents(whole, "it.fmu")
     found = checked(tmp_path, whole)
     if "sources/model.c" in members:
@@ -951,12 +951,12 @@ def test_an_fmu_with_flat_names_is_certified_as_any_other(own, tmp_path):
 
 @pytest.mark.second
 def test_a_python_fmu_is_certified_and_holds(fmus, own, tmp_path):
-    made = certify.certified(certify.members_of(fmus["DcMotor"]), "DcMotor.fmu", own, None)
-    (tmp_path / "DcMotor.fmu").write_bytes(made.data)
+    made, _ = certify.certified(certify.members_of(fmus["DcMotor"]), "DcMotor.fmu", own, None)
+    (tmp_path / "DcMotor.fmu").write_bytes(made)
     found = verify(tmp_path / "DcMotor.fmu", own.public_key().public_bytes_raw())
     assert all(each.holds for each in found)
-    assert "pythonfmu" in made.data.decode("latin-1")
-    bare = without(archive.contents(made.data, "DcMotor.fmu"), "binaries/")
+    assert "pythonfmu" in made.decode("latin-1")
+    bare = without(archive.contents(made, "DcMotor.fmu"), "binaries/")
     found = checked(tmp_path, signed(bare, own))
     assert found["experiments"].sentence.endswith(", and no sources of one")
     assert conclusion(list(found.values())) == (OPEN, "holds, but experiments were not run")
@@ -1001,7 +1001,7 @@ def test_a_linkage_with_any_driver_is_certified_and_holds(own, tmp_path, name):
 
     model = read_linkage(LINKAGES / f"{name}.toml")
     export(model, tmp_path / "it.fmu")
-    data = certify.certified(certify.members_of(tmp_path / "it.fmu"), "it.fmu", own, model).data
+    data = certify.certified(certify.members_of(tmp_path / "it.fmu"), "it.fmu", own, model)[0]
     found = checked(tmp_path, data, model=model)
     assert {"equations", "reference experiment", "points"} <= found.keys()
     assert all(line.holds for line in found.values()), found
@@ -1015,14 +1015,14 @@ def test_a_certificate_made_without_the_model_holds_for_whoever_has_it(own, tmp_
     model = read_linkage(LINKAGES / "slider_crank_press.toml")
     export(model, tmp_path / "it.fmu")
     members = certify.members_of(tmp_path / "it.fmu")
-    without = certify.certified(members, "it.fmu", own, None)
-    assert any(line.startswith("left out: points") for line in without.sentences)
+    whole, sentences = certify.certified(members, "it.fmu", own, None)
+    assert any(line.startswith("left out: points") for line in sentences)
     for given in (None, model):
-        found = checked(tmp_path, without.data, model=given)
+        found = checked(tmp_path, whole, model=given)
         assert found["equations"].holds is (True if given else None)
         assert all(each.holds is not False for each in found.values())
     with pytest.raises(InputError, match=r"the FMU is none of ChamberForces, or .* --of"):
         certify.certified(members, "it.fmu", own, ChamberForces)
-    (tmp_path / "it.fmu").write_bytes(certify.certified(members, "it.fmu", own, model).data)
+    (tmp_path / "it.fmu").write_bytes(certify.certified(members, "it.fmu", own, model)[0])
     found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, ChamberForces)}
     assert found["evidence"].sentence.startswith("the FMU is none of ChamberForces")

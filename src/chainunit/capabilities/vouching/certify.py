@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element
 
 from ... import __version__, machines
@@ -29,13 +29,6 @@ if TYPE_CHECKING:
 
 _DESCRIPTION = "modelDescription.xml"
 _TOOL = f"chainunit {__version__}"
-
-
-class Certified(NamedTuple):
-    """A certified file: its content, and sentences on what it carries."""
-
-    data: bytes
-    sentences: list[str]
 
 
 def members_of(file: Path) -> dict[str, bytes]:
@@ -61,8 +54,8 @@ def is_of_this_version(members: Mapping[str, bytes]) -> bool:
 
 def certified(
     members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None
-) -> Certified:
-    """The certified file with these members, an FMU or an SSP package.
+) -> tuple[bytes, list[str]]:
+    """The certified file with these members, an FMU or an SSP package, and sentences on what it carries.
 
     Parameters
     ----------
@@ -79,7 +72,7 @@ def certified(
     if not is_system(members):
         evidence, sentences = _evidence(members, name, model)
         data = json.dumps(evidence, indent=1, sort_keys=True, allow_nan=False).encode() + b"\n"
-        return Certified(signed({**members, EVIDENCE: data, RELATED: _related(members)}, key), sentences)
+        return signed({**members, EVIDENCE: data, RELATED: _related(members)}, key), sentences
     sentences, inside = [], {}
     for member in archives_in(members):
         place = printable(member)
@@ -87,19 +80,16 @@ def certified(
         if not is_of_this_version(content):
             sentences.append(f"{place}: is not of this version of chainunit, and not judged")
             continue
-        fmu = certified(content, f"{name}: {place}", key, None)
-        inside[member] = fmu.data
-        sentences += [f"{place}: {sentence}" for sentence in fmu.sentences]
-    return Certified(signed({**members, **inside}, key), sentences)
+        inside[member], lines = certified(content, f"{name}: {place}", key, None)
+        sentences += [f"{place}: {line}" for line in lines]
+    return signed({**members, **inside}, key), sentences
 
 
 def _related(members: Mapping[str, bytes]) -> bytes:
     """The manifest of FMI-LS-REF with the evidence in it."""
     root, source = related_files(members.get(RELATED)), EVIDENCE.removeprefix(f"{REFERENCE}/")
     if root.find(f"Related[@source='{source}']") is None:
-        text = (
-            "Deviations of this FMU from the results of its experiments; signed in the comment of the archive"
-        )
+        text = "Deviations of this FMU in its experiments; it is signed in the comment of the archive"
         node = Element("Related", type="application/json", source=source, role="report", description=text)
         # what follows the related files, by the schema, is annotations
         root.insert(len(root.findall("Related")), node)
@@ -133,8 +123,7 @@ def _evidence(
 
 
 def packaged_model(name: str) -> type[Model] | None:
-    """The packaged model of that name; None for any other name. For a machine the modules up to its own are imported:
-    all together take longer than a check of its file."""
+    """The packaged model of that name, or None. For a machine no module after its own is imported: all take long."""
     for module in iter_modules(machines.__path__):
         import_module(f"{machines.__name__}.{module.name}")
         if name in MACHINES:

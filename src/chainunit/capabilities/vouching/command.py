@@ -47,11 +47,9 @@ def certify(
 
     secret, members, target = private_key(key_file), members_of(file), output or file
     with terminal_console(stderr=True).status("certifying") as status:
-        made = certified(members, target.name, secret, _model(of, status.update))
-        write_file(target, made.data)
-    print(f"{target}: certified")
-    for line in made.sentences:
-        print(f"  {line}")
+        data, sentences = certified(members, target.name, secret, _model(of, status.update))
+        write_file(target, data)
+    print("\n  ".join([f"{target}: certified", *sentences]))
 
 
 def verify(

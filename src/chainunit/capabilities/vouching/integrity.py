@@ -13,6 +13,8 @@ from .archive import contents, signature_of
 from .keys import fingerprint, is_signed
 
 EVIDENCE = f"{REFERENCE}/vouching/evidence.json"
+_MOST_NAMED = 12
+"""Most faults of members that are named."""
 HOLDS, FAILS, OPEN = 0, 1, 3
 """Exit statuses: all holds, a line does not, no line fails but a judgement is left open."""
 
@@ -61,7 +63,7 @@ def check_bytes(data: bytes, name: str, key: bytes | None = None, whose: str = "
     except TooLargeError:
         raise
     except InputError as error:
-        faults = str(error).splitlines()
+        faults = str(error).splitlines()[:_MOST_NAMED]
     _check_signature(check, data, key, whose, is_read=not faults)
     for fault in faults:
         check.add(False, "members", fault.removeprefix(f"{name}: "))
@@ -80,10 +82,8 @@ def _check_signature(check: Check, data: bytes, key: bytes | None, whose: str, i
             check.public, holds, sentence = public, key == public, f"holds, by {whose} {signer}"
             if key is None:
                 remedy = "whose it is, a file cannot tell: get the key of the signer, and give --key"
-                sentence, left = (
-                    f"is of the key {signer}; {remedy}",
-                    f"signed by {signer}, whom you have not named",
-                )
+                sentence = f"is of the key {signer}; {remedy}"
+                left = f"signed by {signer}, whom you have not named"
             elif key != public:
                 sentence = f"holds, but by another key: expected {fingerprint(key)}, signed by {signer}"
     elif EVIDENCE in check.members or not is_read:

@@ -18,13 +18,7 @@ if TYPE_CHECKING:
 
 
 def _library() -> tuple[Any, Any]:
-    """The modules of Ed25519 and of the forms of keys.
-
-    Raises
-    ------
-    InputError
-        if the package is not installed.
-    """
+    """The modules of Ed25519 and of the forms of keys."""
     try:
         from cryptography.hazmat.primitives import serialization
         from cryptography.hazmat.primitives.asymmetric import ed25519
