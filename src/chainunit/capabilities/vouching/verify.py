@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import InputError, RunError, printable, shown
-from ...core.inputs import ARCHIVE, file_bytes, json_of
+from ...core.inputs import ARCHIVE, file_bytes, json_of, refuse_large_archive
 from ...core.model import Model
 from ...fmu.description import Interface
 from . import certify
@@ -42,6 +42,7 @@ def verify(
         for a file that is not there, that is too large, or no archive at all.
     """
     data = file_bytes(file, ARCHIVE)
+    refuse_large_archive(data, str(file))
     if not data.startswith(LOCAL):
         raise InputError(f"{file}: is no FMU and no SSP package: it is not a zip archive")
     check = check_bytes(data, str(file), key)
