@@ -1,4 +1,4 @@
-"""The search for the best machine, against other routes: differences, perturbed problems, sweeps, and the FMU."""
+"""The search for the best machine, against other routes: differences, perturbed problems, and sweeps."""
 
 from __future__ import annotations
 
@@ -98,10 +98,7 @@ def test_the_best_machine(best):
     assert best.met and best.starts == 4 and best.feasible == 4 and best.agree >= 3
     assert best.found["peak(crank_torque)"] < 0.6 * best.today["peak(crank_torque)"]
     assert best.neighbours.better == 0 and best.neighbours.feasible > 10
-    # by the FMU, by another route in Python, and by the machine's own refusals
-    assert set(best.fmu) == set(best.quantities)
-    for name, value in best.fmu.items():
-        assert value.deviation < 1e-9, name
+    # by another route in Python, and by the machine's own refusals
     machine = best.machine
     table = evaluate(machine, list(best.quantities.values()), 3.0, best.wishes.feed, engine="numpy")
     for name, value in best.found.items():
@@ -430,7 +427,6 @@ def test_a_linkage_file(press):
     ratio = page.result["parameters"]["ratio"]
     assert page.result["without_effect"] == ["ratio"] and ratio["best"] == ratio["today"]
     assert own.met and own.agree == 2 and own.neighbours.better == 0
-    assert all(value.deviation < 1e-9 for value in own.fmu.values()) and len(own.fmu) == 3
     quantities = list(own.quantities.values())
     fine = [np.linspace(low, high, 21) for low, high in own.wishes.free.values()]
     values = dict(zip(own.wishes.names, fine, strict=True))
@@ -478,7 +474,6 @@ MANY = TABLE.replace("starts = 4", "starts = 32").replace(
 def test_many_starts_find_the_same(objective):
     own = find_best(wishes(MANY, **{"peak(crank_torque)": objective}))
     assert own.agree >= 20 and own.neighbours.better == 0
-    assert all(value.deviation < 1e-6 for value in own.fmu.values())
 
 
 @pytest.mark.slow

@@ -32,12 +32,17 @@ from ...study.relay import (
 from ...study.starts import StartFindings
 from ...study.verdict import STEADY
 from .plan import RelayPlan
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
+_STALL = f"{_CLAUSE}; locked-rotor time of the maker of the motor"
+_RUNNING = Rule(
+    "before", "running", "IEC 60947-4-1, limits of operation",
+    f"RMS current of steady running <= {HOLDS_AT:g} Ir, at which the relay must not trip", "Ir = setting",
+)  # fmt: skip
 _WHAT = "thermal overload relay"
 
 
@@ -205,55 +210,33 @@ def _why_none(study: StudyRecord) -> str:
 
 def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow | NotChecked]:
     """The rows of a relay; `titles` are those of its events."""
-    own, at = of.classes[of.trip_class], "checks.relay"
-    here = f"{at}.classes.{of.trip_class}"
-    name = f"thermal relay of class {of.trip_class}"
+    numbers, own, at = of.numbers, of.classes[of.trip_class], "checks.relay"
+    here, name = f"{at}.classes.{of.trip_class}", f"thermal relay of class {of.trip_class}"
+    places = {
+        "Ir": f"{at}.setting",
+        "IA": f"{at}.stall_current",
+        "I0": f"{at}.before",
+        "largest": f"{here}.longest",
+    }
     yield CheckRow(
-        name,
-        "start",
-        _CLAUSE,
+        name, "start", _CLAUSE,
         f"t = sum (I/({MULTIPLE:g} Ir))^2 dt <= least trip time of the class at {MULTIPLE:g} Ir, cold",
-        of.numbers.start_seconds,
-        own.shortest,
-        f"{at}.start_seconds",
-        {"Ir": f"{at}.setting", "limit": f"{here}.shortest"},
-        "s",
-    )
-    yield CheckRow(
-        name,
-        "running",
-        "IEC 60947-4-1, limits of operation",
-        f"RMS current of steady running <= {HOLDS_AT:g} Ir, at which the relay must not trip",
-        of.numbers.before,
-        of.holds_up_to,
-        f"{at}.before",
-        {"Ir": f"{at}.setting"},
-        "A",
-    )
-    if of.numbers.before >= TRIPS_AT * of.numbers.setting:
+        numbers.start_seconds, own.shortest, f"{at}.start_seconds",
+        {"Ir": places["Ir"], "limit": f"{here}.shortest"}, "s",
+    )  # fmt: skip
+    yield _RUNNING.row(name, at, numbers, of.holds_up_to)
+    if numbers.before >= TRIPS_AT * numbers.setting:
         yield NotChecked(f"{name}, stall and events", "running alone trips it")
         return
-    numbers = {"Ir": f"{at}.setting", "IA": f"{at}.stall_current", "I0": f"{at}.before"}
     yield CheckRow(
-        name,
-        "trip with the rotor locked",
-        f"{_CLAUSE}; locked-rotor time of the maker of the motor",
+        name, "trip with the rotor locked", _STALL,
         f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the class",
-        math.inf if own.stall_trip is None else own.stall_trip,
-        of.numbers.stall_time,
-        f"{here}.stall_trip",
-        numbers | {"largest": f"{here}.longest"},
-        "s",
-    )
+        math.inf if own.stall_trip is None else own.stall_trip, numbers.stall_time, f"{here}.stall_trip", places, "s",
+    )  # fmt: skip
     for event, heat in of.events.items():
+        path = f"{at}.events.{event}"
         yield CheckRow(
-            name,
-            f"heat of the motor until the trip ({titles[event]})",
-            f"{_CLAUSE}; locked-rotor time of the maker of the motor",
-            "t = sum (I/IA)^2 dt until the slowest relay trips",
-            heat.seconds,
-            of.numbers.stall_time,
-            f"{at}.events.{event}.seconds",
-            {"IA": f"{at}.stall_current", "trip": f"{at}.events.{event}.trip_time"},
-            "s",
-        )
+            name, f"heat of the motor until the trip ({titles[event]})", _STALL,
+            "t = sum (I/IA)^2 dt until the slowest relay trips", heat.seconds, numbers.stall_time, f"{path}.seconds",
+            {"IA": places["IA"], "trip": f"{path}.trip_time"}, "s",
+        )  # fmt: skip

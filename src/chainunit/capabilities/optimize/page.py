@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.files import scratch, write_file
-from ...fmu.backends import Backend
 from ...reading.results import as_data
 from ...reading.text import Units, shown_in
 from ...report import blocks as b
@@ -104,11 +103,9 @@ class OptimizedStudy(NamedTuple):
         return source, self.tables(source.parent)
 
 
-def _compute(
-    config: Config, folder: Path | None, progress: TaskProgress, *, backend: Backend | None = None
-) -> OptimizedStudy:
+def _compute(config: Config, folder: Path | None, progress: TaskProgress) -> OptimizedStudy:
     """Search for the best machine of a study."""
-    return OptimizedStudy(config, find_best(wishes_of(config.plans), progress, backend))
+    return OptimizedStudy(config, find_best(wishes_of(config.plans), progress))
 
 
 def _accept(config: Config, **options: Any) -> None:
@@ -287,20 +284,3 @@ def _checks(s: b.Source, best: Best) -> Iterator[b.Block]:
     if best.neighbours is not None:
         severity: b.Severity = "warning" if best.neighbours.better else "good"
         yield b.Judgement(severity, s.words("neighbours.text"))
-    if best.fmu:
-        rows = (
-            b.TableRow(
-                (
-                    Name(name),
-                    s.number(f"quantities.{name}.best", digits=7),
-                    s.number(f"quantities.{name}.fmu", digits=7),
-                )
-            )
-            for name in best.fmu
-        )
-        yield b.Table(
-            tuple(rows),
-            b.heads("quantity", "search", "FMU"),
-            title="The best machine's FMU over the turn",
-            form="long",
-        )
