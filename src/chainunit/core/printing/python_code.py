@@ -53,6 +53,15 @@ def python_text(functions: Iterable[ModelFunction]) -> str:
 
 
 def _function(function: ModelFunction) -> str:
+    statements, results = python_statements(function)
+    lines = [*statements, f"return ({''.join(f'{result}, ' for result in results)})"]
+    head = f"def {function.name}({', '.join(function.takes)}):"
+    return "\n    ".join([head, *lines]) + "\n"
+
+
+def python_statements(function: ModelFunction) -> tuple[list[str], list[str]]:
+    """The statements of a function, each ``aN=expression`` after those that it needs, and the expressions of its
+    results."""
     operations = Operations(function.arguments, function.groups)
     forms = _rare_forms() if function.frequency == "ONCE" else _forms()
     results = [place for group in operations.results for place in group]
@@ -63,16 +72,15 @@ def _function(function: ModelFunction) -> str:
     for place in results:
         uses[place] = uses.get(place, 0) + 1
     texts: list[str] = []
-    lines = [f"def {function.name}({', '.join(function.takes)}):"]
+    statements: list[str] = []
     for place, item in enumerate(operations.items):
         text = _text(item, function.takes, forms, texts)
         if item.kind == NUMBER or (uses.get(place, 0) == 1 and len(text) <= _WIDEST):
             texts.append(f"({text})" if item.operands else text)
         else:
             texts.append(f"a{place}")
-            lines.append(f"    a{place}={text}")
-    lines.append(f"    return ({''.join(f'{texts[place]}, ' for place in results)})")
-    return "\n".join(lines) + "\n"
+            statements.append(f"a{place}={text}")
+    return statements, [texts[place] for place in results]
 
 
 def _text(item: Operation, takes: str, forms: dict[str, str], texts: list[str]) -> str:
