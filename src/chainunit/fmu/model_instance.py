@@ -8,13 +8,13 @@ read, once per state: those that were read at this state or an earlier one, and 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
 from ..core import bounds, messages
 from ..core.integrators import ADDED_UP, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
+from ..core.printing.python_functions import function_text
 
 NAN = float("nan")
 _IDENTITY = __name__.partition(".")[0]
@@ -58,34 +58,15 @@ class _RefusedError(Exception):
     """The values make no model."""
 
 
-class _Evaluation(NamedTuple):
-    """The variables whose values are known after it, the outputs among them by value reference, and the function that
-    gives these outputs."""
-
-    known: frozenset[int]
-    outputs: list[int]
-    function: Callable[..., Sequence[float]]
-
-
 @cache
-def _evaluation(model: Any, known: frozenset[int]) -> _Evaluation:
-    """The evaluation of the outputs among these variables, made from the printed statements that they need."""
+def _evaluation(model: Any, known: frozenset[int]) -> tuple[frozenset[int], list[int], Any]:
+    """These variables, the outputs among them by reference, and the function that gives those outputs alone."""
     first = len(model.SETTABLE) + len(model.NOMINAL)
     outputs = sorted(i for i in known if i >= first)
-    result = "".join(f"{model.OUTPUTS[i - first]}, " for i in outputs)
-    lines, needed = [f"return ({result})"], set(_names(result))
-    for statement in reversed(model.STATEMENTS):
-        name, _, expression = statement.partition("=")
-        if name in needed:
-            needed.update(_names(expression))
-            lines.append(statement)
+    results = [model.OUTPUTS[i - first] for i in outputs]
     functions: dict[str, Any] = {}
-    exec("\n    ".join(["def values(p, u, x, k=()):", *reversed(lines)]), vars(model), functions)
-    return _Evaluation(known, outputs, functions["values"])
-
-
-_names = re.compile(r"\ba\d+\b").findall
-"""The names in an expression that statements before it give."""
+    exec(function_text("def values(p, u, x, k=()):", model.STATEMENTS, results), vars(model), functions)
+    return known, outputs, functions["values"]
 
 
 class ModelInstance:
@@ -99,13 +80,11 @@ class ModelInstance:
         self.first_output = self.first_state + len(model.NOMINAL)
         count = self.first_output + len(model.OUTPUTS)
         self._now = [v.start for v in self.settable] + [NAN] * (count - self.first_state)
-        self._settable, self._states, self._all = map(
-            frozenset, map(range, (self.first_state, self.first_output, count))
-        )
-        """the variables that are known without an evaluation, also the states, and all"""
+        ends = self.first_state, self.first_output, count
+        self._settable, self._states, self._all = (frozenset(range(end)) for end in ends)
         self._known = self._settable
         self._read, self._growths = _evaluation(model, self._states), 0
-        """the evaluation of the outputs that were read, and how often one was added to them"""
+        """for the outputs that were read, and how often more were read"""
         self._p: list[float] | None = None
         self._derived: Sequence[float] | None = None
         """from the fixed parameters, which do not change after the initialization"""
@@ -276,34 +255,33 @@ class ModelInstance:
             return
         bad = bad or self._bad_input()
         if not bad:
-            if not self._read.known.issuperset(references):
+            if not self._read[0].issuperset(references):
                 self._growths += 1
-                known = self._read.known.union(references) if self._growths <= _GROWTHS else self._all
+                known = self._all if self._growths > _GROWTHS else self._read[0].union(references)
                 self._read = _evaluation(self.model, known)
-            # an output that was read at an earlier state alone spoils no other
-            bad = self._fault(self._read) and self._fault(
-                _evaluation(self.model, self._states.union(references))
+            # an output that was read at an earlier state only must not spoil these
+            bad = self._fault(*self._read) and self._fault(
+                *_evaluation(self.model, self._states.union(references))
             )
         if bad:
             self.tell(bad)
             self._now[self.first_output :] = [NAN] * len(self.model.OUTPUTS)
             self._known = self._all
 
-    def _fault(self, evaluation: _Evaluation) -> str:
-        """Evaluate outputs; why they have no values, or an empty text."""
+    def _fault(self, known: frozenset[int], outputs: list[int], function: Any) -> str:
+        """Evaluate these outputs; why they have no values, or an empty text."""
         try:
-            values = evaluation.function(self._p, self._inputs(), self._x, *self._more)
-            # the sum of finite numbers is finite, but for the largest: a fifth of the time
+            values = function(self._p, self._inputs(), self._x, *self._more)
+            # the sum of finite numbers is finite, except of the largest, and takes a fifth of the time
             if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
                 raise ArithmeticError
         except (ArithmeticError, ValueError):
             return messages.NO_OUTPUT.format(model=self.model.NAME, time=self._time)
         except BaseException as reason:
             return f"outputs cannot be evaluated: {reason!r}"
-        now = self._now
-        for i, value in zip(evaluation.outputs, values, strict=True):
-            now[i] = value
-        self._known = evaluation.known
+        for i, value in zip(outputs, values, strict=True):
+            self._now[i] = value
+        self._known = known
         return ""
 
     def _touch(self) -> None:
