@@ -95,7 +95,9 @@ def _judge_fmu(
     check: Check, fmu: UnpackedFmu, stated: Mapping[str, Any], model: type[Model] | None, unrun: str
 ) -> None:
     """Add a line for each part. Code of the FMU runs only if all else holds, and `unrun` gives no reason."""
-    tables, interface = ex.tables_in(fmu), certify.interface_in(fmu, model)
+    # the names of the model come with it, and the tables have them
+    interface = certify.interface_in(fmu, model)
+    tables = ex.tables_in(fmu)
     experiments, limit = ex.Experiments(tables), ex.tolerance(interface)
     if interface is None:
         remedy = "name its file by --of"
