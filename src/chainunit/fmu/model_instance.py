@@ -60,7 +60,7 @@ class _RefusedError(Exception):
 
 @cache
 def _evaluation(model: Any, known: frozenset[int]) -> tuple[frozenset[int], list[int], Any]:
-    """These variables, the outputs among them by reference, and the function that gives those outputs alone."""
+    """These variables, always as the same object, the outputs among them by reference, and their function."""
     first = len(model.SETTABLE) + len(model.NOMINAL)
     outputs = sorted(i for i in known if i >= first)
     results = [model.OUTPUTS[i - first] for i in outputs]
@@ -83,8 +83,8 @@ class ModelInstance:
         ends = self.first_state, self.first_output, count
         self._settable, self._states, self._all = (frozenset(range(end)) for end in ends)
         self._known = self._settable
-        self._read, self._growths = _evaluation(model, self._states), 0
-        """for the outputs that were read, and how often more were read"""
+        self._read, self._growths = self._states, 0
+        """variables that were read, with all but outputs, and how often more outputs were"""
         self._p: list[float] | None = None
         self._derived: Sequence[float] | None = None
         """from the fixed parameters, which do not change after the initialization"""
@@ -255,22 +255,21 @@ class ModelInstance:
             return
         bad = bad or self._bad_input()
         if not bad:
-            if not self._read[0].issuperset(references):
+            if not self._read.issuperset(references):
                 self._growths += 1
-                known = self._all if self._growths > _GROWTHS else self._read[0].union(references)
-                self._read = _evaluation(self.model, known)
+                known = self._all if self._growths > _GROWTHS else self._read.union(references)
+                self._read, _, _ = _evaluation(self.model, known)
             # an output that was read at an earlier state only must not spoil these
-            bad = self._fault(*self._read) and self._fault(
-                *_evaluation(self.model, self._states.union(references))
-            )
+            bad = self._fault(self._read) and self._fault(self._states.union(references))
         if bad:
             self.tell(bad)
             self._now[self.first_output :] = [NAN] * len(self.model.OUTPUTS)
             self._known = self._all
 
-    def _fault(self, known: frozenset[int], outputs: list[int], function: Any) -> str:
-        """Evaluate these outputs; why they have no values, or an empty text."""
+    def _fault(self, known: frozenset[int]) -> str:
+        """Evaluate the outputs among these variables; why they have no values, or an empty text."""
         try:
+            self._known, outputs, function = _evaluation(self.model, known)
             values = function(self._p, self._inputs(), self._x, *self._more)
             # the sum of finite numbers is finite, except of the largest, and takes a fifth of the time
             if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
@@ -281,7 +280,6 @@ class ModelInstance:
             return f"outputs cannot be evaluated: {reason!r}"
         for i, value in zip(outputs, values, strict=True):
             self._now[i] = value
-        self._known = known
         return ""
 
     def _touch(self) -> None:
