@@ -124,10 +124,10 @@ def test_what_a_chain_unit_has_beside_others():
 
 
 def test_a_machine_derived_from_the_chain_unit_is_one(monkeypatch):
-    monkeypatch.setitem(MACHINES, "OtherUnit", None)
-
     class OtherUnit(ChamberForces):
         name = "OtherUnit"
+
+    monkeypatch.setitem(MACHINES, "OtherUnit", OtherUnit)
 
     machine = parse('[system]\nmachine = "OtherUnit"\n[machine]\nratio = 20').machine
     assert isinstance(machine, ChainUnitMachine) and machine.model is OtherUnit and machine.ratio == 20.0

@@ -131,6 +131,7 @@ class PlanetaryPart(PartOfLine):
     """The part, with the table [planetary]."""
 
     name, model = "planetary", PlanetaryGear
+    order = 5
     tables = {  # noqa: RUF012
         "planetary": FileSection(PlanetaryTable, optional=True, title="Planetary gear")
     }

@@ -566,3 +566,7 @@ class ChamberForces(InverseMachine):
                 variable = Variable(f"mean_pull({side}.{rod})", words, Quantity("N", words))
                 columns.append((variable, 0.5 * sum(pulls[side][rod].values())))
         return columns
+
+
+ChainUnit = ChamberForces.direct()
+"""The machine that turns by itself: motor torque in, motion out."""

@@ -36,9 +36,6 @@ from .end_stops import EndStops, StopAction, stop_action
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
-MACHINES: dict[str, type[InverseMachine]] = {}
-"""The machines by name: every subclass of `InverseMachine` with a name is a machine that study files may name."""
-
 
 def names_of(declared: type) -> tuple[str, ...]:
     """The names of the fields of a declaration."""
@@ -161,9 +158,6 @@ class InverseMachine(LinkageModel, MachineModel):
             cls.pins = {f"{pin} {link}": output for output, (pin, link) in cls.joints.items()}
         if "name" in own and "direct_name" not in own:
             cls.direct_name = f"{cls.name}Direct"
-        # a function that makes classes may make several of one name
-        if "name" in own and not cls.made:
-            MACHINES[cls.name] = cls
         if hasattr(cls, "Outputs") and "parts" not in own:
             apart = cls.by_differences
             cls.parts = (

@@ -13,7 +13,7 @@ from ..core.errors import InputError, RunError, check_kind, near_name, refusal_p
 from ..core.model import Model
 from ..core.quantities import Quantity, Variable
 from ..mechanism.models import DirectMachine, InverseMachine
-from ..models import model_named
+from ..models import is_study_file, model_named
 from ..reading.tables import to_number
 from ..system.compiled_simulation import CompiledSystem
 from ..system.linear import LinearModel, place
@@ -26,7 +26,7 @@ from .drive import Drive
 from .equilibrium_point import asks_for_equilibrium, equilibrium_point, place_words
 from .event import Event
 from .operation import OperatingConditions
-from .package import drive_to_export, is_study_file, model_and_start
+from .package import drive_to_export, model_and_start
 from .readings import crank_angle
 from .rig import Rig
 from .start_up import start_up

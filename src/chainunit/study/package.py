@@ -9,7 +9,6 @@ from typing import Any
 
 from ..core.errors import InputError, RunError, printable
 from ..core.files import scratch
-from ..core.inputs import TOML, file_text
 from ..core.model import About, Model
 from ..core.quantities import Layout
 from ..drives.motor import Motor
@@ -20,8 +19,7 @@ from ..machines.chain_organs import USUAL
 from ..machines.flexible import ChainedModel, with_rods
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
-from ..models import model_named
-from ..reading.tables import toml
+from ..models import is_study_file, model_named
 from ..reading.text import number
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
@@ -75,17 +73,6 @@ def start_of(drive: Drive, operation: OperatingConditions, model: type[Model]) -
     return model.parameter_layout.by_name(drive.fmu_parameters)
 
 
-def is_study_file(name: str) -> bool:
-    """Whether the name is that of a study file: a file in TOML without the tables of a linkage."""
-    if not name.lower().endswith(".toml"):
-        return False
-    try:
-        data = toml(file_text(Path(name), TOML))
-    except InputError:
-        return False  # whoever reads the file says what is wrong
-    return not {"links", "ground", "driver", "joints"} & set(data)
-
-
 def model_and_start(
     name: str,
     config: Config | None,
@@ -114,11 +101,13 @@ def model_and_start(
     if config and is_study_file(name):
         drive = drive_to_export(config, backend, progress)
         return whole_system(drive, config.operation, config.title, config.file.labels)
+    if config is None:
+        return model_named(name, direct, rods), {}
     model = model_named(name, direct)
-    start = start_of(drive_to_export(config, backend, progress), config.operation, model) if config else {}
+    start = start_of(drive_to_export(config, backend, progress), config.operation, model)
     if name == "ChainUnitFlexible":
         if rods is None:
-            machine = config and config.machine.simulated
+            machine = config.machine.simulated
             rods = sum(machine.rods) if isinstance(machine, ChainedUnit) else USUAL
         model = with_rods(rods, start)
     return model, start

@@ -16,10 +16,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..core.inputs import TOML, file_text
 from ..drives.motor import Motor
-from ..drives.motors import MOTORS
 from ..machines.linkages.file import linkage_in
 from ..mechanism.models import MachineModel
-from ..models import MACHINES
+from ..models import MACHINES, MOTORS
 from ..reading.tables import (
     Title,
     UnusualValue,

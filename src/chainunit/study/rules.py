@@ -9,9 +9,8 @@ from functools import cache
 from typing import Any
 
 from ..core.errors import InputError, shown
-from ..drives.motors import MOTORS
 from ..machines.paper_ratios import Ratios, lengths
-from ..models import MACHINES
+from ..models import MACHINES, MOTORS
 from ..reading.tables import filled
 from .conditions import (
     NEVER,

@@ -64,6 +64,7 @@ class StaticInertiaCapability(Capability):
     """The capability; it comes with each choice of a motor."""
 
     name = "static_inertia"
+    order = 30
 
     def plan(self, reading: FileReading) -> bool:
         """Whether the study chooses the motor."""

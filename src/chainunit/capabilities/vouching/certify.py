@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module, resources
+from importlib import resources
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ... import __version__, machines
+from ... import __version__
 from ...core.errors import InputError, RunError, printable
 from ...core.files import atomic_file
 from ...core.inputs import ARCHIVE, file_bytes, regular_bytes
@@ -19,7 +18,7 @@ from ...fmu.pack import interface_of
 from ...fmu.recipe import recipes
 from ...fmu.reference import RELATED
 from ...fmu.script import Names, name_in_fmu
-from ...mechanism.models import MACHINES
+from ...models import MODELS
 from . import documents as docs
 from . import experiments as ex
 from .archive import LOCAL, contents, unsafe
@@ -163,7 +162,7 @@ def _certified_fmu(
     with unpacked(members, name) as read:
         _require_own(read, name)
         fmu, interface = with_interface(read, model)
-        if interface is None and (model or packaged_model(fmu.name)):
+        if interface is None and (model or MODELS.get(fmu.name)):
             remedy = "name another file by --of" if model else "export it anew"
             raise InputError(
                 f"{name}: is no FMU of {model.name if model else fmu.name}, or its start values make none; {remedy}"
@@ -258,25 +257,13 @@ def _require_own(fmu: UnpackedFmu, name: str) -> None:
         )
 
 
-def packaged_model(name: str) -> type[Model] | None:
-    """The packaged model of that name; None for any other name. For a machine the modules up to its own are imported:
-    all together take longer than a check of its file."""
-    for module in iter_modules(machines.__path__):
-        import_module(f"{machines.__name__}.{module.name}")
-        if name in MACHINES:
-            return MACHINES[name]
-    from ...models import MODELS
-
-    return MODELS.get(name)
-
-
 def with_interface(
     fmu: UnpackedFmu, model: type[Model] | None = None
 ) -> tuple[UnpackedFmu, Interface | None]:
     """The FMU with the names of its model, and the interface of that with its start values; None for a model
     that this package does not know, and where the variables are not those of the model."""
     names: Names = "flat" if fmu.description.variableNamingConvention == "flat" else "structured"
-    own = model or packaged_model(fmu.name)
+    own = model or MODELS.get(fmu.name)
     if fmu.name == "ChainUnitFlexible" and model is None:
         from ...machines.flexible import with_rods
 

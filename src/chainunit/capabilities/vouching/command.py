@@ -114,7 +114,8 @@ def verify(
 
 def _model_and_start(file: Path, progress: Any) -> Any:
     """The model of a study file or linkage file, with its start values."""
-    from ...study.package import is_study_file, model_and_start
+    from ...models import is_study_file
+    from ...study.package import model_and_start
 
     loaded = study_file(file) if is_study_file(str(file)) else None
     return model_and_start(str(file), loaded, progress=progress)

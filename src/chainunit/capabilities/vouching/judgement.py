@@ -14,6 +14,7 @@ import numpy as np
 from ... import __version__
 from ...core.errors import InputError, RunError, printable, shown
 from ...core.model import Model
+from ...models import MODELS
 from . import certify
 from . import documents as docs
 from . import experiments as ex
@@ -107,7 +108,7 @@ class _Check:
         self._found, self._fmu, self._stated, self._told = found, fmu, stated, told
         self._model, self._interface = model, interface
         # a certificate that was made without the file of the model has the reference experiment alone
-        self._left_out = "left_out" in stated and certify.packaged_model(fmu.name) is None
+        self._left_out = "left_out" in stated and fmu.name not in MODELS
         self._limit = ex.allowed(None if self._left_out else self._interface)
         self._tables = ex.reference_tables(fmu)
         smooth = fmu.file(certify.SMOOTH_IN)
@@ -116,7 +117,7 @@ class _Check:
 
     def judge(self, unrun: str) -> None:
         """Add a line for each part. Code of the FMU runs only if all else holds, and `unrun` gives no reason."""
-        if self._interface is None and (self._model or certify.packaged_model(self._fmu.name)):
+        if self._interface is None and (self._model or self._fmu.name in MODELS):
             words = (
                 "the model of the file that --of names"
                 if self._model
