@@ -73,7 +73,7 @@ BY_NAME = {
     "__init__",  # the names for users
     "core.register",
     "study.registry",  # the modules in the folder of a capability
-    "core.system_description",  # of a system of models, its classes
+    "core.model",  # a model that pickle takes by its place
     "capabilities.vouching.libraries",  # the code in an FMU
 }
 """The modules that import others by name."""

@@ -94,18 +94,19 @@ class Result:
     z: Value = quantity("1", "result")
 
 
-class Formula(Model):
-    """A sum of two products, a quotient, a root and a sine."""
-
-    name = "Formula"
-    description = "operations that are easy to count"
-    Parameters, Inputs = Factor, Pair
-    parts = (
+Formula = Model(
+    name="Formula",
+    text="A sum of two products, a quotient, a root and a sine.",
+    description="operations that are easy to count",
+    Parameters=Factor,
+    Inputs=Pair,
+    parts=(
         Part(
             Result,
             lambda xp, p, u, x, shared: Result(z=u.x * u.y + p.k * u.x + xp.sqrt(u.y) / u.x + xp.sin(u.x)),
         ),
-    )
+    ),
+)
 
 
 def test_operations_are_counted(bench):

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from .drives.motor import Motor
     from .mechanism.models import InverseMachine
 
-MACHINES: Register[type[InverseMachine]] = Register("chainunit.machines")
+MACHINES: Register[InverseMachine] = Register("chainunit.machines")
 """The machines that study files may name."""
-MOTORS: Register[type[Motor]] = Register("chainunit.motors")
+MOTORS: Register[Motor] = Register("chainunit.motors")
 """The types of motor that study files may name."""
-MODELS: Mapping[str, type[Model]] = ChainMap(Register("chainunit.models"), MOTORS, MACHINES)  # type: ignore[list-item]
+MODELS: Mapping[str, Model] = ChainMap(Register("chainunit.models"), MOTORS, MACHINES)  # type: ignore[arg-type]
 """All models."""
 
 
@@ -38,7 +38,7 @@ def is_study_file(name: str) -> bool:
     return not {"links", "ground", "driver", "joints"} & set(data)
 
 
-def model_named(name: str, direct: bool = False, rods: int | None = None) -> type[Model]:
+def model_named(name: str, direct: bool = False, rods: int | None = None) -> Model:
     """The model of that name, or of a linkage file (.toml), of which also the `direct` model. An organ of
     ChainUnitFlexible has so many `rods`.
 

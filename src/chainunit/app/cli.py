@@ -86,7 +86,7 @@ class _Commands(typer.core.TyperGroup):
         return super().list_commands(ctx)
 
     def _take_all(self) -> None:
-        self.commands = _commands_of_capabilities() | self.commands
+        self.commands = {**_commands_of_capabilities(), **self.commands}
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of that name; None if there is none."""

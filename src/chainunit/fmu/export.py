@@ -39,7 +39,7 @@ _KINDS = {
 
 
 def export(
-    model: type[Model],
+    model: Model,
     file: Path,
     start: dict[str, float] | None = None,
     *,

@@ -82,13 +82,13 @@ def _settable(variable: Any, start: float | None) -> tuple[Any, ...]:
     )
 
 
-def _at_terminals(model: type[Model]) -> list[int]:
+def _at_terminals(model: Model) -> list[int]:
     """The outputs that are evaluated without the others, if there are others; by place."""
     first, *others = output_groups(model)
     return first if others else []
 
 
-def _functions(model: type[Model]) -> Iterator[ModelFunction]:
+def _functions(model: Model) -> Iterator[ModelFunction]:
     """The functions of a model, with all outputs in declared order and those at the terminals."""
     interface = shared_interface(model)
     names = [v.name for v in interface.others]

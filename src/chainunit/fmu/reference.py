@@ -147,7 +147,7 @@ def related_files(content: bytes | None = None) -> Element:
 
 @lru_cache(maxsize=32)
 def _tables(
-    model: type[Model], script: type[Script], starts: tuple[tuple[str, float], ...]
+    model: Model, script: type[Script], starts: tuple[tuple[str, float], ...]
 ) -> dict[str, tuple[list[str], list[list[float]]]]:
     """Head and rows of each file, which are the same for each version of FMI.
 
@@ -162,10 +162,10 @@ def _tables(
     layout = model.state_layout
     tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
 
+    outputs_at = _outputs(interface, p)
+
     def outputs(t: float, u: Sequence[float], x: Sequence[float]) -> list[float]:
-        states = layout.instance(list(x)) if layout else None
-        parts = model.evaluate(MATH, p, model.input_layout.instance(list(u)), states)
-        values = [v for part, out in zip(model.parts, parts, strict=True) for v in part.layout.values(out)]
+        values = outputs_at(u, x)
         if not np.isfinite(values).all():
             raise ArithmeticError(f"an output is no finite number at t = {t:g} s")
         return [t, *x, *values]
@@ -191,6 +191,19 @@ def _tables(
             u[place] = model.input_layout.variables[place].quantity.within_bounds(moved)
     heads = {kind: ["time", *(s.name for s in interface.signals_of(kind))] for kind in ("input", "output")}
     return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
+
+
+def _outputs(interface: Interface, p: Any) -> Callable[[Sequence[float], Sequence[float]], list[float]]:
+    """A function of inputs and states that gives all outputs with the parameters `p`, by the traced equations."""
+    import casadi
+
+    trace = interface.trace
+    equations = casadi.Function(
+        "outputs", trace.symbols, [casadi.densify(casadi.vertcat(*map(casadi.SX, trace.outputs)))]
+    )
+    parameters, derived = interface.model.parameter_layout.values(p), getattr(p, "derived", [])
+    # a zero without a sign
+    return lambda u, x: [float(v) + 0.0 for v in equations(parameters, u, x, derived).full().ravel()]
 
 
 def _march(interface: Interface, p: Any) -> Any:

@@ -22,7 +22,7 @@ MOST_STEPS = 1e6
 
 
 def loads_beyond(
-    model: type[MachineModel],
+    model: MachineModel,
     feed: Any,
     events: Mapping[str, Event],
     plans: Mapping[str, Any],

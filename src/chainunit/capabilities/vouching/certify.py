@@ -129,7 +129,7 @@ def kind_of(members: Mapping[str, bytes]) -> str:
 
 
 def certified(
-    members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None, told: Told
+    members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: Model | None, told: Told
 ) -> Certified:
     """The certified file with these members, an FMU or an SSP package.
 
@@ -157,7 +157,7 @@ def certified(
 
 
 def _certified_fmu(
-    members: dict[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None, told: Told
+    members: dict[str, bytes], name: str, key: Ed25519PrivateKey, model: Model | None, told: Told
 ) -> Certified:
     with unpacked(members, name) as read:
         _require_own(read, name)
@@ -257,9 +257,7 @@ def _require_own(fmu: UnpackedFmu, name: str) -> None:
         )
 
 
-def with_interface(
-    fmu: UnpackedFmu, model: type[Model] | None = None
-) -> tuple[UnpackedFmu, Interface | None]:
+def with_interface(fmu: UnpackedFmu, model: Model | None = None) -> tuple[UnpackedFmu, Interface | None]:
     """The FMU with the names of its model, and the interface of that with its start values; None for a model
     that this package does not know, and where the variables are not those of the model."""
     names: Names = "flat" if fmu.description.variableNamingConvention == "flat" else "structured"

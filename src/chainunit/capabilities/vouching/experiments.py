@@ -156,7 +156,7 @@ def smooth_inputs(interface: Interface) -> TimeTable:
     return TimeTable(tuple(names), time, columns.reshape(len(time), len(names)))
 
 
-def _drivers(model: type[Model]) -> list[dict[str, str]]:
+def _drivers(model: Model) -> list[dict[str, str]]:
     """The names of way, speed and acceleration of each shaft or ram at a terminal of the model."""
     members = [terminal.members for terminal in model.terminals]
     return [{n: own[n] for n in ("phi", "w", "a")} for own in members if {"phi", "w", "a"} <= set(own)]
@@ -345,7 +345,7 @@ def _within(interface: Interface, name: str, x: float) -> float:
 
 
 def outputs_at(
-    model: type[Model], parameters: Mapping[str, float], inputs: Mapping[str, float]
+    model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float]
 ) -> dict[str, float] | None:
     """The states and outputs at the start by the equations in Python; None where there is no machine."""
     try:
@@ -379,7 +379,7 @@ def rerun_points(fmu: UnpackedFmu, points: Sequence[StatePoint]) -> Deviation:
     return worst
 
 
-def recomputed(model: type[Model], points: Sequence[StatePoint]) -> list[StatePoint]:
+def recomputed(model: Model, points: Sequence[StatePoint]) -> list[StatePoint]:
     """The points with the outputs by the equations in Python on this machine, of which one without a machine has
     none."""
     layouts = (model.parameter_layout, model.input_layout)

@@ -30,7 +30,7 @@ _GROWTH = 4.0
 
 
 def judge(
-    found: Integrity, manifest: Manifest, name: str, model: type[Model] | None, unrun: str, told: certify.Told
+    found: Integrity, manifest: Manifest, name: str, model: Model | None, unrun: str, told: certify.Told
 ) -> None:
     """Add the lines after those on the bytes; `unrun` tells why no code of the file runs, empty if it may."""
     kind, members = manifest.kind, found.members
@@ -101,7 +101,7 @@ class _Check:
         found: Integrity,
         fmu: UnpackedFmu,
         stated: Mapping[str, Any],
-        model: type[Model] | None,
+        model: Model | None,
         told: certify.Told,
     ) -> None:
         fmu, interface = certify.with_interface(fmu, model)

@@ -25,7 +25,7 @@ HOLDS, FAILS, OPEN = 0, 1, 3
 def verify(
     file: Path,
     key: bytes | None,
-    model: type[Model] | None = None,
+    model: Model | None = None,
     *,
     run: bool = True,
     told: Told = print,
