@@ -153,7 +153,7 @@ def _parts(of: type) -> Table:
     return Table(tuple(rows), heads("name", "unit", "meaning"), numeric=False)
 
 
-def _variables(model: type[Model]) -> Iterator[Block]:
+def _variables(model: Model) -> Iterator[Block]:
     """The table of the variables of an FMU of that model."""
     interface: Any = Interface(model, {})
     rows = []
