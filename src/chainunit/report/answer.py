@@ -17,7 +17,8 @@ _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """The drive where it was chosen, the verdicts, the cards and the warnings."""
+    """The drive where it was chosen, first in a sentence; the verdicts, the cards and the warnings."""
+    yield from sentence(s)
     for part in capabilities():
         yield from part.head(s, study)
     for of in ("model", "motor"):
@@ -50,6 +51,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield from warnings
     if answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
+
+
+def sentence(s: b.Source) -> Iterator[b.Block]:
+    """The sentence on the drive where it was chosen."""
+    if "sentence" in s.result:
+        yield b.Text(s.words("sentence"), central=True)
 
 
 def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:

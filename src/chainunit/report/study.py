@@ -58,7 +58,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
 def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
     s = b.Source(as_dict(study) if result is None else result, study.driver_noun)
-    blocks: list[b.Block] = []
+    blocks: list[b.Block] = list(answer.sentence(s))
     with shown_in(study.config.units):
         for block in answer.blocks(s, study):
             if isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):

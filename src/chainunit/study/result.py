@@ -90,6 +90,7 @@ class StudyData:
     """The results of the base of a study, beside its given values and the findings of its analyses."""
 
     heading: Heading = part(inline=True)
+    sentence: str | None = part("the sized drive in a sentence", optional=True)
     status: str = part("whether the study is complete")
     failure: str | None = part("the error that ended the study early")
     verdict: Verdicts = part("the verdicts")
@@ -117,6 +118,7 @@ def _data(study: StudyRecord) -> StudyData:
     drive, failure = study.drive, study.failure
     return StudyData(
         heading=Heading.of(study.config.title, study.config.file),
+        sentence=study.proposal and study.proposal.sentence(study),
         status=f"failed: {failure}" if failure else "complete",
         failure=str(failure) if failure else None,
         verdict=Verdicts(study.verdict, motor_verdict(study)),

@@ -26,9 +26,9 @@ from chainunit.capabilities.sizing.alternatives import (
 from chainunit.capabilities.sizing.coupling import effects, recommended_setting
 from chainunit.capabilities.sizing.coupling_words import _bound, coupling_sentence, way_words
 from chainunit.capabilities.sizing.gear_order import gear_order
-from chainunit.capabilities.sizing.page import _best, _relay, _starter
+from chainunit.capabilities.sizing.page import _relay, _starter
 from chainunit.capabilities.sizing.protection import CouplingEffect, Obstacle, Setting, Way
-from chainunit.capabilities.sizing.result import DriveProtection
+from chainunit.capabilities.sizing.result import DriveProtection, MotorProtection, SizedDrive
 from chainunit.capabilities.sizing.result import _relay as _relay_of
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.errors import InputError
@@ -40,7 +40,7 @@ from chainunit.drives.induction_steady import steady as on_curve
 from chainunit.drives.motor import T_RATED
 from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
-from chainunit.reading.results import as_data
+from chainunit.reading.results import InUnit, as_data
 from chainunit.reading.text import entry, number
 from chainunit.report import blocks, terminal
 from chainunit.study import config, run
@@ -797,48 +797,42 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     assert bool(told) == (largest.value > 900.0)
 
 
+RELAY = MotorProtection(InUnit(2.45, "A", title="thermal relay, setting"), None, None, "relay")
+
+
+def limited(torque):
+    """The protection by a torque limiter that opens at `torque`, or by none."""
+    names = ("normal_torque", "running_torque", "start_torque", "breakdown_torque")
+    others = dict.fromkeys(names, 1.0) | dict.fromkeys(("effects", "overloads", "disturbances"), {})
+    return DriveProtection(
+        torque, torque, RELAY, "", obstacle=None, why_none="too hard", alternatives=[], **others
+    )
+
+
 @pytest.mark.parametrize(
     ("protection", "ending"),
     [
         (
-            {"trip_torque": (None, "N.m")},
-            "; flywheel 0.300 kg m² (steel disc 22.1 kg, 0.330 m in diameter); no torque limiter; relay at 2.45 A.",
+            limited(None),
+            "; flywheel on the motor shaft 0.300 kg m² (steel disc of 22.1 kg, 0.330 m in diameter); "
+            "no torque limiter (too hard); relay at 2.45 A.",
         ),
-        ({"trip_torque": (400.0, "N.m")}, "; trip torque 400 N m; relay at 2.45 A."),
-        ({}, "; thermal relay, setting 2.45 A."),
+        (limited(400.0), "; torque limiter, trip torque at the crank 400 N m; relay at 2.45 A."),
+        (RELAY, "; thermal relay, setting 2.45 A."),
+        (None, "0.330 m in diameter)."),
     ],
 )
 def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
     """Where the file gives a coupling, there is no empty trip torque, and the relay stands once."""
-    relay = {"relay_current": entry(2.45, "A") | {"title": "thermal relay, setting"}}
-    source = blocks.Source(
-        {
-            "verdict": {"model": None},
-            "sizing": {
-                "candidates": [
-                    {
-                        "motor": "M",
-                        "ratio": entry(50.0, "1"),
-                        "gear": "worm gear",
-                        "series": "",
-                        "verdict": "chosen",
-                        "reason": "it fits",
-                    }
-                ],
-                "flywheel": {
-                    "J": entry(0.3, "kg.m2") | {"title": "flywheel"},
-                    "mass": entry(22.1, "kg"),
-                    "diameter": entry(0.33, "m"),
-                },
-                "protection": {
-                    **{name: entry(*size) | {"title": "trip torque"} for name, size in protection.items()},
-                    **relay,
-                },
-            },
-        }
+    best = SimpleNamespace(
+        designation="M",
+        ratio=50.0,
+        gear_words="worm gear",
+        disc=True,
+        flywheel_words="0.300 kg m² (steel disc of 22.1 kg, 0.330 m in diameter)",
     )
-    sentence = next(each for each in _best(source, "sizing.candidates.0", "Motor") if each.form == "short")
-    assert terminal.plain_line(sentence.line).endswith(ending)
+    drive = SizedDrive(best, False, "crank", None, protection=protection)
+    assert drive.sentence.startswith("Motor: M, ratio 50 (worm gear); ") and drive.sentence.endswith(ending)
 
 
 def test_a_relay_of_a_star_delta_starter_has_its_place():
@@ -902,7 +896,7 @@ def test_the_order_names_the_starter():
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
     assert study.insufficient and sizing_of(study).setting is None
-    assert as_dict(study)["sizing"]["protection"] == {}
+    assert "protection" not in as_dict(study)["sizing"]
     text = said_of(study)
     assert "Insufficient motor:" in text and "relay at" not in text
 

@@ -29,7 +29,7 @@ from .gear_tables import with_gear
 from .parts import OrderedPart, PartsList, parts_list
 from .preference import order_words, poles_rank
 from .protection import Alternative, Obstacle, Setting
-from .result import drive_protection, ordered_belt, ordered_gear, ordered_inverter
+from .result import SizedDrive, drive_protection, ordered_belt, ordered_gear, ordered_inverter
 from .table import Sizing, SizingPlan
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
@@ -144,7 +144,7 @@ class SizingFindings(Findings):
             best.motor,
             as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
-            self.answer,
+            lambda study: self.sized(study).sentence,
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,
@@ -184,22 +184,25 @@ class SizingFindings(Findings):
         return listed
 
     def data(self, study: StudyRecord) -> dict[str, Any]:
-        """Its declared parts, with the gear to order and the protection."""
-        setting, rated = self.coupling(study), self.best.motor.nameplate.rated_current
-        ordered: dict[str, Any] = {
-            "gear": ordered_gear(study, setting, self.plan, self.best.trial.inertia_factor),
-            "protection": drive_protection(study, setting, self.alternatives, rated),
-        }
-        others = {
-            "belt": ordered_belt(study, self.plan, self.best.trial),
-            "inverter": ordered_inverter(study),
-            "parts": self.parts(study, setting),
-        }
-        ordered |= {name: each for name, each in others.items() if each is not None}
-        return super().data(study) | {
-            name: {} if each is None else as_data(each, titled=True, driver=study.driver_noun)
-            for name, each in ordered.items()
-        }
+        """Its declared parts, with the parts to order and the protection."""
+        return super().data(study) | as_data(self.sized(study), driver=study.driver_noun)
+
+    def sized(self, study: StudyRecord) -> SizedDrive:
+        """The drive with its protection by the runs of the study."""
+        setting, trial = self.coupling(study), self.best.trial
+        return SizedDrive(
+            self.best,
+            bool(study.insufficient),
+            study.driver_noun,
+            study.verdict.caveat if study.verdict else None,
+            gear=ordered_gear(study, setting, self.plan, trial.inertia_factor),
+            protection=drive_protection(
+                study, setting, self.alternatives, self.best.motor.nameplate.rated_current
+            ),
+            belt=ordered_belt(study, self.plan, trial),
+            inverter=ordered_inverter(study),
+            parts=self.parts(study, setting),
+        )
 
     def remark(self, study: StudyRecord) -> None:
         """Add the notes on the choice, and one on each ram of a linkage at the recommended coupling."""

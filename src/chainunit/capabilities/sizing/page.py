@@ -281,26 +281,10 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
-    """The sentences on the motor of all runs and on the reason for it."""
-    ratio = s.number(f"{path}.ratio", digits=4, as_given=True)
-    sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio, _aside(_gear(s, path)))
-    why = s.result["sizing"]["protection"].get("why_none")
-    for name, title, size in _sizes(s):
-        if size is None and name == "flywheel":
-            sentence += line("; no flywheel")
-        elif size is None:
-            sentence += line(
-                "; no torque limiter", Aside(s.words("sizing.protection.why_none")) if why else ()
-            )
-        else:
-            is_relay = name == "protection" and _leading(s.result["sizing"][name]) == "relay_current"
-            more = _aside(_disc(s)) if name == "flywheel" else _class(s) if is_relay else ()
-            sentence += line(f"; {title} ", size, more)
-    sentence = line(sentence, *(line("; ", relay) for relay in _relay(s)))
+    """The sentences on what is ordered, and on the reason for the choice."""
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
-    yield b.Text(line(sentence, doubt, "."), form="short", central=True)
     # a motor that does not suffice is not ordered
     parts = s.result["sizing"].get("parts", {}).get("parts", ())
     motor = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)]
