@@ -316,7 +316,7 @@ def test_a_capability_is_a_folder_and_a_line(house):
     assert found["load"]["value"] == pytest.approx(load, rel=1e-3)
     assert found["life"]["value"] / 3600.0 == pytest.approx(hours, rel=4e-3)
     assert found["life"]["value"] < found["wanted"]["value"] == 7.2e7
-    said = next(warning for warning in result["warnings"] if warning["kind"] == "pin life")
+    said = next(warning for warning in result["warnings"] if warning["code"] == "pin-life")
     page, text = ((house.folder / "life" / name).read_text("utf-8") for name in ("report.html", "result.md"))
     shown = number(found["life"]["value"], "s", "hours")
     for written in (page, text):

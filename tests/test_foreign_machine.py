@@ -327,7 +327,7 @@ def test_behind_an_open_coupling_it_is_not_followed(folder, burst):
     assert answers.coupling_trip_time is not None and answers.energy_after_trip is not None
     assert answers.energy_behind is answers.standstill_time is None
     assert set(study.runs) == {"start_up", "burst"}
-    (remark,) = (each for each in study.warnings if each.kind == "trip")
+    (remark,) = (each for each in study.warnings if each.code == "trip")
     assert "the machine behind it is an FMU and is not followed" in remark.text
 
 

@@ -540,7 +540,7 @@ def test_a_torque_limiter_behind_it(trip, opens, folder):
     study = run.run_study(config.parse(text, str(folder / "x.toml")), folder / "coupling")
     assert study.failure is None
     assert (study.answers["jam_left"].coupling_trip_time is not None) == opens
-    told = [remark for remark in study.warnings if remark.kind == "coupling never opens"]
+    told = [remark for remark in study.warnings if remark.code == "coupling-never-opens"]
     assert len(told) == (not opens)
     for remark in told:
         assert set(remark.quantities) == {"trip", "largest", "steady"} and remark.text.endswith("N m.")
@@ -562,9 +562,9 @@ def test_a_motor_that_saves_no_state_runs_each_event_from_rest(folder, tmp_path)
     assert study.answers == saving.answers and study.spreads == saving.spreads and study.spreads
     for name, rows in saving.runs.items():
         assert study.runs[name].drop_attrs().equals(rows.drop_attrs())
-    (note,) = [note for note in study.notes if note.kind == "state not saved"]
+    (note,) = [note for note in study.notes if note.code == "state-not-saved"]
     assert note.runs == ("jam_left", "blocked") and "each event was run from rest" in note.text
-    assert not [note for note in saving.notes if note.kind == "state not saved"]
+    assert not [note for note in saving.notes if note.code == "state-not-saved"]
 
 
 def test_a_reference_in_another_unit_is_refused(file, tmp_path):

@@ -268,13 +268,13 @@ def test_the_flywheels(done):
     assert 0.4 < least.flywheel < 1.2 and 0.97 * 0.05 <= least.speed_ripple <= 0.05
     assert least.flywheel < found.flywheel_by_hand
     assert found.by_hand(found.flywheel_by_hand) == pytest.approx(0.05, rel=1e-9)
-    said = {remark.kind: remark.text for remark in study.remarks}
-    assert said["least flywheel"].startswith("A fluctuation of 5.00 % takes a flywheel of")
+    said = {remark.code: remark.text for remark in study.remarks}
+    assert said["least-flywheel"].startswith("A fluctuation of 5.00 % takes a flywheel of")
     ripple = number(by[1].speed_ripple, "1", "percent")
     assert f"The speed fluctuates by {ripple} with the study's flywheel" in said["fluctuation"]
     # rated current is passed by the light flywheels alone
     rated = study.config.plate.nameplate.rated_current
-    hot = next(remark for remark in study.warnings if remark.kind == "rated current")
+    hot = next(remark for remark in study.warnings if remark.code == "rated-current")
     assert len(hot.quantities) - len([q for q in ("rated",) if q in hot.quantities]) == sum(
         a.current_rms > rated for a in by
     )
@@ -318,7 +318,7 @@ def test_a_run_that_fails_keeps_what_was_computed(tmp_path, monkeypatch):
     assert [wheel.flywheel for wheel in found.wheels] == [0.1, 0.4] and str(study.failure) == "motor: gave up"
     assert "steady" in study.answers
     # nothing is said of what was not tried
-    assert "no flywheel keeps it" not in {remark.kind for remark in study.remarks}
+    assert "no-flywheel-keeps-it" not in {remark.code for remark in study.remarks}
 
 
 @pytest.mark.second
@@ -385,26 +385,26 @@ def test_no_flywheel_is_needed_where_the_motor_alone_keeps_the_fluctuation():
     study = bare()
     found = FlywheelFindings(0.1, 0.05, 1.0, 1e3, 0.01, 1.0, [least], least)
     found.remark(study)
-    said = next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
+    said = next(remark.text for remark in study.remarks if remark.code == "least-flywheel")
     assert said.startswith(
-        "For a fluctuation of 5.00 % no flywheel is needed; nor is one by the hand formula. Without one, "
+        "For a fluctuation of 5.00 % no flywheel is needed. By the hand formula none is needed. Without one the "
     )
     sound = {v.name: 0.03 for v in Layout(FlywheelAnswers).variables}
     for size, words in (
         (
             0.0,
-            "Without one, the moving masses lend 3.00 % of a cut's work, the RMS current is 3.00 % of the rated, ",
+            "Without one the moving masses lend 3.00 % of a cut's work. The RMS current is 3.00 % of the rated. ",
         ),
         (
             2.0,
-            "(the search ends within 3 % of that fluctuation); by the hand formula none is needed, as it leaves out "
+            "(the search ends within 3 % of that fluctuation). By the hand formula none is needed, as it leaves out "
             "the shaft line. With it flywheel and moving masses lend 3.00 %",
         ),
     ):
         study = bare()
         least = judged(study, sound | {"flywheel": size})
         FlywheelFindings(0.1, 0.05, 1.0, 1e3, 0.01, 1.0, [least], least).remark(study)
-        assert words in next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
+        assert words in next(remark.text for remark in study.remarks if remark.code == "least-flywheel")
 
 
 def judged(study, answers):
@@ -424,19 +424,19 @@ def judged(study, answers):
 @pytest.mark.parametrize(
     ("current", "start", "mean", "heavier", "hot", "ending"),
     [
-        (0.98, 5.0, 8.0, 0.9, 350.0, "the start takes 5.00 s."),
-        (0.98, 12.9, 8.0, 0.9, 350.0, "the start takes 12.9 s."),
-        (0.98, 13.1, 8.0, 0.9, 350.0, "still over the limit: time to start. 2.00 kg m² keeps all."),
-        (0.98, 5.0, 8.0, 0.9, 400.0, "the limit: rise of temperature. 2.00 kg m² keeps all."),
+        (0.98, 5.0, 8.0, 0.9, 350.0, "The start takes 5.00 s."),
+        (0.98, 12.9, 8.0, 0.9, 350.0, "The start takes 12.9 s."),
+        (0.98, 13.1, 8.0, 0.9, 350.0, "Over the limit: time to start. 2.00 kg m² keeps all."),
+        (0.98, 5.0, 8.0, 0.9, 400.0, "Over the limit: rise of temperature. 2.00 kg m² keeps all."),
         (
             1.05,
             5.0,
             8.0,
             1.02,
             350.0,
-            "still over the limit: RMS current. No flywheel that was run keeps all.",
+            "Over the limit: RMS current. No flywheel that was run keeps all.",
         ),
-        (1.05, 5.0, 8.0, 0.95, 350.0, "still over the limit: RMS current. 2.00 kg m² keeps all."),
+        (1.05, 5.0, 8.0, 0.95, 350.0, "Over the limit: RMS current. 2.00 kg m² keeps all."),
         (
             2.61,
             27.9,
@@ -465,7 +465,7 @@ def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, me
         for J, ripple, share, time, T in sizes
     )
     FlywheelFindings(2.0, 0.05, 1e3, 150.0, 0.1, mean, [heavy], least, is_searched=True).remark(study)
-    said = next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
+    said = next(remark.text for remark in study.remarks if remark.code == "least-flywheel")
     assert said.endswith(ending)
     assert ("It is not recommended" in said) == ("the limit" in said)
 
@@ -477,17 +477,17 @@ def test_words_for_a_slow_start_and_a_poor_run():
     given |= {"winding_temperature": 400.0}
     FlywheelFindings(1.0, 0.05, 1.0, 150.0, 0.1, 1.0, [judged(study, given)]).remark(study)
     assert [str(remark) for remark in study.warnings] == [
+        "Energy is missing with a flywheel of 5.00 kg m² (3.00 %). Take a shorter run.step.",
+        "The turns do not close with a flywheel of 5.00 kg m². Raise run.settle_turns.",
         "The winding becomes hotter than the permitted 120 degC with a flywheel of 5.00 kg m² (127 degC).",
         "The start takes longer than the 13 s for which the rotor may be locked with a flywheel of 5.00 kg m² "
         "(14.0 s).",
-        "Energy is missing with a flywheel of 5.00 kg m² (3.00 %): a shorter run.step is needed.",
-        "The turns do not close with a flywheel of 5.00 kg m²: raise run.settle_turns.",
     ]
-    assert study.warnings[1].quantities["5.start_time"][:2] == (14.0, "s")
+    assert study.warnings[3].quantities["5.start_time"][:2] == (14.0, "s")
     # of the limits that the study's own flywheel passes the study warns, with its remedies
     own = bare()
     FlywheelFindings(5.0, 0.05, 1.0, 150.0, 0.1, 1.0, [judged(own, given)]).remark(own)
-    assert [remark.kind for remark in own.warnings] == ["energy with flywheel", "flywheel not settled"]
+    assert [remark.code for remark in own.warnings] == ["energy-with-flywheel", "flywheel-not-settled"]
 
 
 def test_a_motor_without_a_nameplate_has_the_limit_of_its_winding_alone():

@@ -772,7 +772,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
     assert slack and {rod["rod"] for rod in slack} <= {
         f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
     }
-    (avoid,) = (warning for warning in result["warnings"] if warning["kind"] == "speed to avoid")
+    (avoid,) = (warning for warning in result["warnings"] if warning["code"] == "speed-to-avoid")
     assert avoid["text"].startswith("Chains: the crank speed lies in a range to avoid")
 
     text = page_of(chains, result)

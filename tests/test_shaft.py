@@ -72,7 +72,7 @@ def test_the_line_amplifies_a_jam(study):
     assert jam.amplification == pytest.approx(jam.tau2_peak / np.max(np.abs(run[RIGID])))
     assert jam.amplification > 1.2 and 1.0 < steady.amplification < 1.3
     assert jam.turns_of_steady > 10.0 and jam.range_equivalent is None
-    runs = {warning.runs: warning.text for warning in study.warnings if warning.kind == "amplification"}
+    runs = {warning.runs: warning.text for warning in study.warnings if warning.code == "amplification"}
     assert "times that of a rigid drive" in runs["jam_left",]
     before = run[RIGID].attrs
     assert before["units"] == "N.m"

@@ -66,7 +66,7 @@ def made(study):
 def test_the_sheet_has_each_section_once(study, made):
     names = [each.name for each in (*made.sections, *made.annex)]
     assert len(names) == len(set(names))
-    assert names[:4] == ["question", "answer", "checks", "assumptions"] and {"unchecked", "runs"} <= set(
+    assert names[:4] == ["answer", "question", "checks", "assumptions"] and {"unchecked", "runs"} <= set(
         names
     )
     whole = {each.name for each in study_report.report(study).sections}

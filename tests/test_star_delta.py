@@ -195,7 +195,7 @@ def test_a_motor_on_an_inverter_is_not_cut_off(tmp_path):
     reclosing behind it would be that of a line."""
     study = run_study(parse(STUDY.replace('"star-delta"', '"inverter"')), tmp_path)
     assert study.failure is None and "interruption" not in study.answers
-    (left_out,) = [remark for remark in study.remarks if remark.kind == "event left out"]
+    (left_out,) = [remark for remark in study.remarks if remark.code == "event-left-out"]
     assert "no contactor on the line" in left_out.text
 
 

@@ -181,7 +181,7 @@ def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
     for name in ("crank_torque", "motor_torque", "rocker_torque"):
         peak = getattr(other.answers["blocked"], f"{name}_peak")
         assert peak == pytest.approx(result.peaks[name][1], rel=1e-6)
-    (note,) = (note for note in study.notes if note.kind == "assumption")
+    (note,) = (note for note in study.notes if note.code == "assumption")
     assert note.runs == ("blocked",)
     assert "are assumed and decide the peak" in note.text and "distance from the pivot C" in note.text
     peaks = as_dict(study)["block_peaks"]["blocked"]
@@ -618,15 +618,15 @@ def test_the_study_waits_until_the_turns_close(tmp_path):
     study, _ = ran(UNSETTLED, tmp_path)
     assert study.steady_begin > study.config.operation.steady_begin + 1.5
     assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
-    assert not any(warning.kind == "turns do not close" for warning in study.warnings)
+    assert not any(warning.code == "turns-do-not-close" for warning in study.warnings)
 
 
 @pytest.mark.second
 @pytest.mark.parametrize(
     ("text", "told", "there"),
     [
-        (UNSETTLED, "turns do not close", True),
-        (LIGHT + "[motor]\nlimit = { i = 0.2 }\n", "no whole turn", False),
+        (UNSETTLED, "turns-do-not-close", True),
+        (LIGHT + "[motor]\nlimit = { i = 0.2 }\n", "no-whole-turn", False),
     ],
 )
 def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkeypatch):
@@ -635,7 +635,7 @@ def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkey
     monkeypatch.setattr(start_up, "PATIENCE", 0.0)
     monkeypatch.setattr(start_up, "_SETTLES", 0.0)
     study, _ = ran(text, tmp_path)
-    assert any(warning.kind == told for warning in study.warnings)
+    assert any(warning.code == told for warning in study.warnings)
     assert (tmp_path / "load_cycle.csv").exists() == there
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ..core.descriptions import of_driver
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
+from ..study.remark import Remark
 from . import blocks as b
 from . import run_names
 from .capability import capabilities
-from .lines import Line, Strong, join, line
+from .lines import Line, Number, Strong, capital, join, line
 from .runs import number
 
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
@@ -49,8 +50,23 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     warnings: list[b.Block] = [b.Judgement("warning", each) for each in s.lines("warnings")]
     warnings += (each for part in capabilities() for each in part.warnings(s))
     yield from warnings
+    yield from remark_tables(study.warnings, "warnings")
     if answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
+
+
+def remark_tables(remarks: Sequence[Remark], path: str) -> Iterator[b.Table]:
+    """A table for each remark with more numbers than its sentences have."""
+    for k, remark in enumerate(remarks):
+        rows = tuple(
+            b.TableRow(
+                (size.title, Number(size.value, size.unit, size.kind, f"{path}.{k}.quantities.{name}"))
+            )
+            for name, size in remark.quantities.items()
+            if size.title
+        )
+        if rows:
+            yield b.Table(rows, title=capital(remark.code.replace("-", " ")))
 
 
 def sentence(s: b.Source) -> Iterator[b.Block]:

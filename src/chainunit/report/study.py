@@ -183,6 +183,7 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 def basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The notes on a study, and its energy certificate."""
     yield from (b.Text(each, "note") for each in s.lines("notes"))
+    yield from answer.remark_tables(study.notes, "notes")
     if s.result["certificate"]:
         yield from _certificate(s, study, s.result["certificate"])
 

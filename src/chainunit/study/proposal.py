@@ -30,6 +30,8 @@ class DriveProposal:
     """the tables of the study, with the values that follow from the drive"""
     question: str
     """the question that it answers about the machine {noun}"""
+    reason: str
+    """the choice and its reason, in words"""
     sentence: Callable[[StudyRecord], str]
     """the sentence on the drive of a study with these runs"""
     insufficient: str = ""

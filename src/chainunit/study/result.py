@@ -19,7 +19,8 @@ from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import Answers, measures_of
 from .origins import origin_of, place_of
-from .record import Remark, StudyRecord
+from .record import StudyRecord
+from .remark import Remark
 from .verdict import Verdict
 from .window import Phase
 
@@ -118,7 +119,7 @@ def _data(study: StudyRecord) -> StudyData:
     drive, failure = study.drive, study.failure
     return StudyData(
         heading=Heading.of(study.config.title, study.config.file),
-        sentence=study.proposal and study.proposal.sentence(study),
+        sentence=None if study.proposal is None else study.proposal.sentence(study),
         status=f"failed: {failure}" if failure else "complete",
         failure=str(failure) if failure else None,
         verdict=Verdicts(study.verdict, motor_verdict(study)),

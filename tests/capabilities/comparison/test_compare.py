@@ -117,9 +117,9 @@ def test_verdicts_and_warnings_of_one_alone_come_first(folder):
         assert all(f"Warning: only {name.upper()}: {text}" in printed for text in data["warnings"][name])
 
 
-def test_warnings_are_compared_by_their_kinds_and_runs(folder, tmp_path):
-    """No sentence is read: the same kind in the same runs is the same warning, whatever its words. One in the same
-    words is the same under any kind: an earlier version named it otherwise."""
+def test_warnings_are_compared_by_their_codes_and_runs(folder, tmp_path):
+    """No sentence is read: the same code in the same runs is the same warning, whatever its words. An earlier version
+    has a kind in place of a code."""
     speed, far, hot = (
         ("Speed 3.1 rad/s, too high: 1", "model speed"),
         ("Not so far: 2", "far"),
@@ -127,11 +127,11 @@ def test_warnings_are_compared_by_their_kinds_and_runs(folder, tmp_path):
     )
     results = []
     a = [speed, far, ("Pushed: 4", "model")]
-    b = [("Far off: 3", "far"), ("Hot", "model speed"), hot, ("Pushed: 4", "model pushed")]
-    for name, warnings in (("a", a), ("b", b)):
+    b = [("Far off: 3", "far"), ("Hot", "model speed"), hot, ("Pushed: 4", "model")]
+    for name, warnings, key, sign in (("a", a, "kind", " "), ("b", b, "code", "-")):
         data = numbers(folder, name)
         data["warnings"] = [
-            {"kind": kind, "text": text, "runs": [name] if kind == "model speed" else []}
+            {key: kind.replace(" ", sign), "text": text, "runs": [name] if kind == "model speed" else []}
             for text, kind in warnings
         ]
         (tmp_path / name).mkdir()

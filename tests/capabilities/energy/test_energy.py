@@ -157,10 +157,10 @@ def test_cost_and_co2_follow_from_the_energy(study):
 
 def test_an_inverter_has_losses_and_a_line_has_none(study):
     assert (found(study).own.mean.inverter is not None) == study.drive.follows
-    kinds = {remark.kind for remark in study.remarks}
-    assert "losses in iron" in kinds and ("losses of the inverter" in kinds) == study.drive.follows
+    kinds = {remark.code for remark in study.remarks}
+    assert "losses-in-iron" in kinds and ("losses-of-the-inverter" in kinds) == study.drive.follows
     # half of the feed goes with the loss of the whole feed in the gear
-    assert "gear at other loads" in kinds
+    assert "gear-at-other-loads" in kinds
 
 
 # -- inverter
@@ -264,7 +264,7 @@ def test_a_motor_of_75_kw_below_ie4_is_warned_of(tmp_path):
     text = 'event = []\ncatalogue = "motors.csv"\n[system]\nmotor = "Old 75"\n[run]\nsettle_turns = 1\n'
     made = run_study(parse(text, source=str(tmp_path / "study.toml")), tmp_path / "out")
     assert isinstance(made.findings["motor_class"], MotorClass)
-    (warning,) = [remark for remark in made.warnings if remark.kind == "efficiency class"]
+    (warning,) = [remark for remark in made.warnings if remark.code == "efficiency-class"]
     assert "is IE3" in warning.text and "asks IE4" in warning.text and "brake motors" in warning.text
 
 
@@ -359,7 +359,7 @@ def test_a_duty_that_is_too_hot_is_warned_of(tmp_path):
     (warning,) = [
         remark
         for remark in made.warnings
-        if remark.kind == "energy of a winding too hot"
+        if remark.code == "energy-of-a-winding-too-hot"
         and own.motor in remark.text.split("winding of")[1][:30]
     ]
     assert "120 degC" in warning.text and "usage.load.factor" in warning.text

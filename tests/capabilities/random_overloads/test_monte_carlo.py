@@ -429,10 +429,10 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     notes = {}
     study = SimpleNamespace(drive=drive, note=lambda kind, words, **of: notes.update({kind: of}))
     monte_carlo.MonteCarloResult.remark(random, study)
-    at = notes.get("random overloads at current limit")
+    at = notes.get("random-overloads-at-current-limit")
     assert at == ({"limit": (4.4, "A")} if told else None)
     words = "1 batch of runs in runs.nc was damaged, and was computed anew"
-    assert notes["runs made anew"] == {"text": words}
+    assert notes["runs-made-anew"] == {"text": words}
 
 
 @pytest.mark.slow
@@ -445,7 +445,7 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
     quantiles_of = result["monte_carlo"]["quantiles"]
     opens = shown(quantiles_of["trips"]["share"]["value"], "1", "percent")
     assert quantiles_of["trips"]["share"]["value"] > 0.0
-    (warning,) = (each for each in result["warnings"] if each["kind"] == "random overload trips")
+    (warning,) = (each for each in result["warnings"] if each["code"] == "random-overload-trips")
     assert warning["text"] == f"Overloads at random: in {opens} of them the torque limiter opens."
     text = " ".join((tmp_path / "out" / "result.md").read_text().split())
     _, _, answer = text.partition("## The answer")

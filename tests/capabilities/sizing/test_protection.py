@@ -475,7 +475,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     near = {n for n in opened if trial.answers[n].crank_torque_peak < 1.02 * numbers.setting}
     assert opened - near == set(each.opens) - near and opened - near
     assert largest(trial, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
-    assert not [warning for warning in trial.warnings if warning.kind == "coupling opens in start"]
+    assert not [warning for warning in trial.warnings if warning.code == "coupling-opens-in-start"]
 
 
 @pytest.mark.second
@@ -666,7 +666,7 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
     assert trials.failure is None
     opened = {n for n, a in trials.answers.items() if a.coupling_trip_time is not None}
     assert opened == {*peaks, "dip"} and sizing_of(on_line).setting.disturbances["dip"] > trip
-    (nuisance,) = [warning for warning in trials.warnings if warning.kind == "nuisance trip"]
+    (nuisance,) = [warning for warning in trials.warnings if warning.code == "nuisance-trip"]
     assert "nuisance trip that protects nothing: the voltage dips." in nuisance.text
     assert nuisance.runs == ("dip",)
     assert sizing_of(trials).setting is None and set(as_dict(trials)["sizing"]["protection"]) == {
@@ -677,7 +677,7 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
     for name, peak in on_line.spreads["blocked"].peaks.items():
         # another start leaves another steady turn
         assert trials.spreads["blocked"].peaks[name] == pytest.approx(peak, rel=0.02), name
-    (note,) = [note.text for note in trials.notes if note.kind == "assumption"]
+    (note,) = [note.text for note in trials.notes if note.code == "assumption"]
     assert "These peaks are without the torque limiter" in note
 
 
@@ -803,7 +803,7 @@ RELAY = MotorProtection(InUnit(2.45, "A", title="thermal relay, setting"), None,
 def limited(torque):
     """The protection by a torque limiter that opens at `torque`, or by none."""
     names = ("normal_torque", "running_torque", "start_torque", "breakdown_torque")
-    others = dict.fromkeys(names, 1.0) | dict.fromkeys(("effects", "overloads", "disturbances"), {})
+    others = dict.fromkeys(names, 1.0) | {name: {} for name in ("effects", "overloads", "disturbances")}
     return DriveProtection(
         torque, torque, RELAY, "", obstacle=None, why_none="too hard", alternatives=[], **others
     )
@@ -908,15 +908,15 @@ def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
         return event_line("jam_left", turns=1, force=force) + "[run]\nstep = 0.002\n"
 
     study = run_study(config.parse(light(2000) + "[coupling]\ntrip_torque = 5000\n"), tmp_path)
-    (remark,) = [warning.text for warning in study.warnings if warning.kind == "coupling never opens"]
+    (remark,) = [warning.text for warning in study.warnings if warning.code == "coupling-never-opens"]
     assert f"opens in no overload of this study ({study.title_of('jam_left')})" in remark
     # what the jam asks, and the motor's current limit times its torque constant through the gear
     assert f"{study.answers['jam_left'].crank_torque_peak:.0f} N m on it at most" in remark
     assert f"motor gives {4.4 * 1.27 * 50:.0f} N m at most" in remark
     study = run_study(config.parse(light(9000) + "[coupling]\ntrip_torque = 320\n"), tmp_path)
     assert study.answers["jam_left"].coupling_trip_time is not None
-    assert any(w.kind == "coupling above motor" and "stalls the motor" in w.text for w in study.warnings)
-    assert not any(warning.kind == "coupling never opens" for warning in study.warnings)
+    assert any(w.code == "coupling-above-motor" and "stalls the motor" in w.text for w in study.warnings)
+    assert not any(warning.code == "coupling-never-opens" for warning in study.warnings)
 
 
 def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
@@ -1007,10 +1007,10 @@ def test_a_start_under_load_opens_a_given_coupling(tmp_path):
     assert study.failure is None
     opened = {n for n, a in study.answers.items() if a.coupling_trip_time is not None}
     assert opened == {"start_loaded_right"} and largest(study, "start_up") < 46.0
-    (warning,) = [warning for warning in study.warnings if warning.kind == "coupling opens in start"]
+    (warning,) = [warning for warning in study.warnings if warning.code == "coupling-opens-in-start"]
     assert "start with all feed on the right" in warning.text
     study = run_study(config.parse(starts + run + "[coupling]\ntrip_torque = 60\n"), tmp_path / "higher")
-    assert not [warning for warning in study.warnings if warning.kind == "coupling opens in start"]
+    assert not [warning for warning in study.warnings if warning.code == "coupling-opens-in-start"]
 
 
 @pytest.mark.slow

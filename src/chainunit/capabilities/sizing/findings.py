@@ -19,6 +19,7 @@ from ...study.drive import Drive
 from ...study.drive_tables import DriveTables
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
+from ...study.remark import fault, note, warning
 from .alternatives import alternatives
 from .candidate import Candidate, Flywheel, Standing
 from .coupling import coupling_of, recommended_setting
@@ -144,6 +145,7 @@ class SizingFindings(Findings):
             best.motor,
             as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
+            self.answer,
             lambda study: self.sized(study).sentence,
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
@@ -207,14 +209,13 @@ class SizingFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Add the notes on the choice, and one on each ram of a linkage at the recommended coupling."""
         for text in self.notes:
-            study.note("sizing", "{text}", text=text)
+            study.say(_CHOICE, text=text)
         if study.insufficient:
-            study.warn("insufficient motor", "{answer}. All runs are with it.", answer=self.answer)
+            study.say(_INSUFFICIENT, answer=self.answer)
         setting = self.coupling(study)
         self._remark_on_gear(study, setting)
         if study.statics.modes is not None:
-            rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
-            study.note("sized without line", rigid)
+            study.say(_WITHOUT_LINE)
         if setting is not None and setting.obstacle in (None, Obstacle.RELEASE):
             # this is the setting that the answer names, recommended or not
             remark_on_rams(study, setting.least)
@@ -242,18 +243,33 @@ class SizingFindings(Findings):
         if sold is None or needed is None:
             return
         order, remedy = needed
-        study.warn(
-            "gear too weak",
-            "The gear {gear} permits {limit} in running and {start} in a start or an overload; {case} puts {torque} "
-            "on it. A gear that permits {rated} in running carries it: {remedy}.",
+        study.say(
+            _GEAR_TOO_WEAK,
             gear=sold.designation,
-            limit=(sold.transmission.torque_limit, "N.m"),
-            start=(sold.transmission.start_limit, "N.m"),
+            limit=sold.transmission.torque_limit,
+            start=sold.transmission.start_limit,
             case=order.decides.words,
-            torque=(order.decides.torque, "N.m"),
-            rated=(order.rated, "N.m"),
-            remedy=remedy,
+            torque=order.decides.torque,
+            rated=order.rated,
+            way=remedy,
         )
+
+
+_CHOICE = note("sizing", "{text}")
+_INSUFFICIENT = fault("insufficient-motor", "{answer}. All runs are with it.")
+_WITHOUT_LINE = note(
+    "sized-without-line",
+    "Sizing took the shafts as rigid and the driveline as massless. The runs include the line.",
+)
+_GEAR_TOO_WEAK = warning(
+    "gear-too-weak",
+    "The gear {gear} permits {limit} in running and {start} in a start or an overload. {case} puts {torque} on it.",
+    remedy="A gear that permits {rated} in running carries it ({way}).",
+    limit="N.m",
+    start="N.m",
+    torque="N.m",
+    rated="N.m",
+)
 
 
 class ProtectionAnalysis(Analysis):

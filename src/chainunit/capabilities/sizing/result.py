@@ -222,7 +222,9 @@ class SizedDrive:
     )
     belt: OrderedBelt | None = part("the belt to order", titled=True, optional=True, default=None)
     inverter: OrderedInverter | None = part("the inverter to order", titled=True, optional=True, default=None)
-    parts: PartsList | None = part("the parts to order from catalogues", titled=True, optional=True, default=None)
+    parts: PartsList | None = part(
+        "the parts to order from catalogues", titled=True, optional=True, default=None
+    )
 
     @property
     def sentence(self) -> str:
