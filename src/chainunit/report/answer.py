@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..core.descriptions import of_driver
+from ..core.quantities import finite
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from ..study.remark import Remark
@@ -98,7 +99,7 @@ def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:
 
 def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:
     """The answer `name` in the overload in which it is largest; nothing where there is no overload."""
-    sizes = {run: s.value(f"answers.{run}.{name}") for run in study.overloads}
+    sizes = {run: finite(getattr(study.answers[run], name)) for run in study.overloads}
     magnitudes = {run: abs(size) for run, size in sizes.items() if size is not None}
     if magnitudes:
         run = max(magnitudes, key=lambda run: magnitudes[run])

@@ -269,19 +269,6 @@ class Source:
             value, place = value[item], f"{place}{'.' if i else '.value.'}{item}"
         return Number(value, node["unit"], **{"kind": node.get("kind", ""), "path": place, **more})
 
-    def check(self, path: str, over: bool | None = None) -> Share:
-        """The cell of the check at `path`. It stands out where it is `over`, by default over its limit."""
-        check = at(self.result, path)
-        used = f"{path}.utilisation"
-        if "forbidden" in check:
-            return Share(self.number(used, none="none permitted", over=True), self.words(f"{path}.forbidden"))
-        if over is None:
-            size = self.value(used)
-            over = size is not None and size > 1.0
-        known = "value" in check and "limit" in check
-        of = self.line(f"{{{path}.value}} of {{{path}.limit}}") if known else ()
-        return Share(self.number(used, none="no value", over=over), of)
-
     def value(self, path: str) -> float | None:
         """The value of the number at `path`, without its unit."""
         value: float | None = at(self.result, path)["value"]

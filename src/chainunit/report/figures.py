@@ -82,9 +82,9 @@ def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
     if "steady" in study.answers:
         speed = study.answers["steady"].speed_mean * study.drive.ratio
         yield fig.Mark(speed, "steady running, mean", look="mark")
-    if "rated_torque" in s.result["motor"]:
-        speed, torque = (s.value(f"motor.rated_{name}") for name in ("speed", "torque"))
-        yield fig.Mark(float(torque or 0.0), "rated torque (S1)", axis="y", look="reference")
+    if study.plate is not None:
+        speed, torque = study.plate.nameplate.speed, study.plate.nameplate.torque
+        yield fig.Mark(torque, "rated torque (S1)", axis="y", look="reference")
         yield fig.Curve("rated point", [speed], [torque], marker="o", has_line=False)
 
 

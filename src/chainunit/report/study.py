@@ -219,7 +219,7 @@ def _certificate(
     yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for shares in certificate.values() for name in shares):
         compared_runs = [run for run, shares in certificate.items() if name in shares]
-        run = max(compared_runs, key=lambda run: s.value(f"certificate.{run}.{name}") or 0.0)
+        run = max(compared_runs, key=lambda run: study.certificate[run][name])
         most = f"{{certificate.{run}.{name}}}"
         text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {most} of the energy moved."
         if name.endswith(DIFFERENCE):

@@ -177,7 +177,7 @@ def test_a_sized_drive_has_one_number_for_each_utilisation(folder):
     assert [row["reason"] for row in rows] == [each["reason"] for each in found["candidates"]]
     for name, check in checks.items():
         assert float(rows[0][f"{name}.utilisation"]) == check["utilisation"]["value"]
-    for name, check in (("torque_used", "peak_torque"), ("temperature_used", "temperature")):
+    for name, check in (("torque_utilisation", "peak_torque"), ("temperature_utilisation", "temperature")):
         share = checks[check]["utilisation"]["value"]
         assert value_of(data, f"motor.{name}") == pytest.approx(100.0 * share, rel=1e-12)
     assert value_of(data, "motor.winding_temperature") == pytest.approx(

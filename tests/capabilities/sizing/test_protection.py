@@ -23,16 +23,17 @@ from chainunit.capabilities.sizing.alternatives import (
     on_motor_side,
     slip_run,
 )
+from chainunit.capabilities.sizing.candidate import DriveNumbers
 from chainunit.capabilities.sizing.coupling import effects, recommended_setting
 from chainunit.capabilities.sizing.coupling_words import _bound, coupling_sentence, way_words
 from chainunit.capabilities.sizing.gear_order import gear_order
 from chainunit.capabilities.sizing.page import _relay, _starter
 from chainunit.capabilities.sizing.protection import CouplingEffect, Obstacle, Setting, Way
-from chainunit.capabilities.sizing.result import DriveProtection, MotorProtection, SizedDrive
+from chainunit.capabilities.sizing.result import DriveProtection, MotorProtection, OrderedInverter, SizedDrive
 from chainunit.capabilities.sizing.result import _relay as _relay_of
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.errors import InputError
-from chainunit.core.quantities import variables
+from chainunit.core.quantities import Layout, variables
 from chainunit.drives.gearing import ordered_torque
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import steady
@@ -43,6 +44,7 @@ from chainunit.machines.chain_unit import SIDES
 from chainunit.reading.results import InUnit, as_data
 from chainunit.reading.text import entry, number
 from chainunit.report import blocks, terminal
+from chainunit.report.cited import cited
 from chainunit.study import config, run
 from chainunit.study.analyses import all_analyses
 from chainunit.study.analysis import Analysis, Work
@@ -66,6 +68,12 @@ from chainunit.study.torques import quasi_static_peak
 from chainunit.study.transients import follow
 from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic
+
+
+def chosen_in(study):
+    """The chosen motor of a study, by which a way to a limiter is judged."""
+    sizing = sizing_of(study)
+    return coupling_alternatives.ChosenMotor(sizing.plan, sizing.duty, sizing.best)
 
 
 def sizing_of(study):
@@ -496,7 +504,7 @@ def test_a_way_is_judged_by_the_limits_of_the_motor(on_line, way):
         Way.INVERTER: coupling_alternatives._inverter,
         Way.SLIP_CLUTCH: coupling_alternatives._slip_clutch,
     }[way]
-    left_out = make(hot, Rig(on_line.config.operation, on_line.drive, None), sizing.setting)
+    left_out = make(hot, Rig(on_line.config.operation, on_line.drive, None), sizing.setting, chosen_in(hot))
     assert left_out.numbers.setting is None and left_out.numbers.start is None and not left_out.opens
     assert "limits of this motor" in way_words(hot, left_out, sizing.setting)
 
@@ -520,7 +528,7 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     """The mill with 0.75 kW started with 15 % only, and was said to start with none."""
     tried = []
 
-    def gentlest(trials, study, goal, limit):
+    def gentlest(trials, study, chosen, goal, limit):
         rigs = list(trials)
         tried.append(({rig.drive.parameters.inverter.boost for rig, *_ in rigs}, len(rigs)))
         rig, _, numbers, _ = rigs[0]
@@ -529,14 +537,14 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
     monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))
     rig = Rig(on_line.config.operation, on_line.drive, None)
-    found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting)
+    found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting, chosen_in(on_line))
     assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
     tables = on_line.config.drive
     tables = dataclasses.replace(tables, given=tables.given | {"starter.inverter.boost"})
     given = dataclasses.replace(on_line.config, drive=tables)
     tried.clear()
     none = coupling_alternatives._inverter(
-        dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting
+        dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting, chosen_in(on_line)
     )
     assert tried == [({0.05}, 5)] and none.numbers.start is None
 
@@ -844,9 +852,13 @@ def test_a_relay_of_a_star_delta_starter_has_its_place():
     assert relay["relay_current"]["value"] == pytest.approx(4.642, abs=1e-3)
     assert "in the phases of the delta" in relay["relay_current"]["title"]
     assert relay["line_current"]["value"] == 8.04 and "in the supply line" in relay["line_current"]["title"]
-    source = blocks.Source({"sizing": {"protection": {"trip_torque": entry(None, "N.m")} | relay}})
-    (words,) = map(terminal.plain_line, _relay(source))
-    assert words == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
+    of_delta = _relay_of(started, 8.04)
+    words = terminal.plain_line(_relay(of_delta, cited(of_delta)))
+    assert (
+        of_delta.setting_words
+        == words
+        == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
+    )
     started.drive.star_delta = None
     assert "line_current" not in as_data(_relay_of(started, 8.04), titled=True)
 
@@ -859,19 +871,13 @@ def test_the_order_names_the_starter():
         "soft_start.time": entry(1.0, "s"),
         "star_delta.time": entry(3.0, "s"),
     }
-    numbers = {
-        "inverter_current": entry(45.4, "A"),
-        "frequency": entry(50.3, "Hz"),
-        "speed": entry(156.8, "rad/s", "speed"),
-    }
-    result = {
-        "run": {"ramp": entry(2.0, "s")},
-        "starter": starter,
-        "sizing": {"candidates": [{"numbers": numbers}], "inverter": {"rated_current": entry(49.1, "A")}},
-    }
+    numbers = {"inverter_current": 45.4, "frequency": 50.3, "speed": 156.8}
+    result = {"run": {"ramp": entry(2.0, "s")}, "starter": starter}
+    order = SizedDrive(None, False, "crank", None, inverter=OrderedInverter(InUnit(49.1, "A"), "a start"))
 
     def said(start):
-        lines = _starter(blocks.Source(result | {"start": start}), "sizing.candidates.0")
+        of_drive = DriveNumbers(**dict.fromkeys(Layout(DriveNumbers).names) | numbers)
+        lines = _starter(blocks.Source(result | {"start": start}), cited(order), cited(of_drive))
         return "; ".join(map(terminal.plain_line, lines))
 
     assert said("soft") == "soft starter, 50 % voltage, 1 s"
@@ -886,7 +892,7 @@ def test_the_order_names_the_starter():
         "inverter of at least 49.1 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
     )
     assert said("inverter") == inverter
-    numbers["inverter_current"] = entry(None, "A")
+    numbers["inverter_current"] = None
     assert said("inverter") == "inverter, boost 5 %, ramp 2 s"
     del result["starter"]
     assert said("direct") == ""

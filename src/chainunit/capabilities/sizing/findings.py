@@ -20,7 +20,7 @@ from ...study.drive_tables import DriveTables
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from ...study.remark import fault, note, warning
-from .alternatives import alternatives
+from .alternatives import ChosenMotor, alternatives
 from .candidate import Candidate, Flywheel, Standing
 from .coupling import coupling_of, recommended_setting
 from .duty import Duty
@@ -289,4 +289,5 @@ class ProtectionAnalysis(Analysis):
         sizing = SizingFindings.of_study(study)
         sizing.setting = recommended_setting(study, sizing.couplings)
         if sizing.setting is not None:
-            sizing.alternatives = alternatives(study, sizing.setting, work.rig, work.progress)
+            chosen = ChosenMotor(sizing.plan, sizing.duty, sizing.best)
+            sizing.alternatives = alternatives(study, sizing.setting, work.rig, chosen, work.progress)
