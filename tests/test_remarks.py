@@ -80,7 +80,7 @@ def test_a_sentence_without_a_value_is_left_out():
         "The {driver} turns at {speed}.",
         "It is {why}.",
         remedy="Take {what}.",
-        speed="rad/s",
+        sizes={"rad/s": "speed"},
     )
     whole = code.remark("steady", driver="eccentric", speed=3.0, why="slow", what="more")
     assert (

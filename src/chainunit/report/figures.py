@@ -157,13 +157,7 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
     panels = (
         (frequency, fig.Axis("gain of the open loop", log=True), "frequency", "gain", "Gain"),
         (frequency, fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0), "frequency", "phase", "Phase"),
-        (
-            time,
-            fig.Axis("speed deviation", "rad/(N.m.s)"),
-            "time",
-            "deviation",
-            "Disturbance step",
-        ),
+        (time, fig.Axis("speed deviation", "rad/(N.m.s)"), "time", "deviation", "Disturbance step"),
     )
 
     def items(over: str, of: str) -> Iterator[fig.Item]:

@@ -36,11 +36,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     sections = [
         *(given[name] for name in _FIRST if name in given),
         *(_on_sheet(given[name]) for name in sheets),
-        b.Section(
-            "assumptions",
-            "Assumptions: values that no file gives",
-            tuple(_assumed(given, study)),
-        ),
+        b.Section("assumptions", "Assumptions: values that no file gives", tuple(_assumed(given, study))),
         *([_basis(s, study)] if "basis" in given else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]

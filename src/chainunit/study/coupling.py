@@ -120,39 +120,32 @@ _OPENS_IN_START = warning(
     "The torque limiter opens at {trip}, and a start puts up to {start} on it ({where}). It opens in some of the "
     "starts.",
     remedy='Set it higher, or start softer (start = "soft" or "inverter").',
-    trip="N.m",
-    start="N.m",
+    sizes={"N.m": "trip start"},
 )
 _OPENS_IN_TRANSIENT = warning(
     "coupling-opens-in-transient",
     "The torque limiter is set to {trip}, and load and acceleration put {start} on it in a start at most. The "
     "{transient}, with {most} at most ({where}).",
     *(f"{each}." for each in TRIPS_IN_TRANSIENT.split(". ")),
-    trip="N.m",
-    start="N.m",
-    most="N.m",
+    sizes={"N.m": "trip start most"},
 )
 _NUISANCE = warning(
     "nuisance-trip",
     "The torque limiter, set to {trip}, opens where no shock asks for it, a nuisance trip that protects nothing: "
     "{where}.",
-    trip="N.m",
+    sizes={"N.m": "trip"},
 )
 _NEVER_OPENS = warning(
     "coupling-never-opens",
     "The torque limiter opens in no overload of this study ({where}). It is set to {trip}, they put {largest} on it "
     "at most, steady running {steady}. The motor gives {motor} at most.",
-    trip="N.m",
-    largest="N.m",
-    steady="N.m",
-    motor="N.m",
+    sizes={"N.m": "trip largest steady motor"},
 )
 _ABOVE_MOTOR = warning(
     "coupling-above-motor",
     "The torque limiter is set to {trip} and the motor gives {motor} at most. A load that rises slowly stalls the "
     "motor and does not open it.",
-    trip="N.m",
-    motor="N.m",
+    sizes={"N.m": "trip motor"},
 )
 _RAM = note(
     "coupling-at-ram",
@@ -162,14 +155,15 @@ _RAM = note(
     "coupling stays shut. At every angle it can push with more than {times} times that while the coupling stays "
     "shut{always}.",
     remedy="A device at the link protects it there, such as a hydraulic overload cushion or a shear plate.",
-    trip="N.m",
-    dead="rad",
-    fastest=("N", "", 3, "force on the link at the setting, where it is fastest"),
-    thirty=("N", "", 3, "30 deg before the dead centre"),
-    ten=("N", "", 3, "10 deg before the dead centre"),
-    working="N",
-    angle="rad",
-    way=("m", "millimetres"),
+    sizes={
+        "N.m": "trip",
+        "rad": "dead angle",
+        ("N", "", 3, "force on the link at the setting, where it is fastest"): "fastest",
+        ("N", "", 3, "30 deg before the dead centre"): "thirty",
+        ("N", "", 3, "10 deg before the dead centre"): "ten",
+        "N": "working",
+        ("m", "millimetres"): "way",
+    },
 )
 
 

@@ -32,8 +32,7 @@ class RippleWithout(Findings):
 _RIPPLE = note(
     "feed-forward",
     "Feed-forward of the machine's torque brings the ripple of the speed from {without} to {speed_ripple}.",
-    without=("1", "percent"),
-    speed_ripple=("1", "percent"),
+    sizes={("1", "percent"): "without speed_ripple"},
 )
 
 

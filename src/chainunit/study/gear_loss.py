@@ -64,13 +64,13 @@ _LOSS = note(
     "gear-loss",
     "The {gear} {total} in steady running. This is {share} of the {net_power} that the machine takes in the mean. "
     "The machine swings energy to and fro, {passed_power} in the mean of both ways, and each way costs its share.",
-    total="W",
-    share=("1", "percent"),
-    net_power="W",
-    by_load=("W", "", 3, "loss by load"),
-    efficiency=("1", "percent", 3, "efficiency under load"),
-    without_load=("W", "", 3, "loss without load (gear.d)"),
-    passed_power="W",
+    sizes={
+        "W": "total net_power passed_power",
+        ("1", "percent"): "share",
+        ("W", "", 3, "loss by load"): "by_load",
+        ("1", "percent", 3, "efficiency under load"): "efficiency",
+        ("W", "", 3, "loss without load (gear.d)"): "without_load",
+    },
 )
 
 

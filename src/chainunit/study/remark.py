@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias
 
 from ..core.descriptions import USUAL_DRIVER, of_driver
@@ -104,10 +105,20 @@ DECLARED: dict[str, RemarkCode] = {}
 
 
 def _declare(
-    severity: Severity, code: str, /, *texts: str, remedy: str = "", **sizes: str | tuple[str | int, ...]
+    severity: Severity,
+    code: str,
+    /,
+    *texts: str,
+    remedy: str = "",
+    sizes: Mapping[str | tuple[str | int, ...], str] = MappingProxyType({}),
 ) -> RemarkCode:
-    """Declare a remark; `sizes` are its numbers, each a unit or the values of a `Size`."""
-    by_name = {name: Size(size) if isinstance(size, str) else Size(*size) for name, size in sizes.items()}  # type: ignore[arg-type]
+    """Declare a remark; `sizes` has the names of its numbers, with blanks between them, by their unit or by the values
+    of a `Size`."""
+    by_name = {
+        name: Size(*((size,) if isinstance(size, str) else size))  # type: ignore[arg-type]
+        for size, names in sizes.items()
+        for name in names.split()
+    }
     sentences = tuple(each for text in texts for each in _SENTENCE_END.split(text))
     declared = RemarkCode(code, severity, sentences, remedy, by_name)
     assert DECLARED.setdefault(code, declared) == declared, code

@@ -152,8 +152,7 @@ _FED_BEFORE_SPEED = fault(
     "In the start-up the motor does not bring the empty machine to its speed in a reasonable time. The feed comes "
     "after {fed}, with the {driver} at {speed} in place of {asked}.",
     remedy="Take a larger motor or a lighter flywheel.",
-    fed="s",
-    speed=("rad/s", "speed"),
+    sizes={"s": "fed", ("rad/s", "speed"): "speed"},
 )
 _HEAVIER = "Take a larger motor, less load, or for a load that comes and goes a heavier flywheel."
 _LIMITS = {
@@ -172,7 +171,7 @@ _LIMITS = {
         "The start-up takes {value}, with up to {peak}. The rotor of a warm motor may be locked for {limit}, and a "
         "start that takes longer overheats it as a locked rotor does.",
         remedy='Take a lighter flywheel, a larger motor, or start = "inverter".',
-        peak="A",
+        sizes={"A": "peak"},
     ),
 }
 """By limit of the motor, the warning if it is exceeded."""
@@ -180,7 +179,7 @@ _NO_RESERVE = fault(
     "no-reserve",
     "In steady running of the motor {passes}. A heavier load or a dip of the voltage stalls it{turns}.",
     remedy="Take a larger motor or a heavier flywheel.",
-    over=("1", "percent"),
+    sizes={("1", "percent"): "over"},
 )
 
 
@@ -224,37 +223,25 @@ def _stall_speed(study: StudyRecord, steady: Answers) -> float | None:
     return breakdown if steady.speed_mean < breakdown else None
 
 
-_ASKED = "In steady running the {driver} turns at {speed_mean} in place of {asked}."
-_BEGIN = "The overloads begin from this state{overloads}."
-_STALLED = fault(
-    "motor-below-pull-out",
-    _ASKED,
-    "The motor stalls below its pull-out speed, {below}.",
-    _BEGIN,
-    remedy=_HEAVIER,
-    speed_mean=("rad/s", "speed"),
+def _speed_missed(code: str, why: str, remedy: str = "") -> RemarkCode:
+    missed = "In steady running the {driver} turns at {speed_mean} in place of {asked}."
+    begin = "The overloads begin from this state{overloads}."
+    return fault(code, missed, why, begin, remedy=remedy, sizes={("rad/s", "speed"): "speed_mean"})
+
+
+_STALLED = _speed_missed(
+    "motor-below-pull-out", "The motor stalls below its pull-out speed, {below}.", _HEAVIER
 )
-_SPEEDS_UP = fault(
+_SPEEDS_UP = _speed_missed(
     "start-does-not-end",
-    _ASKED,
     "The machine still speeds up, too slowly for a start that ends.",
-    _BEGIN,
-    remedy="Take a larger motor, a lighter flywheel or less load.",
-    speed_mean=("rad/s", "speed"),
+    "Take a larger motor, a lighter flywheel or less load.",
 )
-_AT_ITS_LIMIT = fault(
-    "speed-missed",
-    _ASKED,
-    "The motor's voltage or current is at its limit, or the run is too short to settle.",
-    _BEGIN,
-    speed_mean=("rad/s", "speed"),
+_AT_ITS_LIMIT = _speed_missed(
+    "speed-missed", "The motor's voltage or current is at its limit, or the run is too short to settle."
 )
-_BY_SLIP = fault(
-    "speed-by-slip",
-    _ASKED,
-    "A motor on the line takes the speed that gear ratio and slip give.",
-    _BEGIN,
-    speed_mean=("rad/s", "speed"),
+_BY_SLIP = _speed_missed(
+    "speed-by-slip", "A motor on the line takes the speed that gear ratio and slip give."
 )
 
 
@@ -281,14 +268,14 @@ _NOT_CLOSED = fault(
     "In steady running the turns do not close, as their ends differ by {cycle_gap} in speed or torque ({repeats}).",
     *_NO_MEAN,
     remedy="Raise run.settle_turns or run.turns.",
-    cycle_gap=("1", "percent"),
+    sizes={("1", "percent"): "cycle_gap"},
 )
 _SPEED_DRIFTS = fault(
     "speed-drifts",
     "In steady running the machine still {moves}. The change of its speed over the evaluated turns is {speed_drift} "
     "of the ripple. Ripple and RMS are not those of steady running.",
     remedy="Raise run.settle_turns.",
-    speed_drift=("1", "percent"),
+    sizes={("1", "percent"): "speed_drift"},
 )
 _ENERGY_TAKEN = fault(
     "energy-taken-up",
@@ -297,7 +284,7 @@ _ENERGY_TAKEN = fault(
     *_NO_MEAN,
     "The peaks, RMS and ripple are not those of steady running.",
     remedy="Raise run.settle_turns.",
-    energy_gap=("1", "percent"),
+    sizes={("1", "percent"): "energy_gap"},
 )
 _NO_THERMAL = fault(
     "no-thermal-steady-state",
@@ -358,14 +345,16 @@ _HAPPENINGS = {
             "An end of a rod is pushed, though the rod is pulled in the mean: {where}.",
             remedy="More rods are nearer to a chain.",
         ),
-        warning("current-limit", "The motor runs into its current limit of {passed}: {where}.", passed="A"),
-        fault("stall", "The {driver} stands after the event: {where}.", stall_time="s"),
+        warning(
+            "current-limit",
+            "The motor runs into its current limit of {passed}: {where}.",
+            sizes={"A": "passed"},
+        ),
+        fault("stall", "The {driver} stands after the event: {where}.", sizes={"s": "stall_time"}),
         warning(
             "trip",
             "The torque limiter opens after the event: {where}.",
-            coupling_trip_time="s",
-            energy_after_trip="J",
-            energy_behind="J",
+            sizes={"s": "coupling_trip_time", "J": "energy_after_trip energy_behind"},
         ),
         fault(
             "not-recovered", "The speed does not return to its steady band within the time followed: {where}."
@@ -421,9 +410,7 @@ _ROTOR = note(
     "rotor-accelerates",
     "In steady running load and losses take {load} at the motor's shaft at most, and the motor gives {most}. The "
     "rest accelerates its rotor, as the speed swings by {ripple}.",
-    load="N.m",
-    most="N.m",
-    ripple=("1", "percent"),
+    sizes={"N.m": "load most", ("1", "percent"): "ripple"},
 )
 _NO_SLIP = note(
     "no-slip-compensation",
@@ -433,13 +420,13 @@ _NO_SLIP = note(
 _SLIP = note(
     "slip-compensation",
     "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip).",
-    slip="Hz/(N.m)",
+    sizes={"Hz/(N.m)": "slip"},
 )
 _RATED_SUFFICES = note(
     "inverter-with-rated-current",
     "An inverter with the rated current of the motor, {rated}, suffices for running, all starts and all events. It "
     "carries {overload} times that for up to 60 s (starter.overload).",
-    rated="A",
+    sizes={"A": "rated"},
 )
 _INVERTER = note(
     "inverter-current",
@@ -447,9 +434,7 @@ _INVERTER = note(
     "current of the motor, whose own limit of {held} holds its frequency back, {limited}. Times the rated {rated} "
     "of the motor: {cases}.",
     remedy="Order one of at least {current}, for {case}.",
-    current="A",
-    rated="A",
-    held="A",
+    sizes={"A": "current rated held"},
 )
 
 
@@ -511,8 +496,7 @@ _ASSUMPTION = note(
     "assumption",
     "{title}: {text}",
     "These peaks are without the torque limiter, which opens at {trip}.",
-    crank_torque_low="N.m",
-    crank_torque_high="N.m",
+    sizes={"N.m": "crank_torque_low crank_torque_high"},
 )
 
 

@@ -119,10 +119,7 @@ _OVER_LIMIT = warning(
     f"{_PUTS}.",
     "The gear permits {limit} in a start (gear.torque_limit x gear.start_factor). The {transient}, {most}.",
     remedy="{softer}.",
-    torque="N.m",
-    angle="rad",
-    limit="N.m",
-    most="N.m",
+    sizes={"N.m": "torque limit most", "rad": "angle"},
 )
 _OVER_RUNNING = warning(
     "start-at-gear-over-running",
@@ -130,11 +127,7 @@ _OVER_RUNNING = warning(
     "Gears of catalogues commonly permit about {large} times their rated torque in a start. The {transient}, "
     "{most}.",
     remedy="Choose the gear by this torque (gear.torque_limit, gear.start_factor), or {softer}.",
-    torque="N.m",
-    angle="rad",
-    over="1",
-    running="N.m",
-    most="N.m",
+    sizes={"N.m": "torque running most", "rad": "angle", "1": "over"},
 )
 _NO_START = fault(
     "no-start",

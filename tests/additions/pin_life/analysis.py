@@ -65,9 +65,7 @@ TOO_SHORT = warning(
     "pin-life",
     "A bearing at the pin {pin} has a rating life of {life}, and {wanted} are wanted.",
     remedy="Take one with a load rating of {needed}.",
-    life=("s", "hours"),
-    wanted=("s", "hours"),
-    needed="N",
+    sizes={("s", "hours"): "life wanted", "N": "needed"},
 )
 
 

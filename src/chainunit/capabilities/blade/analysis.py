@@ -96,24 +96,23 @@ _BOTTOM = ("m", "millimetres")
 _NO_CUT = fault(
     "no-cut",
     "No cut takes place, as the blade comes down to y = {low} and the stack's top is at {high}.",
-    blade_bottom=_BOTTOM,
+    sizes={_BOTTOM: "blade_bottom"},
 )
 _TABLE_NOT_REACHED = warning(
     "table-not-reached",
     "The blade does not reach the table, as it comes down to y = {low} and the table is at {high}.",
-    blade_bottom=_BOTTOM,
+    sizes={_BOTTOM: "blade_bottom"},
 )
 _STACK_NOT_LEFT = warning(
     "stack-not-left",
     "The blade does not leave the stack, as it rises to y = {high} and the stack's top is at {low}.",
-    blade_top=_BOTTOM,
+    sizes={_BOTTOM: "blade_top"},
 )
 _WORK_OF_A_CUT = note(
     "work-of-a-cut",
     "The work of a cut is {cut_work}, and force times path through the stack is {cut_work_by_path}. The resistance "
     "rises and falls over stack.edge, and fades below stack.v_smooth.",
-    cut_work="J",
-    cut_work_by_path="J",
+    sizes={"J": "cut_work cut_work_by_path"},
 )
 
 

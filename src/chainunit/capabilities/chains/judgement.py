@@ -59,16 +59,16 @@ _FEW_RODS = note(
 _SPEED_TO_AVOID = warning(
     "speed-to-avoid",
     "Chains: the crank speed lies in a range to avoid, {band} ({why}).",
-    speed=("rad/s", "speed"),
+    sizes={("rad/s", "speed"): "speed"},
 )
 _SPEED_MISSING = warning(
-    "speed-missing", "Chains: the speed {speed} is missing ({why}).", speed=("rad/s", "speed")
+    "speed-missing", "Chains: the speed {speed} is missing ({why}).", sizes={("rad/s", "speed"): "speed"}
 )
 _ENERGY = fault(
     "energy-of-chains",
     "Chains: the energy residual reaches {residual} of the energy moved.",
     remedy="Lower chain.fold_stiffness.",
-    residual="1",
+    sizes={"1": "residual"},
 )
 _NOT_FELT = warning(
     "lump-not-felt",

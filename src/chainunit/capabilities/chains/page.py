@@ -98,12 +98,7 @@ def _own_speed(s: b.Source, x: ChainResult) -> b.Table:
         rows += [
             b.TableRow(("resonance of an organ, crank speed", number(x.resonance), "", "")),
             b.TableRow(
-                (
-                    "relative distance of the speed from it (negative: below)",
-                    number(x.distance),
-                    "",
-                    "",
-                )
+                ("relative distance of the speed from it (negative: below)", number(x.distance), "", "")
             ),
         ]
     title = (

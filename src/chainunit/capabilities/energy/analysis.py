@@ -124,14 +124,13 @@ _TOO_HOT = warning(
     "With the loads of [usage] the winding of {motor} would get hotter than the permitted {limit}. Its energy is "
     "the one at this temperature, and too low.",
     remedy="Take a larger motor, or lower usage.load.factor.",
-    limit=("K", "temperature"),
+    sizes={("K", "temperature"): "limit"},
 )
 _BALANCE = fault(
     "energy-balance",
     "{missing} of the electric power of {electric} are missing in the sum of the losses by place.",
     remedy="Raise run.settle_turns, or take a shorter run.step.",
-    missing="W",
-    electric="W",
+    sizes={"W": "missing electric"},
 )
 _IRON = note(
     "losses-in-iron",
@@ -153,7 +152,7 @@ _COMES_BACK = note(
     "In parts of the turn the motor gives back {back} in the mean. Here this power counts as saved. An inverter "
     "with a diode bridge stores it as far as its intermediate circuit is large enough, and turns the rest into heat "
     "in a braking resistor.",
-    back="W",
+    sizes={"W": "back"},
 )
 _NOT_KNOWN = fault(
     "energy-not-known",

@@ -48,7 +48,7 @@ _TOO_LOW = warning(
     "and poles that has come to the market since July 2023.",
     *EXEMPTIONS,
     remedy="Take a motor of class {asked}.",
-    efficiency=("1", "percent"),
+    sizes={("1", "percent"): "efficiency"},
 )
 
 

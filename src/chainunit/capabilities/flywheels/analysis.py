@@ -353,15 +353,12 @@ _TOO_SMALL = warning(
     "motor-too-small",
     "The load takes a torque of {mean} on average, rated is {rated}.",
     remedy="Take a larger motor, as no flywheel helps.",
-    mean="N.m",
-    rated="N.m",
+    sizes={"N.m": "mean rated"},
 )
 _FLUCTUATION = warning(
     "fluctuation",
     "The speed fluctuates by {speed_ripple} with the study's flywheel, {flywheel}. Permitted is {permitted}.",
-    speed_ripple=("1", "percent"),
-    flywheel="kg.m2",
-    permitted=("1", "percent"),
+    sizes={("1", "percent"): "speed_ripple permitted", "kg.m2": "flywheel"},
 )
 _NONE_KEEPS = warning(
     "no-flywheel-keeps-it",
@@ -372,14 +369,12 @@ _BEHIND = warning(
     "With a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the {driver}'s by "
     "{speed_ripple}. The shaft line makes the rest, which no flywheel on the motor's shaft evens.",
     remedy="{way}.",
-    flywheel="kg.m2",
-    motor_ripple=("1", "percent"),
-    speed_ripple=("1", "percent"),
+    sizes={"kg.m2": "flywheel", ("1", "percent"): "motor_ripple speed_ripple"},
 )
 _HEAVIER_WORSE = warning(
     "heavier-flywheel-worse",
     "The speed fluctuates more, not less, with the heavier flywheel of {where}. The drive swings with it.",
-    speed_ripple=("1", "percent"),
+    sizes={("1", "percent"): "speed_ripple"},
 )
 _LEAST = note(
     "least-flywheel",
@@ -388,12 +383,7 @@ _LEAST = note(
     "{by_hand}{left_out}. By the hand formula none is needed{none_by_hand}. {beside} lend {stored} of a cut's work. "
     "The RMS current is {current} of the rated. The start takes {start}. It is not recommended{heavy}. Over the "
     "limit: {excesses}. {fit} keeps all. No flywheel that was run keeps all{no_fit}.",
-    permitted=("1", "percent"),
-    flywheel="kg.m2",
-    by_hand="kg.m2",
-    stored=("1", "percent"),
-    current=("1", "percent"),
-    start="s",
+    sizes={("1", "percent"): "permitted stored current", "kg.m2": "flywheel by_hand", "s": "start"},
 )
 
 

@@ -132,10 +132,7 @@ def _numbers(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
         ),
         (b.Column("95 %: from", "from"), lambda row: number(row[1].low, 4)),
         ("to", lambda row: number(row[1].high, 4)),
-        (
-            b.Column("deviation expected before the fit", form="long"),
-            lambda row: number(row[1].expected, 2),
-        ),
+        (b.Column("deviation expected before the fit", form="long"), lambda row: number(row[1].expected, 2)),
         (
             b.Column("known before", form="long"),
             lambda row: line(number(row[1].given, 4), " ± ", number(row[1].given_deviation, 2)),

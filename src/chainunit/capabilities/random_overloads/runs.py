@@ -277,12 +277,12 @@ _OUTCOMES = {
     "trips": warning(
         "random-overload-trips",
         f"Overloads at random: in {{share}} of them {OUTCOMES['trips']}.",
-        share=_SHARE,
+        sizes={_SHARE: "share"},
     ),
     "stalls": fault(
         "random-overload-stalls",
         f"Overloads at random: in {{share}} of them {OUTCOMES['stalls']}.",
-        share=_SHARE,
+        sizes={_SHARE: "share"},
     ),
 }
 _TOO_FEW = note("too-few-runs", "Overloads at random: {text}")
@@ -290,7 +290,7 @@ _AT_LIMIT = note(
     "random-overloads-at-current-limit",
     "Overloads at random: the largest currents are at their limit of {limit}. A harder overload does not raise "
     "them.",
-    limit="A",
+    sizes={"A": "limit"},
 )
 _MADE_ANEW = note("runs-made-anew", "Overloads at random: {text}.")
 

@@ -33,11 +33,7 @@ def _factors(s: b.Source, study: StudyRecord) -> b.Table:
     first = next(iter(sides.values()))
     rows = (
         b.TableRow(
-            (
-                v.description,
-                *(number(factors[v.name].value) for factors in sides.values()),
-                first[v.name].use,
-            )
+            (v.description, *(number(factors[v.name].value) for factors in sides.values()), first[v.name].use)
         )
         for v in Layout(OverloadFactors).variables
     )

@@ -12,16 +12,7 @@ from ...study.event_torques import running_peak, running_words
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
 from ...study.starts import transient_words
-from .protection import (
-    MARGIN,
-    Alternative,
-    CouplingEffect,
-    Obstacle,
-    Setting,
-    Way,
-    WayNumbers,
-    spares,
-)
+from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
 
 
 def _torque(value: float) -> str:

@@ -265,10 +265,7 @@ _GEAR_TOO_WEAK = warning(
     "gear-too-weak",
     "The gear {gear} permits {limit} in running and {start} in a start or an overload. {case} puts {torque} on it.",
     remedy="A gear that permits {rated} in running carries it ({way}).",
-    limit="N.m",
-    start="N.m",
-    torque="N.m",
-    rated="N.m",
+    sizes={"N.m": "limit start torque rated"},
 )
 
 

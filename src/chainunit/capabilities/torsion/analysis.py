@@ -79,22 +79,20 @@ _LEFT_OUT = note(
     "The line's shaft turns at {speed}, far below its natural frequency of {k_least}. No order of the joints comes "
     "near it, and the analysis in rotation is left out.",
     remedy="A table [torsion] asks for it.",
-    speed=("rad/s", "speed"),
-    k_least=("rad/s", "frequency"),
+    sizes={("rad/s", "speed"): "speed", ("rad/s", "frequency"): "k_least"},
 )
 _OTHER_MOTOR = note(
     "torque-of-the-motor",
     "In steady running the torque of shaft 2 peaks at {run}, in the analysis of the line in rotation at {peak}. The "
     "analysis assumes a motor of constant torque. In the run speed control, slip and the uneven load of the machine "
     "act on the torsion, too.",
-    run=_TORQUE,
-    peak=_TORQUE,
+    sizes={_TORQUE: "run peak"},
 )
 _NO_MOTION = fault(
     "no-steady-motion",
     "No steady motion found at {speed}. Either none has the period of half a turn, or the search did not find it.",
     remedy="More damping or less bend helps in both cases.",
-    speed=_SPEED,
+    sizes={_SPEED: "speed"},
 )
 _ORDER = warning(
     "order-near-line",
@@ -102,67 +100,54 @@ _ORDER = warning(
     "of torsion. This is {low} to {high} over the turns of shaft and machine, and permitted is {margin}. The order "
     "moves shaft 3 by {amplitude}.",
     remedy="Change the speed or the shafts.",
-    speed=_SPEED,
-    near=_SHARE,
-    low=_SPEED,
-    high=_SPEED,
-    margin=_SHARE,
-    amplitude="rad",
+    sizes={_SPEED: "speed low high", _SHARE: "near margin", "rad": "amplitude"},
 )
 _PEAK = warning(
     "peak-of-a-shaft",
     "With a motor of constant torque shaft {shaft} carries {peak} at {speed}, {times} times the torque of the load "
     "alone. Permitted is {factor}. The runs of this study show the torque with this motor.",
-    peak=_TORQUE,
-    speed=_SPEED,
-    times="1",
+    sizes={_TORQUE: "peak", _SPEED: "speed", "1": "times"},
 )
 _SIGN = warning(
     "torque-changes-sign",
     "With a motor of constant torque the torque of shaft 2 falls to {least} in each half turn. With play in splines "
     "and joints, which is not modelled, the shaft hammers.",
-    least=_TORQUE,
+    sizes={_TORQUE: "least"},
 )
 _UNSTABLE = fault(
     "unstable-running",
     "Running at {speed} is unstable, as a torsional vibration grows e-fold in {time}.",
-    speed=_SPEED,
-    time="s",
+    sizes={_SPEED: "speed", "s": "time"},
 )
 _DRIFTING = warning(
     "drifting-speed",
     "A motor whose torque does not fall with speed would not hold {speed}, as deviations grow by {growth}. Above a "
     "resonance faster running takes less torque.",
     remedy="Its control or its slip must outweigh that.",
-    speed=_SPEED,
-    growth="1/s",
+    sizes={_SPEED: "speed", "1/s": "growth"},
 )
 _UNSTABLE_RANGE = warning(
     "unstable-range",
     "Unstable from {low} to {high} at the damping ratio {damping}. Torsional vibration grows by itself (parametric "
     "resonance).",
     remedy="More damping or more even joints end it.",
-    low=_SPEED,
-    high=_SPEED,
-    damping="1",
+    sizes={_SPEED: "low high", "1": "damping"},
 )
 _NO_MOTION_RANGE = warning(
     "range-without-steady-motion",
     "No steady motion found from {low} to {high}. Either none has the period of half a turn, or the search did not "
     "find it.",
-    low=_SPEED,
-    high=_SPEED,
+    sizes={_SPEED: "low high"},
 )
 _DRIFTING_RANGE = note(
     "drifting-range",
     "Only a speed control or slip holds a speed from {low} to {high}, not a motor of constant torque.",
-    low=_SPEED,
-    high=_SPEED,
+    sizes={_SPEED: "low high"},
 )
 _GAINS = note(
     "natural-frequency",
     "Changes that raise the natural frequency, per 1 %: {changes}.",
-    **dict.fromkeys(("J1", "J4", "c2", "c3"), _SHARE),
+    sizes={_SHARE: "J1 J4 c2 c3"},
 )
 _UNDAMPED = note(
     "undamped-resonance",
@@ -174,14 +159,13 @@ _NO_SIMULATION = note(
     "no-time-simulation",
     "Transients take too long for a time simulation (damping ratio {damping}). The resonance curve has only the "
     "steady motion.",
-    damping="1",
+    sizes={"1": "damping"},
 )
 _SPEED_LOST = note(
     "speed-lost",
     "The slow control of the time simulation lost the speed at {count} of {asked} speeds, {low} to {high}. They are "
     "not drawn.",
-    low=_SPEED,
-    high=_SPEED,
+    sizes={_SPEED: "low high"},
 )
 _RUN_UP = note(
     "run-up",

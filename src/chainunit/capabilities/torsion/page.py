@@ -80,16 +80,14 @@ def _ranges(analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
     frequency, motion = x.natural_frequency, x.operation.motion
     yield "ratio i23, over a turn of the shaft", *ends(x.ratio_ends.least, x.ratio_ends.largest, 5)
     yield "natural frequency, over a turn of the shaft", *ends(frequency.least, frequency.largest, 5)
-    yield f"natural frequency, {_OVER_BOTH}", *ends(*frequency.over_both_turns, digits=5)
+    low, high = frequency.over_both_turns
+    yield f"natural frequency, {_OVER_BOTH}", *ends(low, high, 5)
     for n in ORDERS:
         if analysis.excitation[n]:
             title = f"speed at which order {n} meets the natural frequency, {_OVER_BOTH}"
             yield title, *ends(*x.crossing_speeds[f"speed = k/{n}"])
     if analysis.operating.exists[0]:
-        for shaft, least, largest in (
-            (2, motion.least2, motion.peak2),
-            (3, motion.least3, motion.peak3),
-        ):
+        for shaft, least, largest in ((2, motion.least2, motion.peak2), (3, motion.least3, motion.peak3)):
             yield f"torque of shaft {shaft} in normal running", *ends(least[0], largest[0])
     for low, high in x.resonance.unstable:
         yield "speed at which the line is unstable", *ends(low, high)

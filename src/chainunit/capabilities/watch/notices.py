@@ -101,14 +101,13 @@ _ALARMS = warning(
     "observer-alarms-in-normal-running",
     "The load observer raises an alarm in normal running, where it estimates an imbalance of the feed of "
     "{imbalance} (threshold {threshold}). Its alarms in the events tell nothing.",
-    imbalance="kg",
-    threshold="kg",
+    sizes={"kg": "imbalance threshold"},
 )
 _IN_START = note(
     "observer-in-the-start",
     "The load observer raises an alarm in the start, at t = {time}.",
     remedy="Hold its alarms back until running is steady.",
-    time="s",
+    sizes={"s": "time"},
 )
 _WRONG_SIDE = warning(
     "observer-names-the-wrong-side", "The load observer first names the side that is not loaded: {where}."
@@ -119,9 +118,9 @@ _BARS = (
     "The crank turns at {share} times the lowest resonance of the chains.",
     "Up to {good} times it tells a fifth of the feed from the motion of the chains.",
 )
-_UNITS = {"error": "kg", "share": "1", "good": "1"}
-_NEAR_RESONANCE = warning("observer-near-resonance", *_BARS, **_UNITS)
-_TWO_BARS = note("observer-of-two-bars", *_BARS, **_UNITS)
+_SIZES = {"kg": "error", "1": "share good"}
+_NEAR_RESONANCE = warning("observer-near-resonance", *_BARS, sizes=_SIZES)
+_TWO_BARS = note("observer-of-two-bars", *_BARS, sizes=_SIZES)
 
 
 class ObserverAnalysis(Analysis):

@@ -152,22 +152,23 @@ _CONTROL = warning(
     "against a standing motor. Its margins are those of a rigid drive and do not hold here. A run shows the effect "
     "of lower gains on the peaks, as the control also damps the torsion.",
     remedy="A stiffer line or lower gains separate the two.",
-    crossover="rad/s",
-    antiresonance="rad/s",
-    k_least=("rad/s", "frequency", 3, "least natural frequency of the line over a turn"),
-    k_largest=("rad/s", "frequency", 3, "largest natural frequency of the line over a turn"),
+    sizes={
+        "rad/s": "crossover antiresonance",
+        ("rad/s", "frequency", 3, "least natural frequency of the line over a turn"): "k_least",
+        ("rad/s", "frequency", 3, "largest natural frequency of the line over a turn"): "k_largest",
+    },
 )
 _JOINTS = (
     "The joints turn unevenly, as shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23).",
     "This varies by {unevenness} twice a turn.",
 )
-_RATIOS = {"least": ("1", "", 5), "largest": ("1", "", 5), "unevenness": ("1", "percent")}
-_UNEVEN = warning("uneven-joints", *_JOINTS, remedy="{way}.", **_RATIOS)
-_UNEVEN_ALONE = note("uneven-joints-of-a-slow-line", *_JOINTS, remedy="{way}.", **_RATIOS)
+_RATIOS = {("1", "", 5): "least largest", ("1", "percent"): "unevenness"}
+_UNEVEN = warning("uneven-joints", *_JOINTS, remedy="{way}.", sizes=_RATIOS)
+_UNEVEN_ALONE = note("uneven-joints-of-a-slow-line", *_JOINTS, remedy="{way}.", sizes=_RATIOS)
 _AMPLIFIED = warning(
     "amplification",
     "{title}: the line's torque peaks at {amplification} times that of a rigid drive.",
-    amplification="1",
+    sizes={"1": "amplification"},
 )
 _NOT_RIGID = warning(
     "no-rigid-line",
@@ -175,9 +176,11 @@ _NOT_RIGID = warning(
     "{least} times (VDI 2149) a rigid model of the drive does not hold. The runs have the elastic line, and it is "
     "rigid in {taken}.",
     remedy="Stiffer shafts or a slower {driver} raise the ratio.",
-    ratio="1",
-    natural_frequency=("rad/s", "frequency", 3, "lowest natural frequency of the line"),
-    driver_frequency=("rad/s", "frequency", 3, "frequency of the {driver}'s turns"),
+    sizes={
+        "1": "ratio",
+        ("rad/s", "frequency", 3, "lowest natural frequency of the line"): "natural_frequency",
+        ("rad/s", "frequency", 3, "frequency of the {driver}'s turns"): "driver_frequency",
+    },
 )
 
 
