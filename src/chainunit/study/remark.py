@@ -112,8 +112,8 @@ def _declare(
     remedy: str = "",
     sizes: Mapping[str | tuple[str | int, ...], str] = MappingProxyType({}),
 ) -> RemarkCode:
-    """Declare a remark; `sizes` has the names of its numbers, with blanks between them, by their unit or by the values
-    of a `Size`."""
+    """Declare a remark; `sizes` has the names of its numbers, with blanks between them, by their unit or by the
+    values of a `Size`."""
     by_name = {
         name: Size(*((size,) if isinstance(size, str) else size))  # type: ignore[arg-type]
         for size, names in sizes.items()

@@ -298,11 +298,9 @@ def test_the_line_of_the_relay_tells_of_the_tolerance_of_the_current(trip_class,
     study = SimpleNamespace(drive=drive, relay_class=trip_class, findings={"starts": found})
 
     def line():
-        none = {"trip_torque": entry(None, "N.m")}
-        protection = none | as_data(_relay_of(study, 8.04), titled=True)
-        (line,) = map(terminal.plain_line, _relay(blocks.Source({"sizing": {"protection": protection}})))
-        assert protection["relay_class"]["value"] == f"class {trip_class}"
-        return line
+        protection = _relay_of(study, 8.04)
+        assert protection.relay_class["value"] == f"class {trip_class}"
+        return terminal.plain_line(_relay(protection, cited(protection)))
 
     assert line() == f"relay at 8.04 A, class {trip_class}" if words is None else line().endswith(f"{words})")
     # a start that fails is no start of a motor with more current
