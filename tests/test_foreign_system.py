@@ -563,7 +563,7 @@ def test_a_motor_that_saves_no_state_runs_each_event_from_rest(folder, tmp_path)
     for name, rows in saving.runs.items():
         assert study.runs[name].drop_attrs().equals(rows.drop_attrs())
     (note,) = [note for note in study.notes if note.code == "state-not-saved"]
-    assert note.runs == ("jam_left", "blocked") and "each event was run from rest" in note.text
+    assert note.runs == ("jam_left", "blocked") and "Each event was run from rest" in note.text
     assert not [note for note in saving.notes if note.code == "state-not-saved"]
 
 

@@ -466,7 +466,7 @@ def test_a_study_tells_that_the_class_of_its_motor_is_not_checked(name, poles, w
         plate=motor,
         drive=SimpleNamespace(foreign=None),
         config=SimpleNamespace(plans={"energy": None}),
-        note=lambda kind, text: notes.append(text),
+        say=lambda code, **values: notes.append(code.remark(**values).text),
     )
     found = MotorClassAnalysis.find(study, None)
     if not words:

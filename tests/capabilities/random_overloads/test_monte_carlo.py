@@ -427,10 +427,10 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
     random = SimpleNamespace(quantiles=quantiles, shortage="", damaged_batches=1, file_name="runs.nc")
     notes = {}
-    study = SimpleNamespace(drive=drive, note=lambda kind, words, **of: notes.update({kind: of}))
+    study = SimpleNamespace(drive=drive, say=lambda code, **values: notes.update({code.code: values}))
     monte_carlo.MonteCarloResult.remark(random, study)
     at = notes.get("random-overloads-at-current-limit")
-    assert at == ({"limit": (4.4, "A")} if told else None)
+    assert at == ({"limit": 4.4} if told else None)
     words = "1 batch of runs in runs.nc was damaged, and was computed anew"
     assert notes["runs-made-anew"] == {"text": words}
 
