@@ -16,6 +16,7 @@ import xarray as xr
 
 import chainunit
 from chainunit.reading.text import number
+from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.second
 
@@ -184,7 +185,7 @@ def result(house):
     assert files_of(house, lambda: house.insert("report/figures.py", "", FIGURE)) == 1
     (house.folder / "mine.toml").write_text(STUDY, "utf-8")
     house.run("study", "mine.toml", "-o", "mine")
-    return json.loads((house.folder / "mine" / "result.json").read_text("utf-8"))
+    return ResultEntries(json.loads((house.folder / "mine" / "result.json").read_text("utf-8")))
 
 
 def test_a_machine_is_a_file_and_has_fmu_and_study(house, result):
@@ -253,7 +254,7 @@ def test_a_part_of_the_line_is_a_file_and_a_line(house):
     assert files_of(house, part) == 2
     (house.folder / "line.toml").write_text(LINE, "utf-8")
     house.run("study", "line.toml", "-o", "line")
-    result = json.loads((house.folder / "line" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((house.folder / "line" / "result.json").read_text("utf-8")))
     assert result["status"] == "complete" and result["planetary"]["backlash"]["value"] == pytest.approx(
         np.pi / 180
     )
@@ -300,7 +301,7 @@ def test_a_capability_is_a_folder_and_a_line(house):
     schema = json.loads((house.folder / "chainunit.schema.json").read_text("utf-8"))
     assert set(schema["properties"]["pin_life"]["properties"]) == {"pin", "C", "p", "wanted"}
     house.run("study", "life.toml", "-o", "life")
-    result = json.loads((house.folder / "life" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((house.folder / "life" / "result.json").read_text("utf-8")))
     assert result["status"] == "complete"
 
     # the rocker swings about C by its angle, which the run has

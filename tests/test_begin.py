@@ -17,6 +17,7 @@ from chainunit.study.judgement import motor_verdict
 from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.measures import STARTED
 from chainunit.study.run import run_study
+from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.slow
 
@@ -57,7 +58,7 @@ def done(tmp_path_factory):
     study = run_study(parse(DIP + LINE), folder)
     assert study.failure is None
     write(study, folder)
-    return study, folder, json.loads((folder / "result.json").read_text())
+    return study, folder, ResultEntries(json.loads((folder / "result.json").read_text()))
 
 
 def test_the_feed_comes_once_the_crank_turns_behind_its_line(done):

@@ -29,6 +29,7 @@ from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_up import start_up
+from chainunit.study.stored_result import ResultEntries
 from chainunit.study.transients import follow, lead_times, longest_lead
 from chainunit.system import Profile
 
@@ -362,7 +363,7 @@ def test_a_new_type_of_event_is_one_class(swell, tmp_path):
     (tmp_path / "swell.toml").write_text(f"{QUICK}{text}")
     process = chainunit("study", "swell.toml", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
-    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     assert numbers["event"]["swell_right"]["added"] == {"value": 45.0, "unit": "kg"}
     steady, swelld = (numbers["answers"][name] for name in ("steady", "swell_right"))
     assert swelld["crank_torque_peak"]["value"] > 1.02 * steady["crank_torque_peak"]["value"]

@@ -36,6 +36,7 @@ from chainunit.study.package import study_system
 from chainunit.study.readings import crank_torque
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
+from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation, Profile, certify
 
 pytestmark = pytest.mark.slow
@@ -271,7 +272,7 @@ def test_a_study_file_with_our_motor(folder):
     (folder / "pump.toml").write_text(text)
     process = chainunit("study", "pump.toml", "-o", "out", cwd=folder)
     assert process.returncode == 0, process.stderr
-    result = json.loads((folder / "out" / "result.json").read_text())
+    result = ResultEntries(json.loads((folder / "out" / "result.json").read_text()))
     assert result["status"] == "complete" and result["machine"]["piston.mass"]["value"] == MASS
     assert result["answers"]["steady"]["speed_mean"]["value"] == pytest.approx(SPEED, rel=1e-2)
     # the gains are tuned to the inertia that the FMU shows over a turn

@@ -26,6 +26,7 @@ from chainunit.study.choice import choose, drive_of
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.readings import crank_motion, crank_torque, largest_torque, pull_out_torque
+from chainunit.study.stored_result import ResultEntries
 from chainunit.system import (
     CoSimulation,
     ModelExchange,
@@ -379,7 +380,8 @@ def folder(tmp_path_factory):
 def test_a_study_with_a_motor_of_somebody_else(folder):
     """Its answers are those of our motor of the same parameters; what only that tells is null, shown as a dash."""
     foreign, own = (
-        json.loads((folder.parent / name / "result.json").read_text()) for name in ("foreign", "own")
+        ResultEntries(json.loads((folder.parent / name / "result.json").read_text()))
+        for name in ("foreign", "own")
     )
     assert foreign["status"] == own["status"] == "complete"
     assert set(foreign["answers"]) == set(own["answers"]) == {"steady", "jam_left"}

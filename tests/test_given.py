@@ -30,6 +30,7 @@ from chainunit.study.origins import origin_of
 from chainunit.study.parts import example
 from chainunit.study.remarks import conclude
 from chainunit.study.result import as_dict
+from chainunit.study.stored_result import ResultEntries
 
 KNIFE = example("knife")
 
@@ -259,7 +260,7 @@ NOT_OF_A_FILE = (
 )
 def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
     study = study_of(parse(text), tmp_path)
-    again = parse(toml_of(json.loads(json.dumps(as_dict(study)))))
+    again = parse(toml_of(ResultEntries(json.loads(json.dumps(as_dict(study))))))
     for each in dataclasses.fields(again):
         if each.name not in ("file", "machine", "events", "plans"):
             assert getattr(again, each.name) == getattr(study.config, each.name), each.name

@@ -39,6 +39,7 @@ from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_up import start_up
 from chainunit.study.stored import cutting_power
+from chainunit.study.stored_result import ResultEntries
 from chainunit.study.turn import TurnAnalysis
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic
@@ -288,7 +289,7 @@ def test_the_files_of_the_study(done, tmp_path):
     names = {file.name for file in written}
     assert {"turn.png", "blade_path.png", "flywheel.png", "torque_angle.png", "result.nc"} <= names
     assert all(file.stat().st_size > 1000 for file in written)
-    numbers = json.loads((tmp_path / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     for entries, wheel in zip(
         numbers["flywheels"]["compared"], study.findings["flywheels"].wheels, strict=True
     ):

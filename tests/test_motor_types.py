@@ -13,6 +13,7 @@ from systems import pair
 from chainunit.drives.motors import MOTORS
 from chainunit.study import config, run
 from chainunit.study.result import as_dict
+from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation, Profile, export, monolithic
 
 STUDY = """
@@ -60,7 +61,7 @@ def test_a_study_names_it(registered, tmp_path):
     kinds = {remark.code for remark in study.warnings}
     reaches_limit = any(answers.current_peak > 0.999 * 3.0 for answers in study.answers.values())
     assert ("current-limit" in kinds) == reaches_limit
-    result = json.loads(json.dumps(as_dict(study)))
+    result = ResultEntries(json.loads(json.dumps(as_dict(study))))
     assert result["motor"]["kind"] == "ServoMotor" and result["speed_loop"] == {}
     assert result["control"]["crossover"]["value"] == 20.0
     page = page_of(study)

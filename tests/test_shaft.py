@@ -28,6 +28,7 @@ from chainunit.study.package import export_study, start_of
 from chainunit.study.readings import crank_torque
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
+from chainunit.study.stored_result import ResultEntries
 
 JAM, BLOCKED = (event_line(name, turns=1) for name in ("jam_left", "blocked"))
 SHORT = f"""
@@ -224,16 +225,16 @@ def test_the_report_shows_it(study, tmp_path):
     assert (tmp_path / "driveline.png") in write(study, tmp_path)
     text = (tmp_path / "report.html").read_text("utf-8")
     reader = Reader(text)
-    check_traced(reader, json.loads((tmp_path / "result.json").read_text()))
+    check_traced(reader, ResultEntries(json.loads((tmp_path / "result.json").read_text())))
     paths = {n["data-path"] for n in reader.numbers}
     assert {
-        "shaft.jam_left.amplification",
-        "driveline.k_least",
-        "driveline.alpha1",
-        "driveline.exponent",
-        "rigid_line.natural_frequency",
-        "rigid_line.driver_frequency",
-        "rigid_line.ratio",
+        "findings.shaft.jam_left.amplification",
+        "findings.driveline.k_least",
+        "given.driveline.alpha1",
+        "given.driveline.exponent",
+        "findings.rigid_line.natural_frequency",
+        "findings.rigid_line.driver_frequency",
+        "findings.rigid_line.ratio",
     } <= paths
     assert "with a rigid shaft" in text
     assert as_dict(study)["torque_cycles"]["jam_left"]

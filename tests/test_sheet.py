@@ -111,7 +111,7 @@ def test_it_says_up_to_which_speed_it_holds(study, made):
     limits = {
         each.topic: each.speed for each in limits_of_organs(study.drive.machine, study.config.feed, ["N.m"])
     }
-    shown = dict(re.findall(r'data-path="organs.limits.(\w+)" value="([^"]+)"', text))
+    shown = dict(re.findall(r'data-path="findings.organs.limits.(\w+)" value="([^"]+)"', text))
     assert float(shown["crank_torque_speed"]) == limits["crank torque"]
     assert float(shown["rocker_torque_speed"]) == limits["rocker torque"] < limits["crank torque"]
     assert float(shown["slack_speed"]) == limits["slack speed"]
@@ -168,7 +168,7 @@ def test_numbers_of_the_sheet_are_those_of_the_result(study, made):
     result = json.loads(json.dumps(study_report.report(study).result))
     text = pdf.page_text(made, {})
     peak = result["answers"]["jam_left"]["crank_torque_peak"]["value"]
-    shown = re.findall(r'data-path="answers.jam_left.crank_torque_peak" value="([^"]+)"', text)
+    shown = re.findall(r'data-path="runs.answers.jam_left.crank_torque_peak" value="([^"]+)"', text)
     assert shown and all(float(each) == peak for each in shown)
 
 

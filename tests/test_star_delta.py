@@ -20,6 +20,7 @@ from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_runs import start_from
 from chainunit.study.start_up import start_up
+from chainunit.study.stored_result import ResultEntries
 from chainunit.study.transients import follow
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, ModelExchange, monolithic
@@ -221,7 +222,7 @@ def test_a_study_tells_of_both(tmp_path):
     study = run_study(parse(STUDY), tmp_path)
     assert study.failure is None
     write(study, tmp_path)
-    result = json.loads((tmp_path / "result.json").read_text())
+    result = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     assert result["start"] == "star-delta" and "interruption" in result["answers"]
     certificate = result["certificate"]["interruption"]["energy_residual_share"]["value"]
     assert certificate < 1e-4
@@ -240,7 +241,7 @@ def test_sizing_with_a_star_delta_starter(tmp_path):
     study = run_study(parse(head + STARTER), tmp_path)
     write(study, tmp_path)
     assert study.failure is None
-    result = json.loads((tmp_path / "result.json").read_text())
+    result = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     best = result["sizing"]["candidates"][0]
     assert best["checks"]["start"]["value"]["value"] > 0.0
     assert "star-delta starter, 0.5 s in star" in " ".join((tmp_path / "result.md").read_text().split())

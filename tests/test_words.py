@@ -22,6 +22,7 @@ from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
+from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.second
 
@@ -122,7 +123,7 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
     assert "accelerator torque, peak" in text
     assert "the accelerator at " in study_words(study)
     # its inertia is constant: one row of the speed loop
-    loops = json.loads(json.dumps(as_dict(study)["speed_loop"]))
+    loops = ResultEntries(json.loads(json.dumps(as_dict(study)["speed_loop"])))
     assert len(loops) == 1
     table = said_of(study).partition("The linearised speed loop")[2]
     assert "constant inertia" in table and "least inertia" not in table

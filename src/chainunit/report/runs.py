@@ -133,7 +133,7 @@ def _largest_pin(study: StudyRecord) -> b.Text:
 def _peak(study: StudyRecord, pin: str) -> Number:
     """The largest force in a pin of all runs."""
     run = hardest_run(study.pins, pin)
-    return Number(study.pins[run][pin]["peak"], "N", path=f"pins.{run}.{pin}.peak")
+    return Number(study.pins[run][pin]["peak"], "N", path=f"runs.pins.{run}.{pin}.peak")
 
 
 def _pins(study: StudyRecord) -> b.Table:
@@ -143,7 +143,7 @@ def _pins(study: StudyRecord) -> b.Table:
 
     def row(pin: str) -> b.TableRow:
         worst = hardest_run(study.pins, pin)
-        own = (Number(tables[pin][size], "N", path=f"pins.{reference}.{pin}.{size}") for size in sizes)
+        own = (Number(tables[pin][size], "N", path=f"runs.pins.{reference}.{pin}.{size}") for size in sizes)
         return b.TableRow(
             (pin, *own, _peak(study, pin), study.title_of(worst), run_names.short(study, worst))
         )
@@ -168,5 +168,5 @@ def _pins(study: StudyRecord) -> b.Table:
 def number(s: b.Source, study: StudyRecord, run: str, name: str) -> Number:
     """The answer `name` of a run."""
     back = name == "recovery_time" and run != "steady" and study.returns
-    answers = cited(study.answers[run], f"answers.{run}")
+    answers = cited(study.answers[run], f"runs.answers.{run}")
     return cited_number(getattr(answers, name), none="not reached" if back else "-")

@@ -49,7 +49,7 @@ def _rigid(s: b.Source) -> b.Judgement:
 
 def _shaft(study: StudyRecord) -> b.Table:
     """The table of the demands of each run on the driveline."""
-    answers = cited(shaft_findings(study), "shaft").answers
+    answers = cited(shaft_findings(study), "findings.shaft").answers
     runs = by_side(study, answers)
     rows = (
         b.TableRow((v.description, *(number(getattr(answers[run], v.name)) for run in runs)))

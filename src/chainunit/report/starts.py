@@ -26,7 +26,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield b.Text(s.line(worst + transient, running=running))
     at_gear = "torque at the gear" if study.drive.is_geared else f"torque at the {study.driver_noun}"
     yield from table(
-        cited(findings, "starts").starts,
+        cited(findings, "findings.starts").starts,
         (f"{study.driver_noun} angle", lambda start: number(start.angle)),
         (at_gear, lambda start: number(start.quasi_static, none="not reached")),
         ("with the transient", lambda start: number(start.gear_torque, none="not reached")),

@@ -44,7 +44,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     )
     if turn.pins:
         yield from table(
-            cited(turn, "constant_speed").pins.items(),
+            cited(turn, "findings.constant_speed").pins.items(),
             ("pin", lambda row: row[0]),
             ("peak, with feed", lambda row: number(row[1].peak)),
             ("at", lambda row: number(row[1].angle)),

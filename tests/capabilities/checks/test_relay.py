@@ -26,6 +26,7 @@ from chainunit.study.relay import (
     stall_trip,
     start_seconds,
 )
+from chainunit.study.stored_result import ResultEntries
 from chainunit.study.window import Phase, Window
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
@@ -161,7 +162,7 @@ def done(tmp_path_factory):
 
 @pytest.mark.second
 def test_the_numbers_of_a_study_follow_from_its_run(done):
-    result = json.loads((done / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((done / "result.json").read_text("utf-8")))
     found = result["checks"]["relay"]
     plate = 750.0 / (0.825 * 0.75 * math.sqrt(3.0) * 400.0)
     assert found["setting"]["value"] == pytest.approx(plate, rel=1e-9)

@@ -13,7 +13,7 @@ from chainunit.reading.text import number as shown
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.study.stored_result import read_result
+from chainunit.study.stored_result import ResultEntries, read_result
 
 STUDY = """
 title = "{title}"
@@ -53,7 +53,7 @@ def folder(tmp_path_factory):
 
 
 def numbers(folder, name):
-    return json.loads((folder / name / "result.json").read_text())
+    return ResultEntries(json.loads((folder / name / "result.json").read_text()))
 
 
 def rows_of(folder, title):
@@ -201,7 +201,7 @@ def test_a_result_beside_itself_differs_in_nothing(folder, tmp_path):
 
 
 def test_numbers_have_the_noun_of_a_common_driver(folder, tmp_path):
-    one, other = (json.loads((folder / "a" / "result.json").read_text()) for _ in range(2))
+    one, other = (ResultEntries(json.loads((folder / "a" / "result.json").read_text())) for _ in range(2))
     one["driver"] = other["driver"] = "eccentric"
     for driver, noun in (("eccentric", "eccentric"), ("crank", "driver")):
         other["driver"] = driver

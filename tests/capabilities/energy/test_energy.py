@@ -32,6 +32,7 @@ from chainunit.drives.catalogue import catalogue
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
+from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CompiledSimulation, Profile
 
 STUDY = """
@@ -321,7 +322,7 @@ def test_the_reports_have_the_numbers_of_the_result(tmp_path, monkeypatch, capsy
         cli.main()
     assert ended.value.code == 0
     out = tmp_path / "out"
-    energy = json.loads((out / "result.json").read_text("utf-8"))["energy"]
+    energy = ResultEntries(json.loads((out / "result.json").read_text("utf-8")))["energy"]
     assert energy["own"]["energy"]["unit"] == "J" and energy["own"]["energy"]["kind"] == "energy"
     assert set(energy["loads"]) == set(SHARES)
     page, words, said = (

@@ -42,6 +42,7 @@ from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
 from chainunit.study.rig import Rig
+from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation, monolithic
 from chainunit.work.job import CHECKS
 
@@ -441,7 +442,7 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
     (tmp_path / "study.toml").write_text("event = []\n" + STUDY.format(runs=6))
     process = chainunit("study", "study.toml", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
-    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     quantiles_of = result["monte_carlo"]["quantiles"]
     opens = shown(quantiles_of["trips"]["share"]["value"], "1", "percent")
     assert quantiles_of["trips"]["share"]["value"] > 0.0

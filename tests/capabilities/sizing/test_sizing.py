@@ -40,6 +40,7 @@ from chainunit.study.events import one_sided_event
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
+from chainunit.study.stored_result import ResultEntries
 from chainunit.study.verdict import SETTLING
 from chainunit.system import CompiledSimulation, CoSimulation, Profile, System
 
@@ -424,7 +425,7 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
     assert message.exit_code == 1, message.output
     assert "No motor of the catalogue fits (2 of 2 were tried)" in message.output
     assert "the motor is insufficient" in message.output and "Order: " not in message.output
-    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     assert set(numbers["answers"]) == {"steady", "feed_right"} and numbers["status"] == "complete"
     nearest = numbers["sizing"]["candidates"][numbers["sizing"]["nearest"]]
     assert numbers["sizing"]["chosen"] is None and nearest["verdict"] == "insufficient"

@@ -41,6 +41,7 @@ from chainunit.study.line import shaft_runs
 from chainunit.study.line.placed import Line
 from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.rig import Rig
+from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation
 
 SYSTEM = '[system]\nmachine = "Accelerator"\n'
@@ -700,7 +701,7 @@ def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
     )
     for name in PICTURES:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
-    numbers = json.loads((folder / "result.json").read_text())
+    numbers = ResultEntries(json.loads((folder / "result.json").read_text()))
     torsion = numbers["torsion"]
     assert torsion["natural_frequency"]["even"] == {
         "value": pytest.approx(260.98, abs=0.01),

@@ -57,7 +57,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if not chain["avoid"] and len(chain["sweep"]) > 1:
         ends = f"{{chain.sweep.0.speed}} to {{chain.sweep.{len(chain['sweep']) - 1}.speed}}"
         yield b.Text(s.line(f"No speed to avoid from {ends}."), "fine")
-    x = cited(ChainResult.of_study(study), "chain")
+    x = cited(ChainResult.of_study(study), "findings.chain")
     yield _own_speed(s, x)
     slack = {
         side: join(

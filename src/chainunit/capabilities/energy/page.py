@@ -74,7 +74,7 @@ def _places(s: b.Source, findings: EnergyFindings, titles: Mapping[str, str]) ->
 
 
 def _year(s: b.Source, findings: EnergyFindings) -> b.Table:
-    x = cited(findings, "energy")
+    x = cited(findings, "findings.energy")
     motors = list(filter(None, (findings.own, findings.other)))
     shown = list(filter(None, (x.own, x.other)))
     rows = [

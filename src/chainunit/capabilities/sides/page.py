@@ -27,7 +27,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _factors(s: b.Source, study: StudyRecord) -> b.Table:
-    sides = cited(OrganFindings.of_study(study), "organs").overload_factors
+    sides = cited(OrganFindings.of_study(study), "findings.organs").overload_factors
     by = f", of {words}" if (words := study.drive.machine.in_place) else ""
     title = s.line("Overload factor, one side against both, at {=run.crank_speed:4}" + by)
     first = next(iter(sides.values()))

@@ -33,8 +33,8 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     findings = SizingFindings.found_in(study)
     if findings is None:
         return
-    drive, x = findings.sized(study), cited(findings, "sizing")
-    sized, best = cited(drive, "sizing"), x.candidates[0]
+    drive, x = findings.sized(study), cited(findings, "findings.sizing")
+    sized, best = cited(drive, "findings.sizing"), x.candidates[0]
     gear = (_gear(findings.best, best), *_belt(sized.belt), *_gear_torque(sized))
     ratio = number(best.ratio, 4, as_given=True)
     cards = [
@@ -123,7 +123,7 @@ def judgements(study: StudyRecord) -> Iterator[b.Block]:
     """The alarm where no motor fits."""
     findings = SizingFindings.found_in(study)
     if findings is not None and findings.nearest is not None:
-        best = cited(findings, "sizing").candidates[0]
+        best = cited(findings, "findings.sizing").candidates[0]
         rest = line(" All runs are with ", best.designation, ", which is insufficient: ", best.reason, ".")
         yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), rest), form="long")
 
@@ -214,8 +214,8 @@ def _relay(relay: MotorProtection, x: MotorProtection) -> Line:
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The choice, the candidates with the share that each takes of the limits, and the demands on the drive."""
     findings = SizingFindings.of_study(study)
-    drive, x = findings.sized(study), cited(findings, "sizing")
-    sized = cited(drive, "sizing")
+    drive, x = findings.sized(study), cited(findings, "findings.sizing")
+    sized = cited(drive, "findings.sizing")
     if findings.chosen is None:
         reasons = (line(Strong(each.designation), ": ", each.reason) for each in x.candidates[:_REASONS])
         words = Strong("No candidate fits. The reasons:")

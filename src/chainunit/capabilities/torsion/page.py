@@ -48,7 +48,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 def _numbers(analysis: LineAnalysis) -> Iterator[tuple[Line, Line]]:
     """Rows with a title and a number."""
-    x = cited(analysis, "torsion")
+    x = cited(analysis, "findings.torsion")
     yield "inertia J1 of the rotor, at the shaft", number(x.line.J1, 4)
     yield "inertia J4 on shaft 3, with the machine's mean", number(x.line.J4, 4)
     yield "speed of the shaft in normal running", number(x.rotation.speed, 4)
@@ -76,7 +76,7 @@ def _ranges(analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
     def ends(least: object, largest: object, digits: int = 4) -> tuple[Line, Line]:
         return number(least, digits), number(largest, digits)
 
-    x = cited(analysis, "torsion")
+    x = cited(analysis, "findings.torsion")
     frequency, motion = x.natural_frequency, x.operation.motion
     yield "ratio i23, over a turn of the shaft", *ends(x.ratio_ends.least, x.ratio_ends.largest, 5)
     yield "natural frequency, over a turn of the shaft", *ends(frequency.least, frequency.largest, 5)
