@@ -79,7 +79,8 @@ FORMS = {"sum": "x * b + c", "division": "div_v(b, x)", "root": "sqrt_v(x)"}
 @cache
 def library(functions: Sequence[str] = ()) -> Any:
     """The compiled loops, with those of these functions of a vector."""
-    forms = FORMS | {name: f"{name}_v(0.1 + 0.1 * x)" for name in functions}
+    more = {"atan2": ", 1.0 + x"}
+    forms = FORMS | {name: f"{name}_v(0.1 + 0.1 * x{more.get(name, '')})" for name in functions}
     loops = [
         LOOP % {"name": f"loop_{name}", "chains": CHAINS, "factor": 0.999, "form": form}
         for name, form in forms.items()

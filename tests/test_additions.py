@@ -227,6 +227,7 @@ def test_a_measure_is_a_field(house, result):
     assert "force in the bearing O3, peak" in (house.folder / "mine" / "report.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_a_figure_is_a_function_and_is_drawn_on_the_page_and_in_print(house, result):
     picture = (house.folder / "mine" / "output_angle.png").read_bytes()
     assert picture.startswith(b"\x89PNG") and len(picture) > 5000
@@ -238,6 +239,7 @@ def test_a_figure_is_a_function_and_is_drawn_on_the_page_and_in_print(house, res
     assert not (house.folder / "mine" / "output_angle.png").exists()
 
 
+@pytest.mark.slow
 def test_a_part_of_the_line_is_a_file_and_a_line(house):
     """A planetary gear with stiffness, damping and backlash has its table, its FMU and its place between motor and
     machine."""
@@ -280,6 +282,7 @@ def test_a_part_of_the_line_is_a_file_and_a_line(house):
     assert "planetary.ratio = 1: must be > 1" in refusal and "sizing does not know its stiffness" in refusal
 
 
+@pytest.mark.slow
 def test_a_capability_is_a_folder_and_a_line(house):
     """The rating life of a pin by a given load rating has its table, its number on the page, its warning, its command
     and its method of `Study`."""

@@ -59,6 +59,7 @@ def test_reference_points(engine):
 
 @pytest.mark.parametrize("name", [name for name, each in MACHINES.items() if each["states"]])
 @NEEDS_COMPILER
+@pytest.mark.second
 def test_reference_linkages(name):
     states = MACHINES[name]["states"]
     values = {key: column(*(state[key] for state in states)) for key in ("phi", "w", "a")}
@@ -82,6 +83,7 @@ def random_values(model, rng, n):
     "name", ["ChamberForces", "DcMotor", "InductionMotor", "CardanDriveline", "KnifeDrive"]
 )
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.second
 def test_every_model_agrees_with_its_own_equations(name, engine):
     """To 1e-12 of the largest value of each output, although the batch may round differently."""
     model, rng, n = MODELS[name], np.random.default_rng(3), 37
@@ -186,6 +188,7 @@ void compute(const double *x, const double *z, double *out, long n) {
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.second
 def test_derivatives_are_exact(engine):
     """Against central differences of the machine, whose error falls with the square of the step."""
     machine = ChainUnitMachine()

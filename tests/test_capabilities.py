@@ -100,7 +100,7 @@ def test_the_types_of_methods_are_those_of_the_list():
     assert made.FILE.read_text("utf-8") == made.text()
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_type_checker_sees_the_methods_and_results_of_capabilities(tmp_path):
     pytest.importorskip("mypy")
     (tmp_path / "user.py").write_text(USER)

@@ -41,6 +41,7 @@ LINE = '[driveline]\nJ4 = 2\nc2 = 6000\nc3 = 6000\nd2 = 15\nd3 = 15\nalpha1 = "5
 @pytest.mark.parametrize(
     ("organ", "more", "trip"), [("chain", CHAIN, 250), ("two-bar", "", 250), ("chain", CHAIN + LINE, 250)]
 )
+@pytest.mark.slow
 def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch):
     """Positions, speeds and energy do not jump as the coupling opens; from then on the loss of energy is its
     dissipation."""

@@ -54,7 +54,7 @@ def test_it_is_the_inverse_of_the_inverse_model(seed):
     assert out.frame.moment == pytest.approx(float(need.frame.moment), rel=1e-9, abs=1e-7)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_energy_is_kept_when_nothing_drives_or_brakes():
     machine = ChainUnitMachine({"pin.friction": 0.0})
     p, u = parameters(machine, w_start=4.0), MODEL.Inputs(tau=0.0, left=EMPTY, right=EMPTY)

@@ -198,7 +198,7 @@ class _Fetched(HTMLParser):
             self.places.append(own.get("src") or "")
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_site_builds_without_a_broken_link_and_fetches_nothing(tmp_path):
     pytest.importorskip("mkdocs")
     pytest.importorskip("material")

@@ -39,6 +39,7 @@ def outputs(text):
         yield out.getvalue()
 
 
+@pytest.mark.slow
 def test_the_page_shows_what_its_lines_print(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text("utf-8")

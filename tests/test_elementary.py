@@ -114,7 +114,7 @@ def test_every_angle_of_a_vector_is_within_one_unit_in_the_last_place(draw):
 
 
 @long_doubles
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_million_arguments_each():
     for name in ONE:
         check_one(name, 1_000_000)

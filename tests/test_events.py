@@ -354,7 +354,7 @@ def swell():
     del TYPES["swell"]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_new_type_of_event_is_one_class(swell, tmp_path):
     """Defined here, it runs by a study file, on the terminal and the page, and as the event of random overloads."""
     from command import chainunit

@@ -41,6 +41,7 @@ def result(tmp_path_factory):
     return run
 
 
+@pytest.mark.slow
 def test_a_motor_is_picked(result):
     numbers, message, folder = result("motor_from_catalogue")
     sizing = numbers["sizing"]
@@ -62,6 +63,7 @@ def test_a_motor_is_picked(result):
     assert (folder / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_none_fits_and_the_reason_is_told(result):
     numbers, message, _ = result("motor_rejected")
     sizing = numbers["sizing"]
@@ -101,6 +103,7 @@ def test_the_beam_pump_gets_four_poles(result):
     assert two["ratio"]["value"] == 375.0 and two["gear"] == "two gear units" and two["criterion"] == "gear"
 
 
+@pytest.mark.slow
 def test_the_jam_trips_the_coupling(result):
     numbers, message, folder = result("jam_trips_coupling")
     jam, feed = numbers["answers"]["jam_left"], numbers["answers"]["feed_left"]
@@ -118,6 +121,7 @@ def test_the_jam_trips_the_coupling(result):
     assert all(reason["topic"] != "energy" for reason in numbers["verdict"]["model"]["reasons"])
 
 
+@pytest.mark.slow
 def test_the_observer_notices_what_the_coupling_does_not(result):
     """The table of docs/identification.md has these numbers."""
     numbers, message, folder = result("observer_beside_coupling")
@@ -142,6 +146,7 @@ def test_the_observer_notices_what_the_coupling_does_not(result):
     assert "Who notices" in message and (folder / "observer.png").exists()
 
 
+@pytest.mark.slow
 def test_a_lump_swings_the_cardan_shaft(result):
     numbers, message, folder = result("jam_with_driveline")
     jam = numbers["shaft"]["jam_left"]
@@ -192,6 +197,7 @@ SCRIPTS = sorted(set(EXAMPLES.glob("*.py")) - {EXAMPLES / "measured_pump.py"})
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+@pytest.mark.second
 def test_the_scripts_run_without_a_warning(script, tmp_path):
     if script.stem in FMUS:
         (tmp_path / "mine.toml").write_text(
@@ -216,6 +222,7 @@ def test_the_scripts_run_without_a_warning(script, tmp_path):
         assert 0.9 < one_crank / crank < 1.0
 
 
+@pytest.mark.slow
 def test_a_motor_that_starts_in_star_is_closed_on_its_field(result):
     numbers, message, _ = result("star_delta")
     answers = numbers["answers"]

@@ -135,6 +135,7 @@ def test_pngs_appear_whole(tmp_path):
 
 
 @posix
+@pytest.mark.slow
 def test_a_full_disk_is_named_and_costs_no_more_than_the_file(tmp_path):
     """No file may grow beyond 300 kB: the series and the page have no room, numbers and plots have."""
     (tmp_path / "short.toml").write_text(SHORT)
@@ -193,6 +194,7 @@ def test_a_disk_that_is_full_from_the_start_is_named(tmp_path):
 
 
 @posix
+@pytest.mark.slow
 def test_sigterm_ends_in_order(tmp_path):
     """What was computed is written, and no folder for temporary files stays behind."""
     scratch = tmp_path / "scratch"

@@ -147,6 +147,7 @@ def test_two_rods_are_the_two_bar_machine():
 
 
 @native
+@pytest.mark.second
 def test_two_rods_run_as_the_two_bar_machine(files):
     """Two turns in co-simulation, loaded, the drive's own pins with friction: the organs and what the rocker carries
     to 1e-8 of their peaks."""
@@ -309,6 +310,7 @@ def test_the_direct_fmu_goes_on_from_where_the_inverse_one_is(tmp_path):
 
 @native
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+@pytest.mark.second
 def test_the_direct_fmu_runs_as_its_equations(kind, tmp_path):
     model, values = flexible(2, 1).direct(), {"w_start": 4.0, "tau": 30.0, "left.material_mass": 40.0}
     file = export_native(model, tmp_path / "turning.fmu", {n: v for n, v in values.items() if n != "tau"})
@@ -330,7 +332,7 @@ def test_the_direct_fmu_runs_as_its_equations(kind, tmp_path):
 # -- start
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_starts_where_it_hangs():
     """300 random machines, feeds and numbers of rods, at any angle: closed, the angles those of the statics by
     another method, and the same without weight."""
@@ -786,6 +788,7 @@ def test_the_tolerance_controls_the_error(files):
 
 
 @native
+@pytest.mark.second
 def test_a_saved_state_goes_on_to_the_bit(files):
     """Also in the middle of a run and on another instance: with the states, the pace of the integrator is saved."""
     fmu = files(6, 2)
@@ -893,6 +896,7 @@ def test_model_exchange(files):
 
 @native
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.second
 def test_events_of_model_exchange_put_the_chain_back_to_its_end(files, tmp_path, fmi):
     """fmpy holds its inputs for a step of CVode: A2 runs ahead of the chain by 7 mm a step, and each event closes
     the gap. An importer that sets them whenever it asks for derivatives drifts by its tolerance alone, and no event
@@ -1028,6 +1032,7 @@ def test_two_rods_stand_where_a_hanging_chain_would_not():
 
 
 @native
+@pytest.mark.second
 def test_the_fmu_refuses_rods_in_their_stop(files):
     with pytest.raises(
         RunError, match=r"largest angle between rods of the left organ at the start = 1\.\d+ rad"

@@ -229,7 +229,7 @@ def test_dependencies_are_true(fmus):
     assert seen == declared
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_same_model_same_file(fmus, tmp_path):
     for name, model in MODELS.items():
         again = export(model, tmp_path / "again.fmu")
@@ -246,11 +246,8 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
 
     printed = module.printed_model
 
-    def doubled(interface):
-        lines = ("_single = values_at_terminals", "def values_at_terminals(*state):")
-        return "\n".join([printed(interface), *lines, "    return [2.0 * y for y in _single(*state)]", ""])
-
-    monkeypatch.setattr(module, "printed_model", doubled)
+    twice = 'OUTPUTS = [f"2.0*{y}" for y in OUTPUTS]'
+    monkeypatch.setattr(module, "printed_model", lambda interface: f"{printed(interface)}\n{twice}\n")
     other = Fmu(export(ChamberForces, tmp_path / "other.fmu"))
     monkeypatch.undo()
     one = Fmu(fmus["ChamberForces"])
@@ -736,31 +733,89 @@ def test_reset(chamber):
         assert unit.get(["r", "tau"]) == pytest.approx([0.14, float(want)], rel=1e-12)
 
 
-def test_other_outputs_than_those_at_terminals_are_evaluated_only_when_asked_for(fmus, tmp_path, monkeypatch):
-    with zipfile.ZipFile(fmus["ChamberForces"]) as archive:
-        archive.extractall(tmp_path)
-    resources = tmp_path / "resources"
-    monkeypatch.syspath_prepend(str(resources))
-    module = __import__((resources / "slavemodule.txt").read_text())
-    unit = module.ChamberForces(instance_name="unit", resources=str(resources))
-    unit.enter_initialization_mode()
-    unit.exit_initialization_mode()
-    calls = []
-    for name in ("values_at_terminals", "values"):
-        function = getattr(unit.model, name)
-        monkeypatch.setattr(
-            unit.model, name, lambda *a, f=function, name=name: (calls.append(name), f(*a))[1]
-        )
-    references = {s.name: s.reference for s in Interface(ChamberForces, {}).signals}
-    unit.get_real([references["tau"], references["J"]])
-    unit.get_real([references["tau_bias"]])
-    assert calls == ["values_at_terminals"]
-    unit.get_real([references["tau_bias_dw"], references["tau"]])
-    unit.get_real([references["pivot.fx"]])
-    assert calls == ["values_at_terminals", "values"]
-    unit.set_real([references["phi"]], [1.0])
-    unit.get_real([references["tau"]])
-    assert calls == ["values_at_terminals", "values", "values_at_terminals"]
+@pytest.fixture
+def in_process(fmus, tmp_path, monkeypatch):
+    """``in_process(name)``: makes slaves of that Python FMU, without a host, at a state in motion."""
+
+    def of_model(name):
+        with zipfile.ZipFile(fmus[name]) as archive:
+            archive.extractall(tmp_path / name)
+        resources = tmp_path / name / "resources"
+        monkeypatch.syspath_prepend(str(resources))
+        module = __import__((resources / "slavemodule.txt").read_text())
+
+        def slave():
+            unit = getattr(module, name)(instance_name="unit", resources=str(resources))
+            unit.enter_initialization_mode()
+            unit.exit_initialization_mode()
+            inputs = Interface(MODELS[name], {}).signals_of("input")
+            references = [s.reference for s in inputs if s.variable.type == "Real"]
+            unit.set_real(references, [0.3 + 0.1 * k for k in range(len(references))])
+            return unit
+
+        return slave
+
+    return of_model
+
+
+REFERENCES = {s.name: s.reference for s in Interface(ChamberForces, {}).signals}
+
+
+def test_a_step_evaluates_once_what_was_read(in_process, monkeypatch):
+    """A host that reads one output a call evaluates once a step after its first step; many such reads, all outputs."""
+    unit = in_process("ChamberForces")()
+    module = sys.modules[type(unit._instance).__module__]
+    evaluation, calls = module._evaluation, []
+
+    def counted(model, known):
+        known, outputs, function = evaluation(model, known)
+        return known, outputs, lambda *state: (calls.append(len(outputs)), function(*state))[1]
+
+    monkeypatch.setattr(module, "_evaluation", counted)
+
+    def evaluated(*names, time=0.0):
+        calls.clear()
+        assert unit.do_step(time, 0.0)
+        for name in names:
+            assert math.isfinite(unit.get_real([REFERENCES[name]])[0])
+        return calls.copy()
+
+    assert evaluated("phi", "r") == []
+    assert evaluated("tau", "rocker.tau", "tau") == [1, 2]
+    for names in (("tau", "rocker.tau"), ("rocker.tau",), ("r", "tau", "tau")):
+        unit.set_real([REFERENCES["phi"]], [len(names)])
+        assert evaluated(*names) == [2]
+    outputs = len(unit.model.OUTPUTS)
+    assert evaluated("pivot.fx", "pivot.fy", "tau", "J", "power") == [3, outputs]
+    unit.set_real([REFERENCES["phi"]], [0.5])
+    assert evaluated("power") == [outputs]
+
+
+@pytest.mark.parametrize("name", ["ChamberForces", "ChainUnit", "InductionMotor", "LoadObserver"])
+def test_an_output_has_the_same_bits_whatever_is_read_with_it(in_process, name):
+    slave = in_process(name)
+    whole = slave()._instance
+    outputs = range(whole.first_output, whole.first_output + len(whole.model.OUTPUTS))
+    bits = [float(value).hex() for value in whole.values(outputs)]
+    assert len(set(bits)) > 1 and "nan" not in bits
+    growing = slave()._instance
+    for k in (1, 2, len(outputs) // 2, len(outputs)):
+        assert [float(value).hex() for value in growing.values(outputs[:k])] == bits[:k]
+    assert [float(slave()._instance.values([i])[0]).hex() for i in outputs] == bits
+
+
+def test_an_output_that_is_not_finite_spoils_none_that_is_read_without_it(in_process):
+    unit, lines = in_process("ChamberForces")(), []
+    unit._instance._log = lines.append
+    both = [REFERENCES["rocker.tau"], REFERENCES["tau"]]
+    assert all(map(math.isfinite, unit.get_real(both)))
+    unit.set_real([REFERENCES["w"]], [1e120])
+    assert math.isfinite(unit.get_real(both[:1])[0]) and not lines
+    for references in (both[1:], both):
+        assert all(map(math.isnan, unit.get_real(references)))
+    assert len(lines) == 1 and lines[0].startswith("an output of ChamberForces is not a finite number")
+    unit.set_real([REFERENCES["w"]], [3.0])
+    assert all(map(math.isfinite, unit.get_real(both)))
 
 
 def test_state_is_saved_and_serialised(motor):

@@ -282,7 +282,10 @@ def test_a_study_file_with_our_motor(folder):
     page = (folder / "out" / "report.html").read_text()
     assert "An eccentric pump" in page and "piston" in page
     for command, messages in (
-        (("study", "--check", "pump.toml"), r"--check: the equations of ForeignMachine\.fmu are not known"),
+        (
+            ("study", "--check", "pump.toml"),
+            r"pump.toml: check: the equations of ForeignMachine\.fmu are not known",
+        ),
         (("export", "ChamberForces", "--config", "pump.toml"), r"the study's machine is ForeignMachine\.fmu"),
     ):
         process = chainunit(*command, cwd=folder)

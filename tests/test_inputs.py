@@ -114,7 +114,8 @@ def test_the_members_of_an_archive_are_added_up_before_one_is_unpacked(tmp_path,
     monkeypatch.setattr(zipfile.ZipFile, "open", lambda *_: pytest.fail("a member is unpacked"))
     for name in ("fmu", "verify", "certify"):
         assert "its content has more than 3 MiB" in refusal(READERS[name], file)
-    assert "more than 3 MiB" in archive.contents(file.read_bytes()).faults[""]
+    with pytest.raises(InputError, match="more than 3 MiB"):
+        archive.contents(file.read_bytes(), "x.fmu")
 
 
 def test_the_directory_of_an_archive_is_measured_before_it_is_read(tmp_path, monkeypatch):
@@ -295,7 +296,7 @@ def test_an_archive_of_the_size_that_is_read_is_as_it_was():
     with zipfile.ZipFile(out, "w") as made:
         for name, data in content.items():
             made.writestr(name, data)
-    assert archive.contents(out.getvalue()).members == content
+    assert archive.contents(out.getvalue(), "x.fmu") == content
 
 
 @pytest.mark.parametrize(

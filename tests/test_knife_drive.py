@@ -150,7 +150,7 @@ def first(engine, p, u):
     return KnifeDrive.parts[0].equations(engine, p, u, None, KnifeDrive.shared(engine, p, u, None))
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_power_and_two_torques_of_random_machines():
     """500 admissible triads: the power balance, with the storage's growth by dual numbers, and the crank torque from
     the reactions beside that of virtual work."""

@@ -282,7 +282,7 @@ def test_the_flywheels(done):
     assert by[0].current_share == pytest.approx(by[0].current_rms / rated)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_files_of_the_study(done, tmp_path):
     study, _ = done
     written = write(study, tmp_path)
@@ -322,7 +322,7 @@ def test_a_run_that_fails_keeps_what_was_computed(tmp_path, monkeypatch):
     assert "no-flywheel-keeps-it" not in {remark.code for remark in study.remarks}
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_that_stalls(tmp_path):
     text = SMALL.replace("[0.1, 1.2]", "[]") + "step = 0.004\n[feed]\ncut_force = 1e5\n"
     study = run_study(parse(HEAD + text), tmp_path)

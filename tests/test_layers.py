@@ -36,6 +36,7 @@ def test_imports_run_downward():
     assert upward >= UPWARD, f"these are mended, take them out of UPWARD: {sorted(UPWARD - upward)}"
 
 
+@pytest.mark.second
 def test_no_renderer_names_a_study_or_a_machine():
     """Blocks, figures and lines, and the modules that draw and print them, serve any study."""
     renderers = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 from event_tables import event_line
 
@@ -13,10 +14,21 @@ from chainunit.core.engines import MATH
 from chainunit.drives import induction_steady as induction
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
-from chainunit.study.limits import SPEED_DEVIATION, heating
+from chainunit.study.limits import SPEED_DEVIATION, heating, starting
 from chainunit.study.readings import breakdown_speed
 from chainunit.study.run import run_study
 
+STAR = """start = "star-delta"
+event = []
+[system]
+machine = "ChamberForces"
+motor = "IE3 4-pole 2.2 kW, 100L"
+[run]
+crank_speed = "30 rev/min"
+turns = 1
+[starter]
+star_delta = { time = "%s" }
+"""
 KNIFE = f"""{event_line("dip", turns=1)}
 empty_start = true
 [system]
@@ -101,7 +113,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     assert warnings["no-reserve"].text.endswith(f"{said}. Take a larger motor or a heavier flywheel.")
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_above_its_breakdown_speed_has_the_speed_of_ratio_and_slip(tmp_path):
     """Overloads start from there."""
     text = JAM + '[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n[gear]\nratio = 55\n[run]\nturns = 1\n'
@@ -166,3 +178,24 @@ def test_surroundings_as_hot_as_the_winding_may_be_pass_the_limit():
     for ambient in (330.0, 340.0):
         check = heating(350.0, ambient, 330.0)
         assert check.utilisation == math.inf and "over 1000 times" in check.excess
+
+
+def test_the_time_in_star_counts_a_third():
+    """1/sqrt(3) of the current in each winding is a third of the heat."""
+    plate = parse(STAR % "1 s").plate.nameplate
+    check = starting(9.8, plate, in_star=8.0)
+    assert check.value == pytest.approx(8.0 / 3.0 + 1.8) and "star" in check.title
+    assert starting(3.0, plate, in_star=8.0).value == pytest.approx(1.0)
+    assert starting(3.0, plate).value == 3.0 and starting(None, plate, in_star=8.0).value is None
+
+
+@pytest.mark.second
+def test_a_change_to_delta_at_half_the_speed_is_warned_of(tmp_path):
+    """The current jumps to that of a start direct on line, and the starter is good for nothing."""
+    short, long = (run_study(parse(STAR % time), tmp_path / time[0]) for time in ("0.05 s", "3 s"))
+    (warning,) = [each for each in short.warnings if each.code == "star-too-short"]
+    run, plate = short.runs["start_up"], short.plate.nameplate
+    share = float(np.interp(0.05, run["time"], run["motor.w"])) / plate.synchronous
+    assert warning.quantities["share"].value == pytest.approx(share) and share < 0.8
+    assert warning.quantities["delta"].value > 1.5 * plate.rated_current
+    assert not [each for each in long.warnings if each.code == "star-too-short"]

@@ -116,7 +116,7 @@ def test_slopes_of_packaged_models_are_those_of_differences(name):
     assert np.abs(found.D).max() > 0.0 and bool(found.states) == (model.States is not None)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ChainUnitFlexible", "LoadObserver"])
 def test_slopes_of_large_models_are_those_of_differences(name):
     model = MODELS[name]

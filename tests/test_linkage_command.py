@@ -47,6 +47,7 @@ def test_the_example_is_the_reference_machine(tmp_path):
         )
 
 
+@pytest.mark.second
 def test_show(tmp_path):
     """What is shown is computed anew here, from the textbook's slider-crank and the reactions of the machine."""
     done = run("linkage", str(PRESS), "-o", "out", "--speed", "60 rpm", cwd=tmp_path)

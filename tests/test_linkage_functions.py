@@ -126,7 +126,7 @@ def test_a_quantity_may_have_the_name_of_a_new_function():
     assert np.min(m.outputs(np.linspace(0.0, 6.28, 99), 3.0).load_power) < 0.0
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_extremes_follow_the_lengths_in_every_kind_of_run():
     """In Python, over arrays, as symbols; against the closed form of the slider crank and against a fine turn."""
     m = machine(

@@ -68,6 +68,7 @@ def deviations(found, wanted):
 
 
 @pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.second
 def test_against_an_independent_solution(count):
     """Motion of every link and point, every reaction and guide moment, torque and energies to 1e-9; torque by two
     routes and the balance of power, both to 1e-9 of their largest part."""
@@ -105,6 +106,7 @@ def shuffled(data, rng):
 
 
 @pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.slow
 def test_shuffled_lists_give_the_same_groups(count):
     for seed, data, groups, _, model, state in closing(count):
         rng = np.random.default_rng(seed)
@@ -155,6 +157,7 @@ def turns_well(body, places=96, least=1e-3):
     return True
 
 
+@pytest.mark.slow
 def test_refusals_are_right():
     """A linkage that is said not to close, or to come to a dead position, does not go round in the independent
     solution, either; nearly all others do."""

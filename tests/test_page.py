@@ -760,7 +760,7 @@ def test_factors_of_two_bars_are_not_passed_for_those_of_chains(chains, study):
     assert words in said_of(chains) and words not in said_of(study)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_chains_stand_beside_two_bars(chains, tmp_path):
     result = ResultEntries(json.loads(json.dumps(as_dict(chains))))
     found = result["chain"]

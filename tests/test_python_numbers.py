@@ -12,6 +12,7 @@ import xarray as xr
 
 from chainunit import ChainUnitMachine, InputError, SideLoads, Study, linearize, linkage
 from chainunit.batch import Beyond, Histogram
+from chainunit.machines.api import ChainUnitOfChains
 from chainunit.machines.chain_unit import Feed
 from chainunit.machines.crank_rocker import CrankRocker
 from chainunit.machines.knife_drive import KnifeDrive
@@ -294,6 +295,18 @@ def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, 
             'highest = "3 kg": must be a number in rad/s',
         ),
         (lambda: ChainUnitMachine().organ_rods("top"), 'side = "top": must be one of left, right'),
+        (
+            lambda: ChainUnitMachine().organ_rods("left", number="x"),
+            'number of rods = "x": must be a whole number >= 2',
+        ),
+        (
+            lambda: ChainUnitMachine().organ_rods("left", number=1),
+            "number of rods = 1: must be a whole number >= 2",
+        ),
+        (
+            lambda: ChainUnitOfChains(number=2.5).simulated,
+            "number of rods = 2.5: must be a whole number >= 2",
+        ),
         (
             lambda: ChainUnitMachine().energy_per_kg("top", 0.0, 1.0),
             'side = "top": must be one of left, right',

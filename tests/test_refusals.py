@@ -174,3 +174,12 @@ def test_a_missing_linkage_file_is_told_at_the_key_that_names_it(tmp_path):
     assert (
         line.startswith("chainunit: mine.toml:2: machine.linkage: ") and "press.toml: cannot be read" in line
     )
+
+
+@pytest.mark.parametrize("command", ["sweep", "optimize", "identify", "watch"])
+def test_a_command_without_its_table_names_the_study_file(command, tmp_path):
+    (tmp_path / "mine.toml").write_text('title = "x"\n')
+    done = chainunit(command, "mine.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"chainunit: mine.toml: {command}") and "; add " in done.stderr
+    assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())

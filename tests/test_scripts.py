@@ -93,6 +93,7 @@ def test_each_model_has_a_script():
 
 
 @pytest.mark.parametrize("name", MODELS)
+@pytest.mark.slow
 def test_pythonfmu_builds_it_as_the_exporter_does(name, fmus, tmp_path):
     file = build(FOLDER / f"{name}.py", tmp_path)
     exported = tmp_path / f"exported {name}.fmu"

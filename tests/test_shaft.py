@@ -220,7 +220,7 @@ def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
     ]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_report_shows_it(study, tmp_path):
     assert (tmp_path / "driveline.png") in write(study, tmp_path)
     text = (tmp_path / "report.html").read_text("utf-8")

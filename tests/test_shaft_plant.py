@@ -119,6 +119,7 @@ def test_an_encoder_or_nothing_tells_the_angle(angles):
     found_of(problem_of(*runs))
 
 
+@pytest.mark.slow
 def test_derivatives_of_residuals():
     """By every unknown, and of 60 orders by ten, of every column, against differences, at a motion that is far from
     even."""

@@ -394,6 +394,7 @@ OBSERVED = System(
 
 
 @pytest.mark.parametrize("tool", ALL_TOOLS)
+@pytest.mark.slow
 def test_an_observer_beside_machine_and_motor(tool, tmp_path):
     """It takes plain signals of the motor. Its estimates are the loads, in the own master and in the tools."""
     file = tmp_path / "observed.ssp"
@@ -415,6 +416,7 @@ def test_an_observer_beside_machine_and_motor(tool, tmp_path):
 
 
 @pytest.mark.parametrize("tool", ALL_TOOLS)
+@pytest.mark.slow
 def test_a_driveline_between_runs_near_the_own_master(tool, tmp_path):
     """Motor, line and machine: the shaft torque follows, though both ports are a step older in these tools."""
     text = '[machine]\nratio = 50\n[driveline]\nalpha1 = "12 deg"\nalpha2 = "8 deg"\nd2 = 20\nd3 = 20\n'

@@ -238,7 +238,7 @@ def test_no_start_is_permitted_where_running_alone_is_too_hot():
     assert "up to speed from 0 deg, but not from 45.0 deg of the crank in the permitted" in some.reason
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_study_whose_crank_does_not_turn_ends_with_status_1(tmp_path):
     """Masses of a million kilograms: the crank stands, and that is said as a person writes it."""
     masses = "".join(f"{link} = {{ m = 1e6, I = 1e7 }}\n" for link in ("crank", "coupler", "rocker"))

@@ -238,7 +238,7 @@ def test_what_chains_are_refused(text, told):
         config.parse(text)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
     from chainunit.study import config
     from chainunit.study.run import run_study
@@ -283,7 +283,7 @@ cli.main()
 """
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_keeps_what_was_computed(tmp_path):
     import signal
@@ -315,7 +315,7 @@ def test_an_old_result_does_not_survive_a_new_run(tmp_path, done):
     assert (out / "reactions.png").read_bytes()[:4] == b"\x89PNG"
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_that_cannot_reach_the_speed_is_told(tmp_path):
     weak = ONE_JAM + "[motor]\nlimit = { v = 60 }"
     (tmp_path / "mine.toml").write_text(weak)
@@ -558,6 +558,7 @@ def ran(text, folder):
 
 
 @pytest.mark.parametrize(("text", "turns"), [(LIGHT, 1), (TWICE, 1), (LIGHT + "turns = 3\n", 3)])
+@pytest.mark.second
 def test_the_load_cycle_is_whole_turns_that_the_numbers_follow_from(text, turns, tmp_path):
     study, numbers = ran(text, tmp_path)
     time, speed, torque, inertia = np.loadtxt(tmp_path / "load_cycle.csv", delimiter=",", skiprows=1).T
@@ -736,7 +737,7 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_feed_forward_of_chains_is_told_by_chains(tmp_path, monkeypatch):
     """The control asks a machine of the same kind: the ripple that is left is a fraction of that with two bars."""
     from chainunit.study import config

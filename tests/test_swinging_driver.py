@@ -65,6 +65,7 @@ def closing(data):
 
 
 @pytest.mark.parametrize("name", ALL)
+@pytest.mark.second
 def test_torque_and_all_reactions_agree_with_an_independent_solution(name):
     """At 200 places, there and back, with gravity and a force of constant direction at a point of a link."""
     text = description_of(ALL[name], name)
@@ -86,7 +87,7 @@ def test_torque_and_all_reactions_agree_with_an_independent_solution(name):
             assert np.max(np.abs(outputs[key] - wanted)) < 1e-11 * scale, key
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_random_linkages_swing_in_the_range_that_their_refusal_names():
     """Of all kinds of dyads: the range may be pasted, and inside it the independent solution agrees to 1e-11."""
     kinds: Counter[str] = Counter()
@@ -510,6 +511,7 @@ def test_the_usual_end_stops(mass, inertia, effort, slides):
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.second
 def test_the_direct_fmu_rests_on_its_stop(fmi, tmp_path):
     data = {**STEPHENSON, "pins": {"friction": 0.1, "damping": 2.0}}
     file = export(model(data, "direct_stephenson").direct(), tmp_path / "direct.fmu", fmi=fmi)

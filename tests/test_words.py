@@ -156,6 +156,7 @@ ROOT = Path(__file__).parents[1]
 WILD = "{A} {} {0} {{x}} {=run.turns} %s %(x)d %{y} $x^$ \\\\frac [red] [/b] <b>bold</b> */ &amp; `code`"
 
 
+@pytest.mark.slow
 def test_a_text_from_outside_is_no_template(tmp_path):
     """Title and descriptions of a linkage and of its study stand in all results as they are."""
     press = (ROOT / "examples" / "linkages" / "slider_crank_press.toml").read_text("utf-8")

@@ -23,7 +23,8 @@ from .script import Names, Script, script_with_names
 
 _PACKAGE = Path(__file__).parents[1]
 _CARRIED = (
-    *("core/bounds.py", "core/integrators.py", "core/messages.py", "core/printing/python_math.py"),
+    *("core/bounds.py", "core/integrators.py", "core/messages.py"),
+    *("core/printing/python_functions.py", "core/printing/python_math.py"),
     *("fmu/model_instance.py", "fmu/printed_slave.py"),
 )
 """The files of this package that a Python FMU carries; they need the standard library alone."""

@@ -2,23 +2,25 @@
 this file, and the model as the module that `chainunit.fmu.printed_model` prints.
 
 It never raises: a reason is logged, outputs become NaN, and a step is refused. Outputs are evaluated when they are
-read, once per state: those at the terminals alone, if no others are read.
+read, once per state: those that were read at this state or an earlier one, and no others.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 from ..core import bounds, messages
 from ..core.integrators import ADDED_UP, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
+from ..core.printing.python_functions import function_text
 
 NAN = float("nan")
 _IDENTITY = __name__.partition(".")[0]
 """Inside an FMU: the name of its package, which has a hash of all contents of the FMU."""
-_SETTABLE, _STATES, _AT_TERMINALS, _ALL = range(4)
-"""Variables whose values are known: parameters and inputs, also the states, the outputs at the terminals, and all."""
+_GROWTHS = 3
+"""How often outputs are added to those that are evaluated; after that all are."""
 
 
 class Settable(NamedTuple):
@@ -56,6 +58,17 @@ class _RefusedError(Exception):
     """The values make no model."""
 
 
+@cache
+def _evaluation(model: Any, known: frozenset[int]) -> tuple[frozenset[int], list[int], Any]:
+    """These variables, always as the same object, the outputs among them by reference, and their function."""
+    first = len(model.SETTABLE) + len(model.NOMINAL)
+    outputs = sorted(i for i in known if i >= first)
+    results = [model.OUTPUTS[i - first] for i in outputs]
+    functions: dict[str, Any] = {}
+    exec(function_text("def values(p, u, x, k=()):", model.STATEMENTS, results), vars(model), functions)
+    return known, outputs, functions["values"]
+
+
 class ModelInstance:
     """An instance of the printed `model`; `log` gets each line for the user. Variables are known by their value
     references: parameters, inputs, states, outputs."""
@@ -65,11 +78,13 @@ class ModelInstance:
         self.settable = [Settable(*row) for row in model.SETTABLE]
         self.first_input, self.first_state = model.PARAMETERS, len(self.settable)
         self.first_output = self.first_state + len(model.NOMINAL)
-        self._level = [_SETTABLE] * self.first_state + [_STATES] * len(model.NOMINAL) + [_ALL] * model.OUTPUTS
-        for place in model.TERMINALS:
-            self._level[self.first_output + place] = _AT_TERMINALS
-        self._now = [v.start for v in self.settable] + [NAN] * (len(self._level) - self.first_state)
-        self._known = _SETTABLE
+        count = self.first_output + len(model.OUTPUTS)
+        self._now = [v.start for v in self.settable] + [NAN] * (count - self.first_state)
+        ends = self.first_state, self.first_output, count
+        self._settable, self._states, self._all = (frozenset(range(end)) for end in ends)
+        self._known = self._settable
+        self._read, self._growths = self._states, 0
+        """variables that were read, with all but outputs, and how often more outputs were"""
         self._p: list[float] | None = None
         self._derived: Sequence[float] | None = None
         """from the fixed parameters, which do not change after the initialization"""
@@ -226,47 +241,51 @@ class ModelInstance:
 
     def values(self, references: Sequence[int]) -> list[float]:
         """The values of these variables; outputs are evaluated at most once per state."""
-        if self._known < _ALL and references:
-            wanted = max([self._level[i] for i in references])
-            if wanted > self._known:
-                self._evaluate(wanted)
+        if not self._known.issuperset(references):
+            self._evaluate(references)
         now = self._now
         return [now[i] for i in references]
 
-    def _evaluate(self, wanted: int) -> None:
+    def _evaluate(self, references: Sequence[int]) -> None:
         bad = self.prepare()
         count = self.first_output - self.first_state
         self._now[self.first_state : self.first_output] = [NAN] * count if bad else self._x
-        self._known = wanted
-        if wanted == _STATES:
+        self._known = self._states
+        if self._states.issuperset(references):
             return
         bad = bad or self._bad_input()
-        model, values = self.model, [NAN] * len(self._now)
         if not bad:
-            try:
-                function = model.values if wanted == _ALL else model.values_at_terminals
-                values = function(self._p, self._inputs(), self._x, *self._more)
-                if not all(map(math.isfinite, values)):
-                    raise ArithmeticError
-            except (ArithmeticError, ValueError):
-                values, bad = (
-                    [NAN] * len(self._now),
-                    messages.NO_OUTPUT.format(model=model.NAME, time=self._time),
-                )
-            except BaseException as reason:
-                values, bad = [NAN] * len(self._now), f"outputs cannot be evaluated: {reason!r}"
+            if not self._read.issuperset(references):
+                self._growths += 1
+                known = self._all if self._growths > _GROWTHS else self._read.union(references)
+                self._read, _, _ = _evaluation(self.model, known)
+            # an output that was read at an earlier state only must not spoil these
+            bad = self._fault(self._read) and self._fault(self._states.union(references))
         if bad:
             self.tell(bad)
-        if wanted == _ALL:
-            self._now[self.first_output :] = values[: model.OUTPUTS]
-        else:
-            for place, value in zip(model.TERMINALS, values, strict=False):
-                self._now[self.first_output + place] = value
+            self._now[self.first_output :] = [NAN] * len(self.model.OUTPUTS)
+            self._known = self._all
+
+    def _fault(self, known: frozenset[int]) -> str:
+        """Evaluate the outputs among these variables; why they have no values, or an empty text."""
+        try:
+            self._known, outputs, function = _evaluation(self.model, known)
+            values = function(self._p, self._inputs(), self._x, *self._more)
+            # the sum of finite numbers is finite, except of the largest, and takes a fifth of the time
+            if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
+                raise ArithmeticError
+        except (ArithmeticError, ValueError):
+            return messages.NO_OUTPUT.format(model=self.model.NAME, time=self._time)
+        except BaseException as reason:
+            return f"outputs cannot be evaluated: {reason!r}"
+        for i, value in zip(outputs, values, strict=True):
+            self._now[i] = value
+        return ""
 
     def _touch(self) -> None:
         """Mark all outputs for a new evaluation."""
         self._closed = False
-        self._known = _SETTABLE
+        self._known = self._settable
 
     def prepare(self) -> str:
         """Check the parameters and start the states, after a change of either. Returns why they make no model, or an

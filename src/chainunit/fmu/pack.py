@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import IO
 from xml.etree.ElementTree import Element, indent, tostring
 
 from ..core.errors import InputError
@@ -53,9 +54,10 @@ def _refuse_same_names(interface: Interface) -> None:
         )
 
 
-def pack(contents: Mapping[str, bytes], file: Path) -> None:
+def pack(contents: Mapping[str, bytes], file: Path | IO[bytes], comment: bytes = b"") -> None:
     """Write an archive with a fixed order and a fixed time stamp of its entries."""
     with zipfile.ZipFile(file, "w") as archive:
+        archive.comment = comment
         for name in sorted(contents):
             entry = zipfile.ZipInfo(name, _EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED

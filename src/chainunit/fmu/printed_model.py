@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 from ..core.integrators import MAX_STEPS
-from ..core.model import Model, Requirement
-from ..core.printing.kernels import ModelFunction, kernels, output_groups
-from ..core.printing.python_code import python_text
+from ..core.model import Requirement
+from ..core.printing.kernels import kernels
+from ..core.printing.python_code import python_statements, python_text
 from .description import Interface, shared_interface
 
 _HEAD = '''\
@@ -24,10 +22,17 @@ from .core.printing.python_math import *
 
 def printed_model(interface: Interface) -> str:
     """The module of a model, as `chainunit.fmu.model_instance.ModelInstance` takes it."""
-    model = interface.model
-    rows = "\n".join(f"{name} = {_text(value)}" for name, value in _tables(interface).items())
+    model, shared = interface.model, shared_interface(interface.model)
+    columns = [v.name for v in shared.others]
+    values, *functions = kernels(shared.trace, shared.derived, slopes=False, columns=columns)
+    statements, outputs = python_statements(values)
+    equations = _rows({"STATEMENTS": statements, "OUTPUTS": outputs})
     head = _HEAD.format(title=model.name)
-    return f"{head}{interface.text(rows)}\n\n\n{python_text(_functions(model))}"
+    return f"{head}{interface.text(_rows(_tables(interface)))}\n{equations}\n\n\n{python_text(functions)}"
+
+
+def _rows(tables: dict[str, Any]) -> str:
+    return "\n".join(f"{name} = {_text(value)}" for name, value in tables.items())
 
 
 def _text(value: Any) -> str:
@@ -57,8 +62,6 @@ def _tables(interface: Interface) -> dict[str, Any]:
         "SETTABLE": [_settable(s.variable, s.start) for s in settable],
         "PARAMETERS": len(parameters),
         "NOMINAL": tuple(v.quantity.nominal or 1.0 for v in interface.states),
-        "OUTPUTS": len(interface.others),
-        "TERMINALS": _at_terminals(model),
         "TYPES": types,
         "RATES": [
             (inputs.index(one), follows(one), follows(other)) for one, other in model.input_rates.items()
@@ -80,20 +83,3 @@ def _settable(variable: Any, start: float | None) -> tuple[Any, ...]:
         *(variable.name, q.unit, variable.description, q.allowed_range, q.low, q.high, q.slack),
         *(q.open_low, q.tunable, q.type, float(start or 0.0)),
     )
-
-
-def _at_terminals(model: type[Model]) -> list[int]:
-    """The outputs that are evaluated without the others, if there are others; by place."""
-    first, *others = output_groups(model)
-    return first if others else []
-
-
-def _functions(model: type[Model]) -> Iterator[ModelFunction]:
-    """The functions of a model, with all outputs in declared order and those at the terminals."""
-    interface = shared_interface(model)
-    names = [v.name for v in interface.others]
-    yield from kernels(interface.trace, interface.derived, slopes=False, columns=names)
-    if places := _at_terminals(model):
-        columns = [names[i] for i in places]
-        first = next(kernels(interface.trace, interface.derived, slopes=False, columns=columns))
-        yield replace(first, name="values_at_terminals")

@@ -78,7 +78,9 @@ class PrintedSlave(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**kwargs)
         _release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{type(self).__name__}.so")
         self._instance = instance = ModelInstance(self.model, lambda line: self.log(line, Fmi2Status.error))
-        types = dict.fromkeys(range(instance.first_output + self.model.OUTPUTS), "Real") | self.model.TYPES
+        types = (
+            dict.fromkeys(range(instance.first_output + len(self.model.OUTPUTS)), "Real") | self.model.TYPES
+        )
         self._of_type = {kind: {i for i, own in types.items() if own == kind} for kind in _NOTHING}
 
     # -- life cycle

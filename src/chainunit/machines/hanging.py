@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import GeometryError
+from ..core.errors import GeometryError, InputError, shown
 
 _POLISH = 30
 
@@ -192,7 +192,15 @@ def modes(lengths: Any, weights: Any, rest: Hanging, g: float) -> Modes:
 
 def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
     """Distribute `number` rods over two parts of these lengths, so that the rods are nearest to equal length: the
-    number in each part."""
+    number in each part.
+
+    Raises
+    ------
+    InputError
+        for a number that is not whole, or below 2.
+    """
+    if type(number) is bool or not isinstance(number, int | np.integer) or number < len(parts):
+        raise InputError(f"number of rods = {shown(number)}: must be a whole number >= {len(parts)}")
     first, second = parts
     most = number - 1
     share = round(number * first / (first + second))

@@ -25,19 +25,16 @@ from .task import Task, Writer
 
 
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
-    with config.file.refusals():
-        check_motor(config.motor, config.drive, config.plans, config.file.catalogues)
+    check_motor(config.motor, config.drive, config.plans, config.file.catalogues)
     if scheduler is not None:
         for part in registered():
             part.check_scheduler(config.plans[part.name], scheduler)
 
 
 def _compute(config: Config, folder: Path, progress: TaskProgress, **options: Any) -> StudyRecord:
-    """Run a study; options and errors are those of `run_study`. A refusal begins with the name of the study file, if
-    there is one."""
+    """Run a study; options and errors are those of `run_study`."""
     progress("the machine at constant speed", 0.0, 1.0)
-    with config.file.refusals():
-        return run_study(config, folder, progress, **options)
+    return run_study(config, folder, progress, **options)
 
 
 def _writers(record: StudyRecord, report: Report, folder: Path, of_report: list[Writer]) -> list[Writer]:

@@ -7,7 +7,7 @@ it: they claim the folder, clear it, compute, report and write.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -118,14 +118,15 @@ class Task(Generic[Question, Outcome]):
         Raises
         ------
         InputError
-            for a question that is refused; an earlier result stays.
+            for a question that is refused, which begins with the name of its study file; an earlier result stays.
         RunError
             see the task.
         """
-        if self.accept is not None:
-            self.accept(question, **options)
-            self._clear_if_any(folder)
-        outcome = self.compute(question, folder, progress, **options)
+        with question.file.refusals() if isinstance(question, Config) else nullcontext():
+            if self.accept is not None:
+                self.accept(question, **options)
+                self._clear_if_any(folder)
+            outcome = self.compute(question, folder, progress, **options)
         if self.accept is None:
             self._clear_if_any(folder)
         return outcome

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..reading.text import number
 from .event import Role
 from .event_torques import from_event_on, peaks_in_events
-from .ram_force import TIMES, rams
+from .ram_force import TIMES, RamForce, rams
 from .readings import pull_out_torque
 from .record import StudyRecord
 from .remark import note, warning
@@ -80,6 +80,16 @@ def pull_out(study: StudyRecord) -> float:
     return pull_out_torque(study.drive, study.steady, study.window(Phase.STEADY, study.steady).warm)
 
 
+def at_motor_shaft(study: StudyRecord, torque: float) -> float:
+    """Torque at the motor's shaft [N m] for one at the crank [N m], with the loss of the gear by load."""
+    gear = study.config.drive.gear
+    return torque / study.drive.ratio / (gear.efficiency if study.drive.is_geared else 1.0)
+
+
+LESS_TORQUE = 0.1
+"""Part by which the pull-out torque of a motor may be less than that of its catalogue, by IEC 60034-1."""
+
+
 def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     """Warn where a given coupling, set to `trip` [N m], does not protect the drive as it should."""
     # the limit of a foreign motor is not known
@@ -111,8 +121,8 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
             steady=on_coupling(study.drive, study.steady),
             motor=most,
         )
-    elif most is not None and trip > most:
-        study.say(_ABOVE_MOTOR, trip=trip, motor=most)
+    elif most is not None and trip > (least := (1.0 - LESS_TORQUE) * most if study.plate else most):
+        study.say(_ABOVE_MOTOR, trip=trip, motor=most, least=least if study.plate else None)
 
 
 _OPENS_IN_START = warning(
@@ -143,21 +153,22 @@ _NEVER_OPENS = warning(
 )
 _ABOVE_MOTOR = warning(
     "coupling-above-motor",
-    "The torque limiter is set to {trip} and the motor gives {motor} at most. A load that rises slowly stalls the "
-    "motor and does not open it.",
-    sizes={"N.m": "trip motor"},
+    "The torque limiter is set to {trip} and the motor gives {motor} at most. By IEC 60034-1 it may give as little "
+    "as {least}. A load that rises slowly may stall the motor and not open it.",
+    sizes={"N.m": "trip motor least"},
 )
 _RAM = note(
     "coupling-at-ram",
-    "A coupling {set_for}that opens at {trip} does not limit the force on the link {ram} near its dead centre, at "
+    "A coupling {set_for}that opens at {trip} does not limit the force on {ram} near the dead centre, at "
     "{a driver} angle of {dead}. At the dead centre the force has no limit. In running the pin pushes with "
     "{working} at most. Within {angle}, the last {way}, it can push with more than {times} times that while the "
     "coupling stays shut. At every angle it can push with more than {times} times that while the coupling stays "
     "shut{always}.",
-    remedy="A device at the link protects it there, such as a hydraulic overload cushion or a shear plate.",
+    remedy="A device at the link protects it there, such as an overload cushion or a shear plate of a press, or the "
+    "relief valve of a pump.",
     sizes={
         "N.m": "trip",
-        "rad": "dead angle",
+        "rad": "angle",
         ("N", "", 3, "force on the link at the setting, where it is fastest"): "fastest",
         ("N", "", 3, "30 deg before the dead centre"): "thirty",
         ("N", "", 3, "10 deg before the dead centre"): "ten",
@@ -168,16 +179,20 @@ _RAM = note(
 
 
 def remark_on_rams(study: StudyRecord, torque: float, set_for: str = "") -> None:
-    """Note for each ram of a linkage what a coupling of that setting, the `torque` [N m], means at it; `set_for` says
-    for which torques it is set."""
+    """Note for each ram of a linkage what a coupling of that setting, the `torque` [N m], means at it, once for rams
+    that differ in their dead centres alone; `set_for` says for which torques it is set."""
+    alike: dict[tuple[str, str], list[RamForce]] = {}
     for ram in rams(study):
+        alike.setdefault((f"{ram.least(torque):.4g}", f"{ram.working:.4g}"), []).append(ram)
+    for group in alike.values():
+        ram, names = group[0], [ram.ram for ram in group]
         angle, way = ram.overloaded(torque) or (None, None)
         study.say(
             _RAM,
             trip=torque,
             set_for=set_for,
-            ram=ram.ram,
-            dead=ram.dead,
+            ram=f"the link{'s' if names[1:] else ''} {' and '.join(names)}",
+            dead=" and ".join(number(ram.dead, "rad") for ram in group),
             fastest=ram.least(torque),
             thirty=ram.before(torque, math.radians(30.0)),
             ten=ram.before(torque, math.radians(10.0)),

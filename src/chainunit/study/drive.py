@@ -237,6 +237,11 @@ class Drive:
         return f"{bond.driver}.{bond.flanges[0].members[quantity]}", self.ratio_at_machine
 
     @property
+    def time_in_star(self) -> float:
+        """Time in a start from rest for which the motor is in star [s]."""
+        return 0.0 if self.star_delta is None else float(self.star_delta.time)
+
+    @property
     def switched_until(self) -> float:
         """Time in a start from rest from which the motor is in delta [s]; 0 without star."""
         starter = self.star_delta

@@ -186,6 +186,12 @@ class Event(metaclass=EventType):
         signals = self.signals(defaultdict(float), 0.0, defaultdict(float))
         return max([0.0, *corners(signals.values())])
 
+    @property
+    def passes(self) -> bool:
+        """Whether all its signals return to their values before it."""
+        signals = self.signals(defaultdict(float), 0.0, defaultdict(float)).values()
+        return all(isinstance(x, Profile) and x(self.lasts) == x.start for x in signals)
+
     def variants(self) -> tuple[Event, ...]:
         """The same event with its assumed quantity at either end of the range; empty for an event without
         assumptions."""

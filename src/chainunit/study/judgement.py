@@ -8,6 +8,8 @@ from ..core.quantities import quantity
 from ..reading.results import part, result
 from ..reading.text import number
 from . import verdict
+from .coupling import LESS_TORQUE
+from .event import Role
 from .limits import Check, given_motor, reaches
 from .organ_limits import has_empty_side, slack_and_mode
 from .readings import has_turn, less_than_a_turn
@@ -88,7 +90,10 @@ _EXCESSES = {
 """By limit of the motor, the words that say that it is exceeded."""
 
 AMPLE = 0.02
-"""Reserve of torque from which on the motor counts as strong enough; with less it is at its limit."""
+"""Reserve of torque from which on the motor counts as strong enough; with less it is at its limit. A motor of a
+catalogue needs more: its pull-out torque may be less by a tolerance (`LESS_TORQUE`)."""
+_SLOWED = 0.5
+"""Dip of the speed from which on an event counts as a stall."""
 
 
 def no_reserve(run: str, reserve: float) -> str:
@@ -97,6 +102,22 @@ def no_reserve(run: str, reserve: float) -> str:
     over = number(-reserve, "1", "percent") + (" or more" if reserve <= -1.0 else "")
     when = "in each turn" if run == STEADY else "for a moment"
     return f"{when} its torque exceeds the pull-out torque by {over}"
+
+
+def slowed(study: StudyRecord) -> dict[str, float]:
+    """The overloads that pull the motor below half its speed without standing still or opening a coupling, with the
+    dip of the speed, a share of it."""
+    events = study.config.events
+    return {
+        name: answers.speed_dip
+        for name, answers in study.answers.items()
+        if name in study.overloads
+        and events[name].role is Role.SHOCK
+        and not events[name].from_rest
+        and answers.stall_time is None
+        and answers.coupling_trip_time is None
+        and answers.speed_dip > _SLOWED
+    }
 
 
 def lasts(study: StudyRecord) -> bool:
@@ -185,12 +206,23 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
         text += "; its reserve of torque is not known"
     elif reserve is not None and reserve >= 0.0:
         text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.title_of(run)})"
+        if study.plate is not None and reserve < LESS_TORQUE:
+            weaker = number(LESS_TORQUE, "1", "percent")
+            text += f", less than the {weaker} by which IEC 60034-1 permits it to be weaker"
     else:
         text += f"; {no_reserve(run, reserves[run])} ({study.title_of(run)})"
+    if stalls := slowed(study):
+        dips = ", ".join(
+            f"{study.title_of(name)}: by {number(dip, '1', 'percent')}" for name, dip in stalls.items()
+        )
+        text += f"; its speed dips as in a stall ({dips})"
     if left_out:
         names = ", ".join(study.title_of(name) for name in left_out)
         text += f"; runs whose energy balance is not kept are left out ({names})"
-    enough = reserve is not None and reserve >= AMPLE and not study.insufficient and not excesses
+    ample = AMPLE if study.plate is None else LESS_TORQUE
+    enough = (
+        reserve is not None and reserve >= ample and not stalls and not study.insufficient and not excesses
+    )
     burns = not keeps_speed or "temperature" in excesses
     holds: Holds = "false" if burns else "true" if enough else "in part"
     return MotorVerdict(

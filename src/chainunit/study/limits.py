@@ -84,10 +84,14 @@ def heating(temperature: float, ambient: float, permitted: float) -> Check:
     return Check("rise of temperature", hot - ambient, permitted - ambient, "K", "difference")
 
 
-def starting(time: float | None, plate: Nameplate) -> Check:
+def starting(time: float | None, plate: Nameplate, in_star: float = 0.0) -> Check:
     """The time of a start on the line [s], beside the permitted locked-rotor time of a warm motor: while the
-    motor speeds up, it takes about the locked-rotor current."""
-    return Check("time to start", time, plate.locked_time, "s")
+    motor speeds up, it takes about the locked-rotor current. The time `in_star` [s] counts a third, as its current
+    is 1/sqrt(3) of this one in each winding."""
+    title = "time to start" + (", the time in star a third" if in_star else "")
+    return Check(
+        title, None if time is None else time - 2.0 / 3.0 * min(time, in_star), plate.locked_time, "s"
+    )
 
 
 def lasting_current(rms: float, plate: Nameplate) -> Check:
@@ -137,5 +141,5 @@ def given_motor(
         if current is not None:
             checks["current"] = lasting_current(current, plate.nameplate)
         if not drive.follows:
-            checks["start"] = starting(start, plate.nameplate)
+            checks["start"] = starting(start, plate.nameplate, drive.time_in_star)
     return checks

@@ -95,8 +95,14 @@ def _relay(w: Window) -> float | None:
     current = w.value(w.current)
     if w.phase is Phase.LOADED_START:
         current = w.drive.relay_current(w.since, current)
-    before, lasts = w.steady.rms(w.current), lasting_current(current)
+    before = w.steady.rms(w.current)
+    lasts = lasting_current(current, before if w.passes and not stalls(w) else None)
     return relay_trip(w.since, current, setting, before, lasts, w.relay_class, TRIPS_AT)
+
+
+def stalls(w: Window) -> bool:
+    """Whether the crank stands after an overload."""
+    return stall(w.since, w.speed, w.normal_speed) is not None
 
 
 def _slack_time(w: Window) -> float | None:

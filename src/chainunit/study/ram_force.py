@@ -107,7 +107,7 @@ def _dead_centres(angle: Any, rate: Any) -> list[float]:
         return np.interp(q, angle, rate, period=2.0 * math.pi)[None]
 
     (found,) = roots(rate_at, np.append(angle, angle[0] + 2.0 * math.pi), around=True)
-    return [float(q) % (2.0 * math.pi) for q in found]
+    return [round(float(q), 9) % (2.0 * math.pi) for q in found]
 
 
 def _before(angle: Any, size: Any, place: float) -> float:

@@ -17,6 +17,7 @@ from ..reading.results import as_data
 from . import verdict
 from .config import Config
 from .drive import Drive
+from .event import Event
 from .limits import reaches
 from .measures import Answers, not_known
 from .proposal import DriveProposal
@@ -190,14 +191,22 @@ class StudyRecord:
         run = self.runs["start_up"].sel(time=slice(self.steady_begin, None))
         return whole_turns(self.drive, run, self.config.run.turns)
 
-    def window(self, phase: Phase, run: xr.Dataset, begin: float = 0.0, trip: Trip | None = None) -> Window:
-        """The window of a run from which measures are read."""
+    def window(
+        self,
+        phase: Phase,
+        run: xr.Dataset,
+        begin: float = 0.0,
+        trip: Trip | None = None,
+        event: Event | None = None,
+    ) -> Window:
+        """The window of a run from which measures are read; of an overload with its `event`."""
         sides = self.drive.machine.loaded_sides(self.config.feed)
         requested = self.config.run.crank_speed
         steady = None
         if phase in (Phase.START_UP, Phase.EVENT, Phase.LOADED_START):
             steady = Window(Phase.STEADY, self.steady, self.drive, sides, requested)
-        return Window(phase, run, self.drive, sides, requested, begin, steady, trip, self.relay_class)
+        passes = event is not None and event.passes
+        return Window(phase, run, self.drive, sides, requested, begin, steady, trip, self.relay_class, passes)
 
     @property
     def motor(self) -> Any:

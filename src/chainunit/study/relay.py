@@ -66,16 +66,22 @@ def start_seconds(time: Any, current: Any, setting: float) -> float:
 def protecting_class(
     least: int, seconds: float, setting: float, before: float, stall_current: float, stall_time: float
 ) -> int:
-    """The trip class `least`, or the class `QUICK` in place of the usual one, if that trips too late in a stall and
-    the quick one lets every start through, which heats it as `start_seconds` says. Other arguments as of
-    `stall_trip`; the rotor of a warm motor may be locked for the `stall_time` [s]."""
-    if least != LIGHT:
-        return least
-    usual, quick = (next(each for each in CLASSES if each.name == str(number)) for number in (LIGHT, QUICK))
-    late, early = (stall_trip(each, setting, before, stall_current) for each in (usual, quick))
-    is_late = late is None or late > stall_time
-    saves = seconds <= quick.shortest and early is not None and early <= stall_time
-    return QUICK if is_late and saves else least
+    """The trip class `least`, or another one that protects the motor with its rotor locked: the least that lets each
+    start through even if the motor takes `MORE_CURRENT`; or `QUICK` for the usual one, if that trips too late. The
+    hardest start heats a relay as `start_seconds` says. Other arguments as of `stall_trip`; the rotor of a warm motor
+    may be locked for the `stall_time` [s]."""
+
+    def protects(number: int) -> bool:
+        trip_class = next(each for each in CLASSES if each.name == str(number))
+        trip = stall_trip(trip_class, setting, before, stall_current)
+        return trip is not None and trip <= stall_time
+
+    tolerant = class_holding(MORE_CURRENT**2 * seconds, least)
+    if tolerant <= HEAVIEST and protects(tolerant):
+        return tolerant
+    quick = next(each for each in CLASSES if each.name == str(QUICK))
+    saves = least == LIGHT and seconds <= quick.shortest and not protects(LIGHT) and protects(QUICK)
+    return QUICK if saves else least
 
 
 def stall_trip(of: TripClass, setting: float, before: float, current: float) -> float | None:
@@ -87,8 +93,11 @@ def stall_trip(of: TripClass, setting: float, before: float, current: float) -> 
     return relay_trip([0.0], [current], setting, before, current, of.longest, TRIPS_AT)
 
 
-def lasting_current(current: Any) -> float:
-    """The RMS of the last fifth of a record of the `current` [A], shape (n,), which is assumed to flow on."""
+def lasting_current(current: Any, after: float | None = None) -> float:
+    """The current that flows on after a record of the `current` [A], shape (n,): the one `after` an overload that
+    passes, else the RMS of the last fifth of the record."""
+    if after is not None:
+        return after
     return rms(current[-max(1, len(current) // _LASTING) :])
 
 

@@ -16,7 +16,7 @@ from .arrays import peak
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .inverter import inverter_need
-from .judgement import lasts, model_verdict, motor_limits, no_reserve
+from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
 from .measures import STARTED, Answers
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
 from .record import LOAD_CYCLE, StudyRecord
@@ -64,6 +64,7 @@ def conclude(study: StudyRecord) -> None:
         part.remark(study)
     if STEADY in study.answers:
         _on_start(study)
+        _on_star(study)
         _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
         if study.drive.foreign is None:
@@ -337,6 +338,32 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         study.say(_NO_THERMAL, STEADY)
 
 
+_FULL_STAR = 0.8
+"""Share of the synchronous speed from which on a motor in star may be changed over to delta: below it the current
+jumps almost to the one of a start direct on line."""
+_STAR_TOO_SHORT = warning(
+    "star-too-short",
+    "In the start-up the motor has {share} of its synchronous speed after {time} in star. The current jumps from "
+    "{star} to {delta}.",
+    remedy="Take more time in star (starter.star_delta.time), less load, or another start.",
+    sizes={"s": "time", ("1", "percent"): "share", "A": "star delta"},
+)
+
+
+def _on_star(study: StudyRecord) -> None:
+    """Warn of a change from star to delta at too low a speed."""
+    drive, time = study.drive, study.drive.time_in_star
+    if not time or study.plate is None:
+        return
+    run = study.runs["start_up"]
+    times, speeds = run["time"].values, run["motor.w"].values
+    current = np.abs(run[f"motor.{drive.motor.current}"].values)
+    share = float(np.interp(time, times, speeds)) / study.plate.nameplate.synchronous
+    if share < _FULL_STAR and times[-1] > drive.switched_until:
+        before, after = np.interp(time, times, current), peak(current[times >= drive.switched_until])
+        study.say(_STAR_TOO_SHORT, START, time=time, share=share, star=float(before), delta=after)
+
+
 _HAPPENINGS = {
     code.code: code
     for code in (
@@ -351,6 +378,11 @@ _HAPPENINGS = {
             sizes={"A": "passed"},
         ),
         fault("stall", "The {driver} stands after the event: {where}.", sizes={"s": "stall_time"}),
+        warning(
+            "slowed",
+            "The motor is pulled below half its speed, as in a stall: {where}.",
+            sizes={("1", "percent"): "speed_dip"},
+        ),
         warning(
             "trip",
             "The torque limiter opens after the event: {where}.",
@@ -394,6 +426,8 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         late = answers.stall_time > 10.0 * config.run.step
         after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"
         yield "stall", after, {"stall_time": answers.stall_time}
+    if (dip := slowed(study).get(name)) is not None:
+        yield "slowed", f"by {number(dip, '1', 'percent')}", {"speed_dip": dip}
     if answers.coupling_trip_time is not None:
         names = ("coupling_trip_time", "energy_after_trip", "energy_behind")
         sizes = {each: getattr(answers, each) for each in names}

@@ -151,7 +151,8 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
     for name in study.overloads:
         if study.answers[name].coupling_trip_time is None:
             phase = Phase.LOADED_START if study.config.events[name].from_rest else Phase.EVENT
-            window = study.window(phase, from_event_on(study, name), study.event[name])
+            event = study.config.events[name]
+            window = study.window(phase, from_event_on(study, name), study.event[name], event=event)
             later = read_measure("thermal_trip_time", window)
             study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
 
@@ -298,7 +299,7 @@ class Runner:
             trip = Trip(time, energy, coasting)
         self._certify(name, run, transient.lead)
         after = run.sel(time=slice(transient.begin, None))
-        study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip))
+        study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip, transient.event))
         self._pins_and_pulls(name, after)
 
     def _opens_in_start(self, time: float) -> str:

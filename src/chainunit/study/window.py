@@ -78,6 +78,8 @@ class Window:
     trip: Trip | None = None
     relay_class: int = LIGHT
     """trip class of the thermal relay"""
+    passes: bool = False
+    """whether the overload passes, so that the machine runs on as before"""
 
     def value(self, name: str) -> Any:
         """A variable of the run, shape (time,)."""

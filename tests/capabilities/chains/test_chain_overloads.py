@@ -34,6 +34,7 @@ crank_angle = "180 deg"
 """
 
 
+@pytest.mark.slow
 def test_a_lump_that_the_web_folds_before_is_told(tmp_path):
     """On one stroke the lump pulls the web and loads the drive; on the other stroke the web folds."""
     study = run_study(parse(SHORT + LUMPS), tmp_path)

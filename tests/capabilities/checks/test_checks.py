@@ -390,7 +390,7 @@ def test_a_machine_of_somebody_else_has_no_known_pins(tmp_path):
     assert re.search(r"s.toml:3: bearing: needs the pins of the machine, which is an FMU", done.stderr)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_crank_that_stands_has_no_cycle_to_check(tmp_path):
     """A jaw crusher whose motor is too weak for its feed."""
     crusher = Path(__file__).parents[3] / "examples" / "linkages" / "blake_jaw_crusher.toml"

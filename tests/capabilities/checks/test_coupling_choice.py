@@ -308,7 +308,7 @@ def test_its_order_number_stands_on_the_terminal_the_page_and_in_the_handover(st
     assert part == {"designation": "FC 20", "order_number": "F-20"}
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_catalogue_without_a_coupling_that_fits_ends_in_a_warning(studied, tmp_path):
     folder, _ = studied
     shutil.copy(folder / "study.toml", tmp_path)

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from event_tables import event_line
 
-from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows
+from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows, stall_heat
 from chainunit.core.errors import InputError
 from chainunit.report.blocks import at
 from chainunit.study.choice import drive_of
@@ -134,6 +135,24 @@ def test_a_class_that_trips_too_late_gives_way_to_one_that_passes(least, seconds
     assert protecting_class(least, seconds, 20.0, 16.0, 140.0, stall_time) == trip_class
     rows = used(str(trip_class), start_seconds=seconds, stall_time=stall_time)
     assert rows["trip with the rotor locked"].holds == (stall_time == 12.0 or trip_class == 5)
+
+
+def test_a_class_lets_a_motor_at_the_tolerance_of_its_current_start():
+    """20 % more current heats a relay by 1.44: a start of 3 s takes class 20, if that trips in time."""
+    assert (
+        protecting_class(10, 2.7, 20.0, 16.0, 140.0, 12.0) == 10
+    )  # 1.44 x 2.7 = 3.9 s of the 4 s of class 10
+    assert protecting_class(10, 3.0, 20.0, 16.0, 140.0, 12.0) == 20
+    assert protecting_class(10, 3.0, 20.0, 16.0, 140.0, 6.0) == 10  # class 20 trips after 11.8 s
+
+
+def test_an_overload_that_passes_trips_no_relay():
+    """The last current of a surge of 0.3 s was assumed to flow on for ever: a trip after 133 s, beside the surge."""
+    time, current = np.linspace(0.0, 0.5, 51), np.full(51, 60.0)
+    assert stall_heat(CLASSES[2], time, current, 20.0, 16.0, 140.0).trip_time > 0.5
+    assert stall_heat(CLASSES[2], time, current, 20.0, 16.0, 140.0, after=16.0) is None
+    events = parse(event_line("jam_left", "blocked")).events
+    assert events["jam_left"].passes and not events["blocked"].passes
 
 
 def test_a_relay_that_never_trips_in_a_stall_does_not_protect():

@@ -128,7 +128,7 @@ permitted = 2000
 """
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_numbers_of_a_study_follow_from_its_run(tmp_path):
     (tmp_path / "mine.toml").write_text(STUDY, "utf-8")
     assert chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path).returncode == 0

@@ -312,7 +312,7 @@ def test_refusals_name_key_and_remedy(table, words):
     assert words in str(refused.value)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_reports_have_the_numbers_of_the_result(tmp_path, monkeypatch, capsys):
     file = tmp_path / "study.toml"
     file.write_text(STUDY.format(start="inverter"))
@@ -352,7 +352,7 @@ def test_the_winding_has_the_temperature_of_the_duty(study):
     assert settled == pytest.approx(own.temperature, abs=0.5) and not own.too_hot
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_duty_that_is_too_hot_is_warned_of(tmp_path):
     made = run_study(parse(short_study(loads="[[usage.load]]\nfactor = 10\n")), tmp_path)
     own = found(made).own
@@ -383,7 +383,7 @@ def test_another_motor_that_changes_the_speed_is_no_comparison(tmp_path):
     assert "turns at 1.9" in found(made).no_other and "usage.other" in found(made).no_other
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_same_motor_takes_the_same_energy(tmp_path):
     made = run_study(parse(short_study(table='other = "IE3 4-pole 1.5 kW, 90L"\n')), tmp_path)
     write(made, tmp_path)

@@ -101,6 +101,7 @@ def empty():
     return recorded(empty=True, seed=5)
 
 
+@pytest.mark.second
 def test_derivatives_of_residuals(loaded):
     """By every unknown, of every column, against differences."""
     problem = problem_of(loaded)
@@ -132,6 +133,7 @@ def test_a_loaded_and_an_empty_run_are_identified(loaded, empty, angle):
 
 
 @pytest.mark.parametrize("angle", ["mark", "motor.count"])
+@pytest.mark.second
 def test_a_minute_of_an_induction_motor_from_many_starts(angle):
     """A motor without speed control loses step with a simulated one of another load, by parts of a turn in a minute,
     and its encoder counts thousandths of a degree: from all starts the fit ends at the same point, soon."""
@@ -275,7 +277,7 @@ def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):
     assert own.known + own.change == pytest.approx(0.15, abs=4.0 * own.deviation) and own.deviation < 5e-4
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_wrong_gains_are_the_suspects(loaded, empty):
     """Of a converter whose gains are taken for others; with those of the recorded one the model describes the
     recordings."""
@@ -307,6 +309,7 @@ def test_another_law_of_friction_is_suspicious():
     assert own.known + own.change == pytest.approx(0.2, abs=0.02 + 4.0 * own.deviation)
 
 
+@pytest.mark.second
 def test_a_law_with_which_the_machine_does_not_run_is_left_out(loaded, monkeypatch):
     """One that is nearer to that of the model stands in its place."""
     problem = problem_of(without(loaded, "motor.count"))
@@ -341,6 +344,7 @@ def test_the_statistic_of_noise_is_that_of_its_distribution():
     assert own.orders[0] == (3, pytest.approx(0.18, abs=0.02)) and not own.is_noise
 
 
+@pytest.mark.second
 def test_a_proposed_run_with_fewer_rows_tells_the_same(loaded, monkeypatch):
     """Each row counts for those that it stands for, and a mark as before."""
     problem, own = problem_of(without(loaded, "motor.count")), what_runs_tell._simulated
@@ -593,6 +597,7 @@ WITH_MASSES = (
 )
 
 
+@pytest.mark.second
 def test_what_runs_cannot_tell_is_named(loaded, empty):
     """In one run the material on the left web acts as the web itself. An empty run tells them apart, and is what is
     proposed."""

@@ -58,7 +58,7 @@ def study(name, speed, numbers):
     return text
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_a_linkage_is_identified(name, tmp_path):
     """Parameters and inputs that the file itself declares, within four deviations of the truth."""

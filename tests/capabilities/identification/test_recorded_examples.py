@@ -38,7 +38,7 @@ def test_they_are_modest():
         assert recording.step == pytest.approx(1.0 / TRUTH["sensors"]["rate"])
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_the_hidden_machine_is_identified():
     """With a scale that weighs its parts to 5 %, and a current clamp of 1 %, from a loaded and an empty run: the feed

@@ -104,6 +104,7 @@ def test_derivatives_of_a_shaken_run(fine):
 
 
 @pytest.mark.parametrize("kind", ["dc", pytest.param("im", marks=SLOW), "torque"])
+@pytest.mark.slow
 def test_a_coast_is_identified(kind):
     """Beside a steady run: within four standard deviations, and the residuals are noise. After the switch no electric
     column is compared."""

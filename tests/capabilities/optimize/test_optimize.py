@@ -1,4 +1,4 @@
-"""The search for the best machine, against other routes: differences, perturbed problems, sweeps, and the FMU."""
+"""The search for the best machine, against other routes: differences, perturbed problems, and sweeps."""
 
 from __future__ import annotations
 
@@ -99,10 +99,7 @@ def test_the_best_machine(best):
     assert best.met and best.starts == 4 and best.feasible == 4 and best.agree >= 3
     assert best.found["peak(crank_torque)"] < 0.6 * best.today["peak(crank_torque)"]
     assert best.neighbours.better == 0 and best.neighbours.feasible > 10
-    # by the FMU, by another route in Python, and by the machine's own refusals
-    assert set(best.fmu) == set(best.quantities)
-    for name, value in best.fmu.items():
-        assert value.deviation < 1e-9, name
+    # by another route in Python, and by the machine's own refusals
     machine = best.machine
     table = evaluate(machine, list(best.quantities.values()), 3.0, best.wishes.feed, engine="numpy")
     for name, value in best.found.items():
@@ -269,7 +266,7 @@ def _moved(limit, each, step):
     return _with(limit, **{"low" if each.side == "min" else "high": each.value + step})
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_one_parameter_without_limits():
     """A counterweight alone: the RMS torque is a smooth function of one number."""
     text = '[optimize]\nobjectives = ["rms(crank_torque)"]\n[optimize.free.crank]\ns = { min = -1, max = 1 }'
@@ -376,7 +373,7 @@ def test_small_powers_are_in_watts(best):
         assert units_of(found, chosen.file.tables, chosen.units)["power"] == ("kW",)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_two_wishes_that_conflict():
     """A swing and a speed of slack, each of which can be met alone."""
     pair = {'"16 deg"': '"19 deg"', "4 rad/s": "8 rad/s", "starts = 4": "starts = 2"}
@@ -414,7 +411,7 @@ def press(tmp_path):
     return PRESS.replace('"PRESS"', f'"{pressed_both_ways(tmp_path).as_posix()}"')
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_linkage_file(press):
     """The best of three parameters is that of a map over all of them; a fourth one, on which nothing depends, keeps
     its value."""
@@ -431,7 +428,6 @@ def test_a_linkage_file(press):
     ratio = page.result["parameters"]["ratio"]
     assert page.result["without_effect"] == ["ratio"] and ratio["best"] == ratio["today"]
     assert own.met and own.agree == 2 and own.neighbours.better == 0
-    assert all(value.deviation < 1e-9 for value in own.fmu.values()) and len(own.fmu) == 3
     quantities = list(own.quantities.values())
     fine = [np.linspace(low, high, 21) for low, high in own.wishes.free.values()]
     values = dict(zip(own.wishes.names, fine, strict=True))
@@ -479,7 +475,6 @@ MANY = TABLE.replace("starts = 4", "starts = 32").replace(
 def test_many_starts_find_the_same(objective):
     own = find_best(wishes(MANY, **{"peak(crank_torque)": objective}))
     assert own.agree >= 20 and own.neighbours.better == 0
-    assert all(value.deviation < 1e-6 for value in own.fmu.values())
 
 
 @pytest.mark.slow

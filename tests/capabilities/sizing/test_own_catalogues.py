@@ -33,6 +33,7 @@ from chainunit.capabilities.sizing.parts import coupling_for
 from chainunit.capabilities.sizing.preference import order_words, rank
 from chainunit.core.errors import InputError
 from chainunit.drives.catalogue import catalogue, offer
+from chainunit.drives.gearing import ordered_torque
 from chainunit.reading.results import as_data
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import load, parse
@@ -189,13 +190,13 @@ def test_a_gear_that_just_carries_an_overload_is_not_too_weak(sized, monkeypatch
     """The gear is judged by the torque that it has to carry, and told with the digits that part it from the gear."""
     _, found = sized
     load = GearLoad(1000.4, "an overload", 2.0)
-    order = GearOrder(load.rated, {"overload": load}, ())
+    order = GearOrder(ordered_torque(load.rated), {"overload": load}, ())
     monkeypatch.setattr(findings, "gear_order", lambda *of: order)
     data = dataclasses.replace(found.best.sold.data, rated_torque=rated)
     best = dataclasses.replace(found.best, sold=dataclasses.replace(found.best.sold, data=data))
     study = SimpleNamespace(insufficient="")
     listed = dataclasses.replace(found, candidates=[best]).parts(study, None)
-    assert any("an overload takes one that permits 500.2 N m" in words for words in listed.open) == is_weak
+    assert any("an overload takes one that permits 501 N m" in words for words in listed.open) == is_weak
 
 
 def test_checks_of_thermal_rating_overhung_load_and_speed(sized):

@@ -171,16 +171,17 @@ def test_a_belt_before_a_gear_has_the_ratio_of_both():
 
 
 def test_a_belt_by_hand():
-    """75 kW at 1485 rev/min times 1.4 are 105 kW, 675 N m on a pulley of 250 mm: 19.4 m/s; a belt was ordered by the
-    torque of a gear."""
+    """75 kW at 1485 rev/min times 1.4 are 105 kW, 675 N m on a pulley of 237 mm at least: 300 and 1600 mm are the
+    smallest standard pair within 2 % of the ratio 5.4, at 23.3 m/s; a belt was ordered by the torque of a gear. The
+    large pulley was one that nobody makes: 1350 mm."""
     w = 1485.0 * math.pi / 30.0
     belt = belt_drive(75e3, w, 5.4, 1.4)
     assert belt.design_power == pytest.approx(105e3) and belt.section == "SPB"
-    assert (belt.small, belt.large) == pytest.approx((0.25, 1.35))
-    assert belt.speed == pytest.approx(19.4, abs=0.05)
+    assert (belt.small, belt.large) == (0.3, 1.6)
+    assert belt.speed == pytest.approx(23.3, abs=0.05)
     assert (belt_drive(1.1e3, 150.0, 3.0, 1.3).section, belt_drive(1.1e3, 150.0, 3.0, 1.3).small) == (
         "SPZ",
-        0.063,
+        0.067,
     )
 
 
@@ -255,12 +256,16 @@ def test_a_belt_is_ordered_by_its_design_power_and_no_gear_with_it():
     assert belt.service_factor.value == 1.5 and belt.design_power.value == pytest.approx(112.5e3)
     # a long text in a narrow column ran over its neighbour
     assert "its maker gives number and tension" in belt.design_power.title and len(belt.section) < 22
-    assert belt.ratio.value == 5.4 and belt.speed.value == pytest.approx(
-        0.5 * belt.small_pulley.value * motor.nameplate.speed
+    assert (
+        belt.ratio.value == pytest.approx(1600 / 300)
+        and belt.ratio.title.endswith("in the runs 5.4")
+        and belt.speed.value == pytest.approx(0.5 * belt.small_pulley.value * motor.nameplate.speed)
     )
     both = dataclasses.replace(plan, load_class="uniform")
     study.drive = SimpleNamespace(transmission="belt and gear", is_geared=True, ratio=150.0)
-    assert ordered_belt(study, both, TrialResult(inertia_factor=20.0)).ratio.value == pytest.approx(3.75)
+    assert ordered_belt(study, both, TrialResult(inertia_factor=20.0)).ratio.value == pytest.approx(
+        3.75, rel=0.02
+    )
     study.drive = SimpleNamespace(transmission="gear", is_geared=True, ratio=150.0)
     assert ordered_belt(study, plan, TrialResult()) is None
 
@@ -357,6 +362,7 @@ def ranked(*candidates, larger=2.0):
     return candidates
 
 
+@pytest.mark.second
 def test_no_fluctuation_is_a_limit_unless_it_is_given(tmp_path):
     """A limit of 5 % that nobody asked for doubled the motor."""
     assert parse("[sizing]\n").plans["sizing"].demands.fluctuation == math.inf
@@ -643,7 +649,7 @@ def check_order(config, first, name, tmp_path, monkeypatch, *motors, more=""):
     assert used > 0.95
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch):
     """It got 0.55 kW with 2 poles, a ratio of 199, a flywheel of 200 rotors, and a start of 7.3 s; with the gear that
     was ordered for 0.75 kW it got that again."""
@@ -907,7 +913,7 @@ def pressed(tmp_path, monkeypatch, more="", *designations):
     return sized_by(parse(PRESS + more, str(folder / "press.toml")), tmp_path)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypatch):
     """The press takes 200 W in the mean and 837 W by the RMS torque: 1.1 kW was chosen as the smallest. Without a
     flywheel the motor of 0.55 kW stalls where the ram meets the workpiece."""

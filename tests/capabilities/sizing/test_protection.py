@@ -446,7 +446,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     assert "times running (all feed on the right), " in said
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [Way.SOFT_STARTER, Way.INVERTER], ids=["soft", "inverter"])
 def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way, tmp_path):
     """With starter and setting as the sentence gives them the coupling stays shut in the start and in running, and
@@ -484,7 +484,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     assert not [warning for warning in trial.warnings if warning.code == "coupling-opens-in-start"]
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "way", [Way.SOFT_STARTER, Way.INVERTER, Way.SLIP_CLUTCH], ids=["soft", "inverter", "clutch"]
 )
@@ -583,7 +583,9 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
         for peak in (700.0, 1300.0)
     )
     words = sentence(having(on_line, setting=spared))
-    assert f"350 N m at the crank, {350.0 / ratio:.2f} N m at the motor's shaft" in words
+    # the loss of the gear is on the side of the motor
+    at_motor = 350.0 / ratio / on_line.config.drive.gear.efficiency
+    assert f"350 N m at the crank, {at_motor:.2f} N m at the motor's shaft" in words
     assert (
         "It opens where the rocker is blocked (700 N m at the output of the gear in place of 1324 N m)"
         in words
@@ -919,7 +921,7 @@ def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
     assert f"motor gives {4.4 * 1.27 * 50:.0f} N m at most" in remark
     study = run_study(config.parse(light(9000) + "[coupling]\ntrip_torque = 320\n"), tmp_path)
     assert study.answers["jam_left"].coupling_trip_time is not None
-    assert any(w.code == "coupling-above-motor" and "stalls the motor" in w.text for w in study.warnings)
+    assert any(w.code == "coupling-above-motor" and "may stall the motor" in w.text for w in study.warnings)
     assert not any(warning.code == "coupling-never-opens" for warning in study.warnings)
 
 
@@ -966,7 +968,7 @@ def test_the_largest_torque_is_that_of_voltage_frequency_and_a_warm_winding():
     assert pull_out_torque(drive, run.isel(time=[0]), T) < result[0] * drive.ratio
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_behind_an_open_coupling_the_machine_has_its_chains(tmp_path):
     """It goes on from the rods' angles and speeds at that instant, and its energy from there on is only lost."""
     text = """organ = "chain"

@@ -262,6 +262,7 @@ def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
     assert choice.keeps_margin and choice.drive.added_inertia == 0.0
 
 
+@pytest.mark.second
 def test_peaks_are_of_both_sides(sized, tmp_path):
     """The side that asks the larger RMS torque is not the one with the larger peak."""
     config = parse(HEAVY)
@@ -292,6 +293,7 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
 
 
 @pytest.mark.parametrize(("series", "tolerance"), [("exact", 0.01), ("preferred", 0.03)])
+@pytest.mark.second
 def test_the_crank_turns_as_asked(sized, tmp_path, series, tolerance):
     """With the exact ratio; with a preferred one nearly."""
     config = parse(f'{HEAVY}ratio_series = "{series}"\n')
@@ -354,7 +356,7 @@ def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeyp
     assert as_data(result)["weak"]["value"] == 2
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_remedy_of_the_rejected_example_works(tmp_path):
     """Its comment says that a soft starter makes a motor fit."""
     text = (Path(__file__).parents[3] / "examples/motor_rejected.toml").read_text("utf-8")

@@ -405,6 +405,7 @@ def jams():
 
 
 @NATIVE
+@pytest.mark.second
 def test_measures_are_those_of_the_co_simulation():
     """A point as a study of its own, to the error of the coupling; the rows are so close that both meet the peaks."""
     text = gains() + TRANSIENTS.replace(
@@ -421,6 +422,7 @@ def test_measures_are_those_of_the_co_simulation():
 
 
 @NATIVE
+@pytest.mark.second
 def test_the_largest_loads_come_first_and_the_limit_of_the_current_is_told():
     text = TRANSIENTS.replace('quantities = ["min(margin)"]\n', "")
     plans = [
@@ -841,6 +843,7 @@ points = 12
 """
 
 
+@pytest.mark.second
 def test_the_command(tmp_path):
     (tmp_path / "map.toml").write_text(MAP, "utf-8")
     done = chainunit("sweep", "map.toml", "-o", "map", "--workers", "2", cwd=tmp_path)

@@ -688,7 +688,7 @@ def run(monkeypatch, capsys, *arguments):
     return left.value.code, *capsys.readouterr()
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
     file, folder = tmp_path / "mine.toml", tmp_path / "out dir"
     start = "[run]\nramp = 1\nsettle_turns = 10\nturns = 1\n"

@@ -145,7 +145,7 @@ def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     assert any(each.startswith("feed.left.material_mass") for each in doubts)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
     """By the factor that the page states; a file that is no identification is refused."""
     covariance = {

@@ -23,7 +23,7 @@ from ...study.remark import note, warning
 from ...study.torques import gear_torque
 from ...study.window import mean
 from .coupling_choice import CHOSEN, CouplingCandidate, tried, with_row
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 from .runs import largest
 from .tables import FlexibleCouplingTable
 
@@ -155,57 +155,40 @@ def coupling_check(
     )
 
 
+_IMPACT = "TL = mean; SZ = factors.start; St = factors.temperature"
+_RULES = {
+    "rated_torque": Rule(
+        "rated", "rated torque", _CLAUSE, "TKN >= T St, T: RMS of steady running", "T = rms; St = factors.temperature"
+    ),
+    "peak_torque": Rule(
+        "peak", "peak torque ({run})", _CLAUSE, "TKmax >= (TL + (T - TL) SA SZ) St",
+        f"T = largest; SA = factors.surge; {_IMPACT}",
+    ),
+    "alternating_torque": Rule(
+        "alternating", "alternating torque", _CLAUSE, "TKW >= half range of sum V(f) Sf(f) T(f), times St",
+        "rigid = swinging.rigid; elastic = swinging.elastic; fe = swinging.natural_frequency; "
+        "St = factors.temperature",
+    ),
+}  # fmt: skip
+"""By the key of the limit."""
+_PASSAGE = Rule(
+    "passage", "passage through resonance", _CLAUSE, "TKmax >= (TL + Ti VR SZ) St",
+    f"Ti = swinging.passed; VR = factors.resonance; {_IMPACT}",
+)  # fmt: skip
+
+
 def coupling_rows(
     of: CouplingCheck, table: FlexibleCouplingTable, titles: Mapping[str, str]
 ) -> Iterator[CheckRow | NotChecked]:
     """The rows of a coupling; `titles` are those of runs."""
-    at = "checks.flexible_coupling"
-    factors = {"St": f"{at}.factors.temperature"}
-    impact = {"TL": f"{at}.mean", "SZ": f"{at}.factors.start", **factors}
-    rows = (
-        (
-            "rated torque",
-            "rated_torque",
-            "rated",
-            "TKN >= T St, T: RMS of steady running",
-            {"T": f"{at}.rms", **factors},
-        ),
-        (
-            f"peak torque ({titles.get(of.run, of.run)})",
-            "peak_torque",
-            "peak",
-            "TKmax >= (TL + (T - TL) SA SZ) St",
-            {"T": f"{at}.largest", "SA": f"{at}.factors.surge", **impact},
-        ),
-        (
-            "alternating torque",
-            "alternating_torque",
-            "alternating",
-            "TKW >= half range of sum V(f) Sf(f) T(f), times St",
-            {
-                "rigid": f"{at}.swinging.rigid",
-                "elastic": f"{at}.swinging.elastic",
-                "fe": f"{at}.swinging.natural_frequency",
-                **factors,
-            },
-        ),
-        (
-            "passage through resonance",
-            "peak_torque",
-            "passage",
-            "TKmax >= (TL + Ti VR SZ) St",
-            {"Ti": f"{at}.swinging.passed", "VR": f"{at}.factors.resonance", **impact},
-        ),
-    )
-    for title, key, name, formula, numbers in rows:
-        limit, value = getattr(table, key), getattr(of, name)
-        if not limit:
-            yield NotChecked(f"coupling, {title}", f"add [flexible_coupling] with {key}, by its maker")
-        elif value is None:
-            words = "add [flexible_coupling] with stiffness and damping, by its maker"
-            yield NotChecked(f"coupling, {title}", words)
+    run = titles.get(of.run, of.run)
+    for key, rule in (*_RULES.items(), ("peak_torque", _PASSAGE)):
+        lacking = key if not (limit := getattr(table, key)) else "stiffness and damping"
+        if not limit or getattr(of, rule.value) is None:
+            why = f"add [flexible_coupling] with {lacking}, by its maker"
+            yield NotChecked(f"coupling, {rule.title.format(run=run)}", why)
         else:
-            yield CheckRow("coupling", title, _CLAUSE, formula, value, limit, f"{at}.{name}", numbers, "N.m")
+            yield rule.row("coupling", "checks.flexible_coupling", of, limit, run)
 
 
 @dataclass(frozen=True)
@@ -283,11 +266,9 @@ def speed_row(of: CouplingCheck, table: FlexibleCouplingTable) -> CheckRow | Not
     """The check of the speed of a coupling."""
     if not table.largest_speed:
         return NotChecked("coupling, speed", "add [flexible_coupling] with largest_speed, by its maker")
-    source, at = "Limit of the maker of the coupling", "checks.flexible_coupling.speed"
-    formula, speed = "largest |w| of all runs <= permitted", float(of.duty.speed)
-    return CheckRow(
-        "coupling", "speed", source, formula, speed, table.largest_speed, at, {}, "rad/s", "speed"
-    )
+    formula = "largest |w| of all runs <= permitted"
+    rule = Rule("speed", "speed", "Limit of the maker of the coupling", formula)
+    return rule.row("coupling", "checks.flexible_coupling", of.duty, table.largest_speed)
 
 
 def find(

@@ -28,7 +28,7 @@ from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_torque
 from ...study.verdict import START
 from ...study.window import mean
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 from .runs import largest
 from .tables import GearRatingTable, MotorShaftTable
 
@@ -36,6 +36,28 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _MAKER = "Rating of the maker of the gear"
+_TEQ = {True: "Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p)", False: "Teq: largest |T| of running"}
+_RUNNING = {
+    has_exponent: Rule(
+        "running", "torque of running", "ISO 6336-6:2019, annex on KA from a load spectrum",
+        f"Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T|, both of steady "
+        "running", "TN = rated_torque; p = exponent; KA = application_factor",
+    )
+    for has_exponent, teq in _TEQ.items()
+}  # fmt: skip
+_LARGEST = Rule(
+    "largest", "largest torque of the output ({run})", _MAKER, "T <= peak factor x TN",
+    "TN = rated_torque; permitted = torque_limit",
+)  # fmt: skip
+_RATINGS = {
+    "thermal_power": Rule("power", "mean power", _MAKER, "mean of |P| <= thermal rating"),
+    "overhung_load": Rule("radial", "overhung load", _MAKER, "largest |F| of the bearing <= permitted"),
+    "largest_speed": Rule("speed", "speed of the input shaft", _MAKER, "largest |w| of all runs"),
+}
+"""By the key of the rating."""
+_EVENTS = Rule(
+    "largest_radial", "overhung load of all runs", _MAKER, "largest |F| of the bearing <= permitted in events"
+)
 _UNTURNED = "no pin of the machine turns with the output shaft"
 _SEPARATE = "the crank has bearings of its own (sizing.separate_bearing)"
 
@@ -116,61 +138,24 @@ def gear_rows(
 ) -> Iterator[CheckRow | NotChecked]:
     """The rows of a gear; `permitted_peak` is the permitted radial force in events [N], 0 where it is unknown, and
     `titles` are those of runs. `unloaded` says why the output shaft carries no reaction, where it carries none."""
-    own, at = of.load, "checks.gear"
+    load, at = of.load, "checks.gear"
     if of.running_limit is not None and of.torque_limit is not None:
-        rated = {"TN": f"{at}.rated_torque"}
-        teq = "Teq: largest |T| of running"
-        exponent = {}
-        if own.exponent:
-            teq = "Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p)"
-            exponent = {"p": f"{at}.exponent"}
-        yield CheckRow(
-            "gear",
-            "torque of running",
-            "ISO 6336-6:2019, annex on KA from a load spectrum",
-            f"Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T|, both of steady "
-            "running",
-            own.running,
-            of.running_limit,
-            f"{at}.running",
-            {**rated, **exponent, "KA": f"{at}.application_factor"},
-            "N.m",
-        )
-        yield CheckRow(
-            "gear",
-            f"largest torque of the output ({titles.get(of.run, of.run)})",
-            _MAKER,
-            "T <= peak factor x TN",
-            own.largest,
-            of.torque_limit,
-            f"{at}.largest",
-            {**rated, "permitted": f"{at}.torque_limit"},
-            "N.m",
-        )
+        yield _RUNNING[bool(load.exponent)].row("gear", at, load, of.running_limit)
+        yield _LARGEST.row("gear", at, load, of.torque_limit, titles.get(of.run, of.run))
     else:
         yield _lacks("torque of running and largest torque", "rated_torque")
-    ratings = (
-        ("mean power", "thermal_power", "mean of |P| <= thermal rating", "power", "W", ""),
-        ("overhung load", "overhung_load", "largest |F| of the bearing <= permitted", "radial", "N", ""),
-        ("speed of the input shaft", "largest_speed", "largest |w| of all runs", "speed", "rad/s", "speed"),
-    )
-    for title, key, formula, name, unit, kind in ratings:
-        limit, value = getattr(rating, key), getattr(own, name)
-        if value is None:
-            yield NotChecked(f"gear, {title}", unloaded)
-        elif not limit:
-            yield _lacks(title, key)
+    for key, rule in _RATINGS.items():
+        if getattr(load, rule.value) is None:
+            yield NotChecked(f"gear, {rule.title}", unloaded)
+        elif not (limit := getattr(rating, key)):
+            yield _lacks(rule.title, key)
         else:
-            yield CheckRow("gear", title, _MAKER, formula, value, limit, f"{at}.{name}", {}, unit, kind)
-    if own.largest_radial is not None and rating.overhung_load:
-        title = "overhung load of all runs"
+            yield rule.row("gear", at, load, limit)
+    if load.largest_radial is not None and rating.overhung_load:
         if permitted_peak:
-            yield CheckRow(
-                "gear", title, _MAKER, "largest |F| of the bearing <= permitted in events",
-                own.largest_radial, permitted_peak, f"{at}.largest_radial", {}, "N",
-            )  # fmt: skip
+            yield _EVENTS.row("gear", at, load, permitted_peak)
         else:
-            yield _lacks(title, "peak_overhung_load")
+            yield _lacks(_EVENTS.title, "peak_overhung_load")
 
 
 def _lacks(title: str, key: str) -> NotChecked:
@@ -290,14 +275,7 @@ def pulley_force(torque: float, diameter: float, factor: float) -> float:
 
 def shaft_row(of: ShaftLoad, limit: float, formula: str, numbers: Mapping[str, str]) -> CheckRow:
     """The row of the motor's shaft."""
+    source, place = "Permitted radial force of the maker of the motor", "checks.motor_shaft.radial"
     return CheckRow(
-        "motor",
-        "overhung load of the shaft",
-        "Permitted radial force of the maker of the motor",
-        formula,
-        of.radial,
-        limit,
-        "checks.motor_shaft.radial",
-        numbers,
-        "N",
+        "motor", "overhung load of the shaft", source, formula, of.radial, limit, place, numbers, "N"
     )

@@ -13,9 +13,20 @@ import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 
 _MAKER = "Limits of the maker of the bearing"
+_RULES = (
+    Rule(
+        "pressure", "pressure ({run})", "Specific load of ISO 7902-1; limit of the maker of the bearing",
+        "p = F/(d b), F: largest force of all runs", "F = largest_force; d = diameter; b = width",
+    ),
+    Rule("speed", "sliding speed", _MAKER, "v = d/2 |dphi/dt|, largest of steady running", "d = diameter"),
+    Rule(
+        "pv", "pressure times speed", _MAKER, "mean of F/(d b) d/2 |dphi/dt| over the time of steady running",
+        "d = diameter; b = width",
+    ),
+)  # fmt: skip
 
 
 @declaration
@@ -65,41 +76,10 @@ def plain_bearing(table: Any, time: Any, force: Any, angle: Any, largest: float,
 def checks(pin: str, of: PlainBearing, table: Any, path: str, run: str) -> Iterator[CheckRow | NotChecked]:
     """The checks of a bearing whose numbers stand at `path` of the result; `run` is the title of the run with the
     largest force."""
-    own, at = of.numbers, {name: f"{path}.{name}" for name in vars(of.numbers)}
-    sizes = {"d": at["diameter"], "b": at["width"]}
-    rows = (
-        (
-            "pressure",
-            f"pressure ({run})",
-            "Specific load of ISO 7902-1; limit of the maker of the bearing",
-            "p = F/(d b), F: largest force of all runs",
-            "N/m2",
-            "stress",
-            {"F": at["largest_force"], **sizes},
-        ),
-        (
-            "speed",
-            "sliding speed",
-            _MAKER,
-            "v = d/2 |dphi/dt|, largest of steady running",
-            "m/s",
-            "",
-            {"d": at["diameter"]},
-        ),
-        (
-            "pv",
-            "pressure times speed",
-            _MAKER,
-            "mean of F/(d b) d/2 |dphi/dt| over the time of steady running",
-            "W/m2",
-            "pv",
-            sizes,
-        ),
-    )
-    for name, title, clause, formula, unit, kind, numbers in rows:
-        limit = getattr(table, name)
-        if limit is None:
-            yield NotChecked(f"{pin}, {title}", f"the file gives no permitted {name}")
+    for rule in _RULES:
+        if (limit := getattr(table, rule.value)) is None:
+            yield NotChecked(
+                f"{pin}, {rule.title.format(run=run)}", f"the file gives no permitted {rule.value}"
+            )
         else:
-            value = getattr(own, name)
-            yield CheckRow(pin, title, clause, formula, value, limit, at[name], numbers, unit, kind)
+            yield rule.row(pin, path, of.numbers, limit, run)

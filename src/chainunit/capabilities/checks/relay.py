@@ -8,7 +8,7 @@ must not trip it, and as slow as the other, where it must still save the motor.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,14 +29,20 @@ from ...study.relay import (
     stall_trip,
     start_seconds,
 )
+from ...study.starts import StartFindings
 from ...study.verdict import STEADY
 from .plan import RelayPlan
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
+_STALL = f"{_CLAUSE}; locked-rotor time of the maker of the motor"
+_RUNNING = Rule(
+    "before", "running", "IEC 60947-4-1, limits of operation",
+    f"RMS current of steady running <= {HOLDS_AT:g} Ir, at which the relay must not trip", "Ir = setting",
+)  # fmt: skip
 _WHAT = "thermal overload relay"
 
 
@@ -86,14 +92,20 @@ class RelayFindings:
 
 
 def stall_heat(
-    of: TripClass, time: Any, current: Any, setting: float, before: float, stall_current: float
+    of: TripClass,
+    time: Any,
+    current: Any,
+    setting: float,
+    before: float,
+    stall_current: float,
+    after: float | None = None,
 ) -> StallHeat | None:
     """An event: the trip of the slowest relay of a class, and the heat of the motor until then. `time` [s] since the
-    event and `current` [A] are of shape (n,); its `lasting_current` flows on. None where the relay never
+    event and `current` [A] are of shape (n,); the current flows on as `lasting_current` says. None if the relay never
     trips."""
     if before >= TRIPS_AT * setting:
         return None
-    lasts = lasting_current(current)
+    lasts = lasting_current(current, after)
     trip = relay_trip(time, current, setting, before, lasts, of.longest, TRIPS_AT)
     if trip is None:
         return None
@@ -104,14 +116,15 @@ def stall_heat(
 
 
 def relay_findings(
-    trip_class: str, numbers: RelaySetting, runs: Mapping[str, tuple[Any, Any, float]], least: int = LIGHT
+    trip_class: str, numbers: RelaySetting, runs: Mapping[str, Sequence[Any]], least: int = LIGHT
 ) -> RelayFindings:
     """The relay with these `numbers`.
 
     Parameters
     ----------
     trip_class : name of its class; empty for the class `least`, or the heaviest
-    runs : by event, the time since it began [s] and the current [A], shape (n,), and the RMS current before [A]
+    runs : by event, the time since it began [s] and the current [A], shape (n,), the RMS current before [A], and the
+        one that flows after it if it passes [A]
     least : the least class that all starts need, by `chainunit.study.relay.start_class`
     """
     classes: dict[str, RelayOfClass] = {}
@@ -127,8 +140,8 @@ def relay_findings(
     trips = {name: classes[name].stall_trip for name in (each.name for each in starting)}
     suitable = [name for name, trip in trips.items() if trip is not None and trip <= numbers.stall_time]
     heats = {
-        name: stall_heat(own, time, current, numbers.setting, before, numbers.stall_current)
-        for name, (time, current, before) in runs.items()
+        name: stall_heat(own, time, current, numbers.setting, before, numbers.stall_current, *after)
+        for name, (time, current, before, *after) in runs.items()
     }
     events = {name: heat for name, heat in heats.items() if heat is not None}
     holds = HOLDS_AT * numbers.setting
@@ -163,14 +176,24 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
 
     rise = study.runs["start_up"].sel(time=slice(None, study.start_end))
     seconds = start_seconds(rise["time"].values, current_of(rise), given["setting"])
-    runs: dict[str, tuple[Any, Any, float]] = {}
+    starts = StartFindings.found_in(study)
+    if (
+        starts is not None
+        and drive.rated_current
+        and not starts.stuck
+        and in_phases == (drive.star_delta is not None)
+    ):
+        # the hardest of the starts from all crank angles, which are for a relay at the rated current
+        seconds = max(seconds, starts.relay_seconds * (share * drive.rated_current / given["setting"]) ** 2)
+    runs: dict[str, tuple[Any, Any, float, float | None]] = {}
     for event in study.overloads:
         # behind a coupling that opens no load is left that could trip the relay
         if study.answers[event].coupling_trip_time is None:
             run = from_event_on(study, event)
             from_rest = study.config.events[event].from_rest
             time = run["time"].values - study.event[event]
-            runs[event] = time, current_of(run), 0.0 if from_rest else before
+            passes = study.config.events[event].passes and study.answers[event].stall_time is None
+            runs[event] = time, current_of(run), 0.0 if from_rest else before, before if passes else None
     numbers = RelaySetting(before=before, start_seconds=seconds, **given)
     found = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
     return found, list(relay_rows(found, {event: study.title_of(event) for event in found.events}))
@@ -187,55 +210,33 @@ def _why_none(study: StudyRecord) -> str:
 
 def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow | NotChecked]:
     """The rows of a relay; `titles` are those of its events."""
-    own, at = of.classes[of.trip_class], "checks.relay"
-    here = f"{at}.classes.{of.trip_class}"
-    name = f"thermal relay of class {of.trip_class}"
+    numbers, own, at = of.numbers, of.classes[of.trip_class], "checks.relay"
+    here, name = f"{at}.classes.{of.trip_class}", f"thermal relay of class {of.trip_class}"
+    places = {
+        "Ir": f"{at}.setting",
+        "IA": f"{at}.stall_current",
+        "I0": f"{at}.before",
+        "largest": f"{here}.longest",
+    }
     yield CheckRow(
-        name,
-        "start",
-        _CLAUSE,
+        name, "start", _CLAUSE,
         f"t = sum (I/({MULTIPLE:g} Ir))^2 dt <= least trip time of the class at {MULTIPLE:g} Ir, cold",
-        of.numbers.start_seconds,
-        own.shortest,
-        f"{at}.start_seconds",
-        {"Ir": f"{at}.setting", "limit": f"{here}.shortest"},
-        "s",
-    )
-    yield CheckRow(
-        name,
-        "running",
-        "IEC 60947-4-1, limits of operation",
-        f"RMS current of steady running <= {HOLDS_AT:g} Ir, at which the relay must not trip",
-        of.numbers.before,
-        of.holds_up_to,
-        f"{at}.before",
-        {"Ir": f"{at}.setting"},
-        "A",
-    )
-    if of.numbers.before >= TRIPS_AT * of.numbers.setting:
+        numbers.start_seconds, own.shortest, f"{at}.start_seconds",
+        {"Ir": places["Ir"], "limit": f"{here}.shortest"}, "s",
+    )  # fmt: skip
+    yield _RUNNING.row(name, at, numbers, of.holds_up_to)
+    if numbers.before >= TRIPS_AT * numbers.setting:
         yield NotChecked(f"{name}, stall and events", "running alone trips it")
         return
-    numbers = {"Ir": f"{at}.setting", "IA": f"{at}.stall_current", "I0": f"{at}.before"}
     yield CheckRow(
-        name,
-        "trip with the rotor locked",
-        f"{_CLAUSE}; locked-rotor time of the maker of the motor",
+        name, "trip with the rotor locked", _STALL,
         f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the class",
-        math.inf if own.stall_trip is None else own.stall_trip,
-        of.numbers.stall_time,
-        f"{here}.stall_trip",
-        numbers | {"largest": f"{here}.longest"},
-        "s",
-    )
+        math.inf if own.stall_trip is None else own.stall_trip, numbers.stall_time, f"{here}.stall_trip", places, "s",
+    )  # fmt: skip
     for event, heat in of.events.items():
+        path = f"{at}.events.{event}"
         yield CheckRow(
-            name,
-            f"heat of the motor until the trip ({titles[event]})",
-            f"{_CLAUSE}; locked-rotor time of the maker of the motor",
-            "t = sum (I/IA)^2 dt until the slowest relay trips",
-            heat.seconds,
-            of.numbers.stall_time,
-            f"{at}.events.{event}.seconds",
-            {"IA": f"{at}.stall_current", "trip": f"{at}.events.{event}.trip_time"},
-            "s",
-        )
+            name, f"heat of the motor until the trip ({titles[event]})", _STALL,
+            "t = sum (I/IA)^2 dt until the slowest relay trips", heat.seconds, numbers.stall_time, f"{path}.seconds",
+            {"IA": places["IA"], "trip": f"{path}.trip_time"}, "s",
+        )  # fmt: skip

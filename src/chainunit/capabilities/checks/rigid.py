@@ -18,13 +18,7 @@ def checks(study: StudyRecord) -> Iterator[CheckRow | NotChecked]:
         )
         return
     yield CheckRow(
-        "shaft line",
-        "lowest natural frequency over that of the turns",
-        "VDI 2149 Part 1",
-        f"f1/f >= {HOLDS_FROM:g}: the rigid model holds",
-        line.ratio,
-        HOLDS_FROM,
-        "rigid_line.ratio",
-        {"f1": "rigid_line.natural_frequency", "f": "rigid_line.driver_frequency"},
-        at_least=True,
-    )
+        "shaft line", "lowest natural frequency over that of the turns", "VDI 2149 Part 1",
+        f"f1/f >= {HOLDS_FROM:g}: the rigid model holds", line.ratio, HOLDS_FROM, "rigid_line.ratio",
+        {"f1": "rigid_line.natural_frequency", "f": "rigid_line.driver_frequency"}, at_least=True,
+    )  # fmt: skip

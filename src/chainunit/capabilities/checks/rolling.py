@@ -10,7 +10,7 @@ factors.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,9 +19,33 @@ from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...reading.text import number
 from ...study.bearings import EXPONENT, mean_load
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 
-_CLAUSE = {"ball": "ISO 281:2007, 5.3", "roller": "ISO 281:2007, 7.3"}
+_ISO_281 = {"ball": "ISO 281:2007, 5.3", "roller": "ISO 281:2007, 7.3"}
+_LIFE = {
+    kind: Rule(
+        "life", "rating life", _ISO_281[kind],
+        f"L = a (C/P)^p 10^6 turns, p = {p}; P = (sum F^p |dphi| / sum |dphi|)^(1/p)",
+        "a = life_factor; C = C; P = load; mean |dphi/dt| = speed", at_least=True,
+    )
+    for kind, p in (("ball", "3"), ("roller", "10/3"))
+}  # fmt: skip
+_LOAD = {
+    kind: Rule(
+        "load", "equivalent load", _ISO_281[kind],
+        "P <= 0.5 C, and P <= C0: beyond it the formula of the life does not hold", "P = load; C = C; C0 = C0",
+    )
+    for kind in _ISO_281
+}  # fmt: skip
+_STATIC = Rule(
+    "static_safety", "static safety ({run})", "ISO 76:2006, static safety factor",
+    "S0 = C0/F, F: largest force of all runs", "C0 = C0; F = largest_force", at_least=True,
+)  # fmt: skip
+_SWING = Rule(
+    "swing", "swing", "Rumbarger and Jones 1968; Harris, Rolling Bearing Analysis",
+    "theta >= 4 pi/(Z (1 - gamma)): below it false brinelling threatens, and the rating life does not hold",
+    "least = critical_swing", at_least=True,
+)  # fmt: skip
 _MILLION_TURNS = 2e6 * math.pi
 MOST_LOAD = 0.5
 """Equivalent load over the dynamic load rating up to which the formula of the life holds."""
@@ -113,7 +137,7 @@ def rolling_bearing(
 def checks(pin: str, of: RollingBearing, table: Any, path: str, run: str) -> Iterator[CheckRow | NotChecked]:
     """The checks of a bearing whose numbers stand at `path` of the result; `run` is the title of the run with the
     largest force."""
-    own, at = of.numbers, {name: f"{path}.{name}" for name in vars(of.numbers)}
+    own = of.numbers
     least = own.critical_swing
     if own.swing is not None and least is not None and own.swing < least:
         why = (
@@ -122,67 +146,17 @@ def checks(pin: str, of: RollingBearing, table: Any, path: str, run: str) -> Ite
         )
         yield NotChecked(f"{pin}, rating life", why)
     else:
-        yield _life_row(pin, of, table, at)
-    rows = {"P": at["load"], "C": at["C"]} | ({"C0": at["C0"]} if table.C0 else {})
+        yield _LIFE[of.kind].row(pin, path, own, table.life)
     most = MOST_LOAD * table.C
-    yield CheckRow(
-        pin,
-        "equivalent load",
-        _CLAUSE[of.kind],
-        "P <= 0.5 C, and P <= C0: beyond it the formula of the life does not hold",
-        own.load,
-        min(most, table.C0) if table.C0 else most,
-        at["load"],
-        rows,
-        "N",
-    )
+    yield _LOAD[of.kind].row(pin, path, own, min(most, table.C0) if table.C0 else most)
     if table.C0:
-        yield CheckRow(
-            pin,
-            f"static safety ({run})",
-            "ISO 76:2006, static safety factor",
-            "S0 = C0/F, F: largest force of all runs",
-            own.static_safety,
-            table.static_safety or 0.0,
-            at["static_safety"],
-            {"C0": at["C0"], "F": at["largest_force"]},
-            at_least=True,
-        )
+        yield _STATIC.row(pin, path, own, table.static_safety or 0.0, run)
     else:
         yield NotChecked(f"{pin}, static safety", "the file gives no static load rating C0")
     if own.swing is None:
         return
-    if own.critical_swing is None:
+    if least is None:
         why = "the file does not give the number of rolling elements (elements)"
         yield NotChecked(f"{pin}, swing against false brinelling", why)
         return
-    yield CheckRow(
-        pin,
-        "swing",
-        "Rumbarger and Jones 1968; Harris, Rolling Bearing Analysis",
-        "theta >= 4 pi/(Z (1 - gamma)): below it false brinelling threatens, and the rating life does not hold",
-        own.swing,
-        own.critical_swing,
-        at["swing"],
-        {"least": at["critical_swing"]},
-        "rad",
-        at_least=True,
-    )
-
-
-def _life_row(pin: str, of: RollingBearing, table: Any, at: Mapping[str, str]) -> CheckRow:
-    """The rating life beside the one that is asked for; `at` are the places of the numbers."""
-    p = "3" if of.kind == "ball" else "10/3"
-    return CheckRow(
-        pin,
-        "rating life",
-        _CLAUSE[of.kind],
-        f"L = a (C/P)^p 10^6 turns, p = {p}; P = (sum F^p |dphi| / sum |dphi|)^(1/p)",
-        of.numbers.life,
-        table.life,
-        at["life"],
-        {"a": at["life_factor"], "C": at["C"], "P": at["load"], "mean |dphi/dt|": at["speed"]},
-        "s",
-        "hours",
-        at_least=True,
-    )
+    yield _SWING.row(pin, path, own, least)

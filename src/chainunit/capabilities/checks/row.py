@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from ...reading.results import OWN, derived, part, result
 
@@ -51,3 +53,29 @@ class NotChecked:
     why: str = part("the reason, and the remedy")
     table: str = ""
     """the table that the file does not have, where that is the reason"""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rule:
+    """A check as data. `value` is the name of its number among those of a part; `letters` have by symbol of the
+    `formula` the place of its number, from the place of the part on: "F = largest_force; d = diameter". Those of
+    numbers that the part does not have are left out."""
+
+    value: str
+    title: str
+    clause: str
+    formula: str
+    letters: str = ""
+    at_least: bool = False
+
+    def row(self, part: str, path: str, numbers: Any, limit: float, run: str = "") -> CheckRow:
+        """The row of a part: its `numbers` declare the value with its unit, and stand at `path` of the result; `run`
+        is the title of the run in the rule's title."""
+        letters = dict(pair.split(" = ") for pair in self.letters.split("; ") if pair)
+        quantity = type(numbers).__dataclass_fields__[self.value].metadata["quantity"]
+        return CheckRow(
+            part, self.title.format(run=run), self.clause, self.formula,
+            getattr(numbers, self.value), limit, f"{path}.{self.value}",
+            {x: f"{path}.{name}" for x, name in letters.items() if getattr(numbers, name, self) is not None},
+            quantity.unit, quantity.kind, self.at_least,
+        )  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, pin_force
 from ...study.readings import crank_torque, machine_series
 from ...study.record import StudyRecord
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 from .runs import largest
 from .section_plan import SectionPlan
 from .section_strength import (
@@ -31,10 +32,18 @@ from .section_strength import (
 )
 from .tables import SectionTable
 
-_CLAUSE = {
-    "fatigue": "DIN 743-1:2012, safety against fatigue",
-    "yield": "DIN 743-1:2012, safety against yield",
-}
+_FATIGUE = Rule(
+    "fatigue_safety", "safety against fatigue", "DIN 743-1:2012, safety against fatigue",
+    "S = 1/sqrt((szda/szdADK + sba/sbADK)^2 + (tta/ttADK)^2)",
+    "sba = bending; szda = tension; tta = torsion; sbADK = permitted_bending; szdADK = permitted_tension; "
+    "ttADK = permitted_torsion", at_least=True,
+)  # fmt: skip
+_YIELD = Rule(
+    "yield_safety", "safety against yield ({run})", "DIN 743-1:2012, safety against yield",
+    "S = 1/sqrt((szd/szdFK + sb/sbFK)^2 + (tt/ttFK)^2), largest stresses of all runs",
+    "sb = largest_bending; szd = largest_tension; tt = largest_torsion; sbFK = strength.yield_bending; "
+    "szdFK = strength.yield_tension; ttFK = strength.yield_torsion", at_least=True,
+)  # fmt: skip
 
 
 @declaration
@@ -150,47 +159,10 @@ def shaft_section(
 
 def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterator[CheckRow]:
     """The rows of a section; `run` is the title of the run with the largest force."""
-    at = f"checks.section.{name}"
-    own, loads = of.stress, {"sba": "bending", "szda": "tension", "tta": "torsion"}
-    # a section without a swinging stress lasts
-    fatigue = own.fatigue_safety if math.isfinite(own.fatigue_safety) else None
-    yields = own.yield_safety if math.isfinite(own.yield_safety) else None
-    yield CheckRow(
-        f"section {name}",
-        "safety against fatigue",
-        _CLAUSE["fatigue"],
-        "S = 1/sqrt((szda/szdADK + sba/sbADK)^2 + (tta/ttADK)^2)",
-        fatigue,
-        safety,
-        f"{at}.fatigue_safety",
-        {
-            **{symbol: f"{at}.{load}" for symbol, load in loads.items()},
-            **{
-                f"{symbol.removesuffix('a')}ADK": f"{at}.permitted_{load}"
-                for symbol, load in loads.items()
-                if getattr(own, f"permitted_{load}") is not None
-            },
-        },
-        at_least=True,
-    )
-    yield CheckRow(
-        f"section {name}",
-        f"safety against yield ({run})",
-        _CLAUSE["yield"],
-        "S = 1/sqrt((szd/szdFK + sb/sbFK)^2 + (tt/ttFK)^2), largest stresses of all runs",
-        yields,
-        safety,
-        f"{at}.yield_safety",
-        {
-            "sb": f"{at}.largest_bending",
-            "szd": f"{at}.largest_tension",
-            "tt": f"{at}.largest_torsion",
-            "sbFK": f"{at}.strength.yield_bending",
-            "szdFK": f"{at}.strength.yield_tension",
-            "ttFK": f"{at}.strength.yield_torsion",
-        },
-        at_least=True,
-    )
+    for rule in (_FATIGUE, _YIELD):
+        row = rule.row(f"section {name}", f"checks.section.{name}", of.stress, safety, run)
+        # a section without a swinging stress lasts
+        yield row if row.value is not None and math.isfinite(row.value) else replace(row, value=None)
 
 
 def find(

@@ -13,7 +13,7 @@ from ...study.permitted_starts import PermittedStarts, permitted_starts, startin
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
-from .row import CheckRow, NotChecked
+from .row import CheckRow, NotChecked, Rule
 from .tables import StartingTable
 
 _WHAT = "starts per hour by the rule of makers of motors"
@@ -43,29 +43,14 @@ def find(
 
 def starting_rows(of: PermittedStarts, is_chosen: bool = False) -> Iterator[CheckRow]:
     """The row of the starts; those of a motor that `is_chosen` are limited by the criteria of the choice, too."""
-    at = {name: f"checks.starting.{name}" for name in vars(of)}
-    both = (
-        "; at most as many as the choice of the motor permits, by the heat of its winding"
-        if is_chosen
-        else ""
-    )
-    yield CheckRow(
-        "motor",
-        "starts per hour",
+    choice = "; at most as many as the choice of the motor permits, by the heat of its winding"
+    rule = Rule(
+        "per_hour", "starts per hour",
         "Rule of makers of motors, Z = Z0 KJ KM KP (SEW-Eurodrive, Project planning for AC motors)",
-        f"Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM{both}",
-        of.per_hour,
-        of.permitted,
-        at["per_hour"],
-        {
-            "Z0": at["bare"],
-            "ML": at["counter_torque"],
-            "MH": at["motor_torque"],
-            "I": at["current"],
-            "IN": at["rated_current"],
-            "FI": at["inertia_factor"],
-        },
-    )
+        f"Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM{choice if is_chosen else ''}",
+        "Z0 = bare; ML = counter_torque; MH = motor_torque; I = current; IN = rated_current; FI = inertia_factor",
+    )  # fmt: skip
+    yield rule.row("motor", "checks.starting", of, of.permitted)
 
 
 def _why_none(study: StudyRecord, table: StartingTable, asked: float) -> str:

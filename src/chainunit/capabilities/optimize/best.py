@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 
 from ...core.brief import briefly_shown
-from ...core.files import scratch
-from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...study.cycle import cycle
 from ...study.cycle_quantities import CycleQuantity
 from ...work.progress import TaskProgress, quiet
-from .checks import FmuValue, Neighbours, by_fmu, neighbours
+from .checks import Neighbours, neighbours
 from .conflict import Conflict, conflict, nearest
 from .effects import effective_search
 from .search import Answer, Effort, Search
@@ -64,7 +62,6 @@ class Best:
     values: tuple[float, ...] = ()
     """the values that the feasible starts reached, in rising order"""
     neighbours: Neighbours | None = None
-    fmu: Mapping[str, FmuValue] = field(default_factory=dict)
     front: tuple[FrontPoint, ...] = ()
     turns: Mapping[str, Any] = field(default_factory=dict)
     """crank angle [rad] and crank torque [N m] of today's machine and of the best one"""
@@ -106,7 +103,7 @@ def machine_at(wishes: Wishes, x: Any) -> Machine:
     return wishes.machine.replace(dict(zip(wishes.names, map(float, x), strict=True)))
 
 
-def find_best(wishes: Wishes, progress: TaskProgress = quiet, backend: Backend | None = None) -> Best:
+def find_best(wishes: Wishes, progress: TaskProgress = quiet) -> Best:
     """Search for the best machine, and check it.
 
     Raises
@@ -137,20 +134,17 @@ def find_best(wishes: Wishes, progress: TaskProgress = quiet, backend: Backend |
     progress("the checks", 0.0, 1.0)
     objective, limits = _checked(wishes, best, search)
     around = neighbours(search, best.x, objective, limits, search.value(objective, best.x))
-    found = _values(search, best.x)
-    machine = machine_at(wishes, best.x)
     return replace(
         begun,
         answer=best,
-        found=found,
+        found=_values(search, best.x),
         pulls=_pulls(search, best.x),
         feasible=len(good),
         agree=agree,
         values=tuple(sorted(answer.value for answer in good)),
         neighbours=around,
-        fmu=_by_fmu(search, best, machine, found, backend),
         front=front,
-        turns=_turns(wishes, machine),
+        turns=_turns(wishes, machine_at(wishes, best.x)),
     )
 
 
@@ -268,21 +262,6 @@ def _checked(wishes: Wishes, best: Answer, search: Search) -> tuple[CycleQuantit
         second = wishes.objectives[1]
         limits.append(TurnLimit(second, None, search.value(second, best.x)))
     return wishes.objectives[0], limits
-
-
-# -- the best machine
-
-
-def _by_fmu(
-    search: Search, best: Answer, machine: Machine, found: Mapping[str, float], backend: Backend | None
-) -> dict[str, FmuValue]:
-    """The quantities by the FMU of the best machine."""
-    angles = [
-        angle for q in quantities_of(search.wishes).values() for angle in search.extreme_angles(q, best.x)
-    ]
-    with scratch() as folder:
-        quantities = quantities_of(search.wishes)
-        return by_fmu(search.wishes, machine, quantities, found, angles, folder, backend)
 
 
 def _turns(wishes: Wishes, machine: Machine) -> dict[str, Any]:

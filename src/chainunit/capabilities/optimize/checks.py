@@ -1,32 +1,23 @@
-"""Checks of an answer by other routes: machines near it, computed as a batch, and an FMU of the best machine."""
+"""The check of an answer by another route: machines near it, computed as a batch."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...core.quantities import quantity
-from ...fmu.backends import Backend, export
-from ...machines.machine import Machine
 from ...reading.results import result
 from ...study.cycle_quantities import CycleQuantity, evaluate
-from ...system.instance import Fmu, Instance
-from ...work.interrupts import stoppable
-from .rows import grid
 from .search import FINE, Search
-from .wishes import TurnLimit, Wishes
+from .wishes import TurnLimit
 
 STEPS = (1e-3, 1e-2)
 """Distances of the neighbours, as shares of the distance between the bounds."""
 _RANDOM = 64
 _TOLERANCE, _ROUNDING = 1e-7, 1e-11
-_STEP = 1e-3
-"""Step of the FMU at each angle [s]: its outputs follow from its inputs alone."""
 
 
 @result
@@ -106,87 +97,3 @@ def _is_better(
     if not all(_meets(limit, np.array(search.value(limit.quantity, x)), _ROUNDING) for limit in limits):
         return False
     return search.value(objective, x) < value * (1.0 - math.copysign(_TOLERANCE, value))
-
-
-# -- the FMU
-
-
-@dataclass(frozen=True)
-class FmuValue:
-    """A quantity by the FMU over the turn, and by the search at the same machine."""
-
-    fmu: float
-    search: float
-
-    @property
-    def deviation(self) -> float:
-        """Difference of both, as a share."""
-        return abs(self.fmu - self.search) / max(abs(self.search), 1e-12)
-
-
-def by_fmu(
-    wishes: Wishes,
-    machine: Machine,
-    quantities: Mapping[str, CycleQuantity],
-    values: Mapping[str, float],
-    angles: Sequence[float],
-    folder: Path,
-    backend: Backend | None = None,
-) -> dict[str, FmuValue]:
-    """Quantities of the best machine from its FMU, exported to `folder` and run by fmpy over the turn; `angles` are
-    further crank angles, at which the extremes lie. Quantities that need the places of pins are left out: the FMU
-    of a packaged machine has none."""
-    model = machine.model
-    file = folder / f"{model.name}.fmu"
-    export(model, file, machine.by_name, backend=backend)
-    columns = {i.column for q in quantities.values() for i in q.integrands}
-    with stoppable():  # an interrupt would be a fatal error inside the FMU
-        series = _run(file, machine, wishes, np.array([*grid(FINE), *angles]), columns)
-    results = {}
-    for name, q in quantities.items():
-        if not all(i.column in series for i in q.integrands):
-            continue
-        parts = []
-        for each in q.integrands:
-            y = series[each.column]
-            parts.append(
-                {
-                    "max": np.max(y),
-                    "min": np.min(y),
-                    "peak": np.max(np.abs(y)),
-                    "mean": np.mean(y[:FINE]),
-                    "rms": np.sqrt(np.mean(y[:FINE] ** 2)),
-                }[each.reduction]
-            )
-        value = float(q.combine(parts, wishes.crank_speed * machine.ratio, wishes.basis))
-        results[name] = FmuValue(value, values[name])
-    return results
-
-
-def _run(file: Path, machine: Machine, wishes: Wishes, q: Any, columns: set[str]) -> dict[str, Any]:
-    """The columns over crank angles, as far as the FMU gives them."""
-    fmu = Fmu(file)
-    try:
-        outputs = fmu.outputs()
-        instance = Instance(fmu, "best")
-        w = wishes.crank_speed * machine.ratio
-        try:
-            inputs = machine.model.feed_layout.by_name(wishes.feed) | {"phi": 0.0, "w": w, "a": 0.0}
-            instance.initialize(inputs, 0.0)
-            instance.finish_initialization()
-            rows = []
-            for k, angle in enumerate(q):
-                instance.step(k * _STEP, _STEP)
-                instance.set(["phi"], [float(angle) * machine.ratio])
-                rows.append(instance.get(outputs))
-        finally:
-            instance.close()
-    finally:
-        fmu.close()
-    by_name = dict(zip(outputs, np.array(rows).T, strict=True))
-    by_name["crank_torque"] = by_name["tau"] * machine.ratio
-    for name in list(by_name):
-        pin, _, axis = name.rpartition(".")
-        if axis == "fx" and f"{pin}.fy" in by_name:
-            by_name[f"force({pin})"] = np.hypot(by_name[name], by_name[f"{pin}.fy"])
-    return {name: y for name, y in by_name.items() if name in columns}

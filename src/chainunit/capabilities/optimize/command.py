@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...report.command_options import AllOption, BackendOption, OutputFolder, PicturesOption
+from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out, study_file
 from ...report.result_kind import ResultKind
 
@@ -15,7 +15,6 @@ from ...report.result_kind import ResultKind
 def optimize(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with the table [optimize].")],
     output: OutputFolder = Path("best"),
-    backend: BackendOption = None,
     whole: AllOption = False,
     png: PicturesOption = False,
 ) -> None:
@@ -26,7 +25,7 @@ def optimize(
     question = study_file(config)
     from .page import TASK
 
-    carry_out(TASK, question, output, backend=backend and backend.value, whole=whole, png=png)
+    carry_out(TASK, question, output, whole=whole, png=png)
 
 
 COMMANDS = (optimize,)

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.files import scratch, write_file
-from ...fmu.backends import Backend
 from ...reading.results import as_data
 from ...reading.text import Units, shown_in
 from ...report import blocks as b
@@ -106,17 +105,13 @@ class OptimizedStudy(NamedTuple):
         return source, self.tables(source.parent)
 
 
-def _compute(
-    config: Config, folder: Path | None, progress: TaskProgress, *, backend: Backend | None = None
-) -> OptimizedStudy:
-    """Search for the best machine of a study. A refusal begins with the name of the study file, if there is one."""
-    with config.file.refusals():
-        return OptimizedStudy(config, find_best(wishes_of(config.plans), progress, backend))
+def _compute(config: Config, folder: Path | None, progress: TaskProgress) -> OptimizedStudy:
+    """Search for the best machine of a study."""
+    return OptimizedStudy(config, find_best(wishes_of(config.plans), progress))
 
 
 def _accept(config: Config, **options: Any) -> None:
-    with config.file.refusals():
-        wishes_of(config.plans)
+    wishes_of(config.plans)
 
 
 def _writers(
@@ -277,12 +272,3 @@ def _checks(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     if best.neighbours is not None:
         severity: b.Severity = "warning" if best.neighbours.better else "good"
         yield b.Judgement(severity, s.words("neighbours.text"))
-    if best.fmu:
-        yield from table(
-            best.fmu,
-            ("quantity", Name),
-            ("search", lambda key: number(x.quantities[key].best, 7)),
-            ("FMU", lambda key: number(x.quantities[key].fmu, 7)),
-            title="The best machine's FMU over the turn",
-            form="long",
-        )

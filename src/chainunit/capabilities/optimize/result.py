@@ -65,9 +65,6 @@ class WebPull(TodayAndBest):
 class SoughtQuantity(FreeParameter, WebPull):
     """An objective or a limited quantity."""
 
-    fmu: float | None = part("its value by the FMU of the best machine", unit=OWN)
-    fmu_deviation: float | None = quantity("1", "deviation of the FMU, as a share")
-
 
 @result
 class WhyNone:
@@ -218,7 +215,7 @@ def _parameters(best: Best) -> Iterator[tuple[str, FreeParameter]]:
 
 
 def _quantity(best: Best, name: str) -> SoughtQuantity:
-    q, limit, fmu = best.quantities[name], _limit_of(best, name), best.fmu.get(name)
+    q, limit = best.quantities[name], _limit_of(best, name)
     return SoughtQuantity(
         title=q.description,
         today=best.today[name],
@@ -226,8 +223,6 @@ def _quantity(best: Best, name: str) -> SoughtQuantity:
         low=limit.low if limit else None,
         high=limit.high if limit else None,
         missed=limit is not None and limit.is_missed(best.found[name]),
-        fmu=fmu.fmu if fmu else None,
-        fmu_deviation=fmu.deviation if fmu else None,
         unit=q.unit,
         kind=q.kind,
     )

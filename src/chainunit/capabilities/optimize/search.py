@@ -155,11 +155,6 @@ class Search:
         top, angle, *_ = peaks[np.argmax(peaks[:, 0])]
         return float(angle), float(-top if reduction == "min" else top)
 
-    def extreme_angles(self, q: CycleQuantity, x: Any) -> list[float]:
-        """The crank angles of the extremes of a quantity [rad]."""
-        extremes = [i for i in q.integrands if i.reduction in SIGNS]
-        return [self._extreme(x, self.columns.whole(i.column), i.reduction)[0] for i in extremes]
-
     def least_pull(self, x: Any) -> float:
         """The least mean pull along a web up to the highest speed of the slack-free range [N]."""
         from scipy.optimize import minimize_scalar

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import RunError
-from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
@@ -69,7 +68,6 @@ class BestResult(ReportedResult[Config, OptimizedStudy]):
 def optimize(
     study: AnyStudy,
     folder: str | Path | None = None,
-    backend: Backend | None = None,
     progress: TaskProgress | None = None,
 ) -> BestResult:
     """Search for the best machine, as the table [optimize] asks: 20 starts take some ten seconds.
@@ -77,7 +75,7 @@ def optimize(
     Parameters
     ----------
     folder : the folder to which the files of ``chainunit optimize -o`` are written
-    backend, progress : as of `run`
+    progress : as of `run`
 
     Raises
     ------
@@ -86,7 +84,7 @@ def optimize(
     WriteError
         for a file that cannot be written; the others are written.
     """
-    result = BestResult.made(study.config, folder, progress, backend=backend)
+    result = BestResult.made(study.config, folder, progress)
     result._asked = study
     return result
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...drives.catalogue_couplings import CatalogueCoupling
 from ...study.arrays import peak
-from ...study.coupling import hardest_start, pull_out
+from ...study.coupling import at_motor_shaft, hardest_start, pull_out
 from ...study.event import Role
 from ...study.event_torques import from_event_on, peaks_in_events, running_peak
 from ...study.judgement import wrong_runs
@@ -57,7 +57,7 @@ def coupling_of(
     """The torque limiter of the catalogues for that setting, see `coupling_for`; it turns with the motor's shaft."""
     drive = study.drive
     fastest = peak(study.steady[drive.motor_speed].values)
-    return coupling_for(couplings, setting.least / drive.ratio, fastest)
+    return coupling_for(couplings, at_motor_shaft(study, setting.least), fastest)
 
 
 def effects(

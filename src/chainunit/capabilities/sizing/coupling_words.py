@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from ...core.descriptions import of_driver
 from ...core.quantities import variables
 from ...reading.text import aside, number
-from ...study.coupling import TRIPS_IN_TRANSIENT, hardest_start, transient_of_starts
+from ...study.coupling import TRIPS_IN_TRANSIENT, at_motor_shaft, hardest_start, transient_of_starts
 from ...study.event_torques import running_peak, running_words
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
@@ -21,7 +21,8 @@ def _torque(value: float) -> str:
 
 def _at_both(study: StudyRecord, value: float) -> str:
     """A torque at the crank, and at the motor's shaft, on which the coupling sits."""
-    return f"{_torque(value)} at the {study.driver_noun}, {_torque(value / study.drive.ratio)} at the motor's shaft"
+    at_motor = _torque(at_motor_shaft(study, value))
+    return f"{_torque(value)} at the {study.driver_noun}, {at_motor} at the motor's shaft"
 
 
 def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
@@ -91,8 +92,8 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
         f"Recommended torque limiter{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
-        f"{_torque(setting.normal)} {of} puts on it{by}, and {'above' if setting.stalls else 'below'} the "
-        f"{_torque(setting.motor)} that the warm motor gives at the {study.driver_noun}. It opens where "
+        f"{_torque(setting.normal)} {of} puts on it{by}; the warm motor gives {_torque(setting.motor)} at the "
+        f"{study.driver_noun}, and may give 10 % less by IEC 60034-1. It opens where "
         f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
@@ -101,9 +102,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
         names = ", ".join(map(study.title_of, setting.wrong))
         text += f" Left out, as the energy balance is not kept: {names}."
     if setting.stalls:
-        text += (
-            " A load that rises slowly stalls the motor and does not open it: the relay has to trip there."
-        )
+        text += " A load that rises slowly may stall the motor and not open it: the relay has to trip there."
     if setting.nuisances:
         nuisances = _list_of(study, setting.nuisances)
         text += f" A nuisance trip, which protects nothing: it opens, too, where {nuisances}."

@@ -14,7 +14,7 @@ from ...reading.results import GIVEN, as_data, derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import as_used
-from ...study.coupling import remark_on_rams
+from ...study.coupling import at_motor_shaft, remark_on_rams
 from ...study.drive import Drive
 from ...study.drive_tables import DriveTables
 from ...study.proposal import DriveProposal
@@ -170,7 +170,7 @@ class SizingFindings(Findings):
             if sold := coupling_of(study, setting, self.couplings):
                 items = [*items, OrderedPart.of("torque limiter", sold)]
             else:
-                torque = number(setting.torque / study.drive.ratio, "N.m")
+                torque = number(at_motor_shaft(study, setting.torque), "N.m")
                 wanted = f"a torque limiter that opens at {torque} on the motor's shaft"
         unknown = [] if best.sold is None else unknown_limits(best.sold)
         flywheel = f"a flywheel of {best.flywheel_words}" if best.disc else ""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from ...core.quantities import Value, declaration, quantity, variables
+from ...study.coupling import LESS_TORQUE
 
 MARGIN = 1.25
 """Ratio of the setting of a torque limiter to the largest torque of normal duty."""
@@ -158,8 +159,8 @@ class Setting:
 
     @property
     def stalls(self) -> bool:
-        """Whether the motor stalls before the coupling opens, if the load rises slowly."""
-        return self.least >= self.motor
+        """Whether the motor may stall before the coupling opens, if the load rises slowly."""
+        return self.least >= (1.0 - LESS_TORQUE) * self.motor
 
     @property
     def nuisances(self) -> dict[str, float]:

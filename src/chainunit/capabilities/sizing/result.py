@@ -11,6 +11,7 @@ from ...drives.belt import belt_drive
 from ...drives.gear_ratios import belt_before_gear
 from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import aside, number
+from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
 from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words
@@ -133,9 +134,13 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
         ),
         InUnit(factor, "1", title=f"service factor of the belt: {plan.service_words(trial.inertia_factor)}"),
         InUnit(belt.speed, "m/s", title="belt speed"),
-        InUnit(ratio, "1", title="ratio of the belt"),
-        InUnit(belt.small, "m", title="pulley of the motor, pitch diameter"),
-        InUnit(belt.large, "m", title="other pulley, pitch diameter; take the nearest standard one"),
+        InUnit(
+            belt.large / belt.small,
+            "1",
+            title=f"ratio of the belt with these pulleys; in the runs {ratio:.4g}",
+        ),
+        InUnit(belt.small, "m", "millimetres", title="pulley of the motor, pitch diameter"),
+        InUnit(belt.large, "m", "millimetres", title="other pulley, pitch diameter"),
         f"{belt.section}, narrow V-belts",
     )
 
@@ -263,7 +268,7 @@ def drive_protection(
     judged = setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
     return DriveProtection(
         trip_torque=setting.torque,
-        trip_torque_at_motor=setting.torque and setting.torque / study.drive.ratio,
+        trip_torque_at_motor=setting.torque and at_motor_shaft(study, setting.torque),
         relay=relay,
         coupling=coupling_sentence(study, setting, alternatives),
         obstacle=setting.obstacle,

@@ -346,7 +346,7 @@ def start_check(
     task: SizingTask, motor: CatalogueMotor, drive: Drive, start_time: float | None = None
 ) -> Check:
     """The time of a start [s] beside the permitted one."""
-    check = starting(start_time, motor.nameplate)
+    check = starting(start_time, motor.nameplate, drive.time_in_star)
     return dataclasses.replace(check, limit=1.0 + 1.2 * task.operation.run.ramp) if drive.follows else check
 
 

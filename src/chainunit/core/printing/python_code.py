@@ -7,9 +7,8 @@ from collections.abc import Iterable
 
 from .kernels import ModelFunction
 from .operations import ARGUMENT, NUMBER, Operation, Operations
+from .python_functions import function_text
 
-_WIDEST = 80
-"""Largest number of characters of an operation that is written inline instead of on a line of its own."""
 _RARE = "sqrt exp log pow sin cos tan asin acos sinh cosh fmod floor ceil".split()
 """Functions that `math` refuses to compute out of their domains."""
 
@@ -49,30 +48,25 @@ def _rare_forms() -> dict[str, str]:
 def python_text(functions: Iterable[ModelFunction]) -> str:
     """The text of these functions, each ``NAME(p, u, ...)``: its arguments are sequences of numbers, its results a
     tuple of all groups. The text takes names from `math` and from `python_math`."""
-    return "\n\n".join(_function(function) for function in functions)
+    return "\n\n".join(
+        function_text(f"def {function.name}({', '.join(function.takes)}):", *python_statements(function))
+        for function in functions
+    )
 
 
-def _function(function: ModelFunction) -> str:
+def python_statements(function: ModelFunction) -> tuple[list[str], list[str]]:
+    """The statements of a function, as `function_text` takes them, and the expressions of its results."""
     operations = Operations(function.arguments, function.groups)
     forms = _rare_forms() if function.frequency == "ONCE" else _forms()
-    results = [place for group in operations.results for place in group]
-    uses: dict[int, int] = {}
-    for item in operations.items:
-        for n, operand in enumerate(item.operands):
-            uses[operand] = uses.get(operand, 0) + forms[item.kind].count(f"{{{n}}}")
-    for place in results:
-        uses[place] = uses.get(place, 0) + 1
     texts: list[str] = []
-    lines = [f"def {function.name}({', '.join(function.takes)}):"]
+    statements: list[str] = []
     for place, item in enumerate(operations.items):
         text = _text(item, function.takes, forms, texts)
-        if item.kind == NUMBER or (uses.get(place, 0) == 1 and len(text) <= _WIDEST):
-            texts.append(f"({text})" if item.operands else text)
-        else:
-            texts.append(f"a{place}")
-            lines.append(f"    a{place}={text}")
-    lines.append(f"    return ({''.join(f'{texts[place]}, ' for place in results)})")
-    return "\n".join(lines) + "\n"
+        if item.kind != NUMBER:
+            statements.append(f"a{place}={text}")
+            text = f"a{place}"
+        texts.append(text)
+    return statements, [texts[place] for group in operations.results for place in group]
 
 
 def _text(item: Operation, takes: str, forms: dict[str, str], texts: list[str]) -> str:
