@@ -15,8 +15,8 @@ import pytest
 import xarray as xr
 
 import chainunit
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import number
-from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.second
 

@@ -11,13 +11,13 @@ import xarray as xr
 from event_tables import event_line
 from reports import said_of, write
 
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_verdict
 from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.measures import STARTED
 from chainunit.study.run import run_study
-from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.slow
 

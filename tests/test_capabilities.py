@@ -15,8 +15,8 @@ import pytest
 
 import chainunit
 from chainunit.capabilities import NAMES
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.registry import capabilities
-from chainunit.study.stored_result import ResultEntries
 
 PACKAGE = Path(chainunit.__file__).parent
 STUDY = """

@@ -17,6 +17,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.cycle import cycle
@@ -29,7 +30,6 @@ from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_up import start_up
-from chainunit.study.stored_result import ResultEntries
 from chainunit.study.transients import follow, lead_times, longest_lead
 from chainunit.system import Profile
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from command import chainunit
 
-from chainunit.study.stored_result import ResultEntries
+from chainunit.reading.result_entries import ResultEntries
 
 pytestmark = pytest.mark.second
 

@@ -25,6 +25,7 @@ from test_ssp import run as run_in
 
 from chainunit import InputError, Study
 from chainunit.core.quantities import Value, declaration, quantity
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import number as text_of
 from chainunit.study import config
 from chainunit.study.choice import choose
@@ -36,7 +37,6 @@ from chainunit.study.package import study_system
 from chainunit.study.readings import crank_torque
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation, Profile, certify
 
 pytestmark = pytest.mark.slow

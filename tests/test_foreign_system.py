@@ -21,12 +21,12 @@ from chainunit import InputError, RunError
 from chainunit.core.model import Terminal
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config, run
 from chainunit.study.choice import choose, drive_of
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.readings import crank_motion, crank_torque, largest_torque, pull_out_torque
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import (
     CoSimulation,
     ModelExchange,

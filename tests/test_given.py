@@ -17,6 +17,7 @@ from test_foreign_system import build
 
 from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report import blocks, html
 from chainunit.report.sheet import sheet
 from chainunit.report.study import report
@@ -30,7 +31,6 @@ from chainunit.study.origins import origin_of
 from chainunit.study.parts import example
 from chainunit.study.remarks import conclude
 from chainunit.study.result import as_dict
-from chainunit.study.stored_result import ResultEntries
 
 KNIFE = example("knife")
 

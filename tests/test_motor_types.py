@@ -11,9 +11,9 @@ from reports import page_of
 from systems import pair
 
 from chainunit.drives.motors import MOTORS
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config, run
 from chainunit.study.result import as_dict
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation, Profile, export, monolithic
 
 STUDY = """

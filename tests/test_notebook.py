@@ -17,7 +17,7 @@ import pytest
 
 import chainunit
 from chainunit.core.native.compilers import compiler
-from chainunit.study.stored_result import ResultEntries
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.work.progress import quiet
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

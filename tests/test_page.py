@@ -31,6 +31,7 @@ from chainunit.core.quantities import Layout
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.machines.chain_unit import Feed
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import InUnit
 from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.reading.text import number as told_as
@@ -46,7 +47,6 @@ from chainunit.study.limits import Check
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
-from chainunit.study.stored_result import ResultEntries
 from chainunit.study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 
 SHORT = """

@@ -16,6 +16,7 @@ from test_page import Reader, check_traced
 from chainunit import InputError
 from chainunit.drives.shafts import hollow, stiffness
 from chainunit.models import MODELS
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.shaft import _driveline
 from chainunit.report.study_motion import motion
 from chainunit.study import config
@@ -28,7 +29,6 @@ from chainunit.study.package import export_study, start_of
 from chainunit.study.readings import crank_torque
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.study.stored_result import ResultEntries
 
 JAM, BLOCKED = (event_line(name, turns=1) for name in ("jam_left", "blocked"))
 SHORT = f"""

@@ -10,6 +10,7 @@ from reports import said_of, write
 
 from chainunit.core.errors import InputError
 from chainunit.drives.contactor import CONTACTOR_EDGE
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.block_runs import BlockRuns, RunPoint
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
@@ -20,7 +21,6 @@ from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_runs import start_from
 from chainunit.study.start_up import start_up
-from chainunit.study.stored_result import ResultEntries
 from chainunit.study.transients import follow
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, ModelExchange, monolithic

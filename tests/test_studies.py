@@ -16,8 +16,8 @@ from command import chainunit
 from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult, WriteError
 from chainunit.app import studies
 from chainunit.core.files import LIST, FileList, claim
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.record import StudyRecord
-from chainunit.study.stored_result import ResultEntries
 
 FILE = """
 title = "<b>Short</b> & quick"

@@ -14,8 +14,8 @@ from command import chainunit
 from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config
-from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.second
 

@@ -7,8 +7,9 @@ import json
 import pytest
 
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import PARTS, ResultEntries
 from chainunit.report import blocks as b
-from chainunit.study.stored_result import PARTS, ResultEntries, read_result
+from chainunit.study.stored_result import read_result
 
 PACKAGED = {
     "chainunit": "1",

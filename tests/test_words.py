@@ -14,6 +14,7 @@ from event_tables import event_line
 from reports import said_of
 
 from chainunit.core.quantities import Quantity
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import chosen_units, number, shown_in
 from chainunit.report.blocks import Source
 from chainunit.report.lines import Words
@@ -22,7 +23,6 @@ from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.second
 

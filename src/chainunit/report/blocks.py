@@ -15,8 +15,8 @@ from typing import Any, Literal, TypeAlias
 
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import Layout
+from ..reading.result_entries import PARTS, ResultEntries
 from ..reading.text import DEFAULT_UNITS, Units
-from ..study.stored_result import PARTS, ResultEntries
 from .figure import Figure
 from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
 from .live_block import Live

@@ -47,7 +47,7 @@ def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
         return Number(finite(value.value), value.unit, value.kind, path)
     if isinstance(value, Mapping):
         return {key: _piece(each, f"{path}.{key}", unit, kind) for key, each in value.items()}
-    if unit and (isinstance(value, list | tuple) or hasattr(value, "tolist")):
+    if unit and (isinstance(value, list | tuple) or bool(getattr(value, "ndim", False))):
         place = path if ".value." in path else f"{path}.value"
         return [_piece(each, f"{place}.{k}", unit, kind) for k, each in enumerate(value)]
     if unit:

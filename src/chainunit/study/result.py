@@ -8,6 +8,7 @@ from typing import Any
 from ..core.quantities import quantity, variables
 from ..drives.catalogue import CatalogueMotor
 from ..drives.speed_control import Loop, Tuning
+from ..reading.result_entries import ResultEntries
 from ..reading.results import InUnit, as_data, part, result
 from ..reading.tables import UnusualValue
 from ..reading.text import entries, entry, shown_in
@@ -21,7 +22,6 @@ from .measures import Answers, measures_of
 from .origins import origin_of, place_of
 from .record import StudyRecord
 from .remark import Remark
-from .stored_result import ResultEntries
 from .verdict import Verdict
 from .window import Phase
 

@@ -18,11 +18,11 @@ from chainunit.capabilities.checks import plain, rolling
 from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import BearingTable
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.tables import instance
 from chainunit.reading.text import number
 from chainunit.report.blocks import at
 from chainunit.study.config import parse
-from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.second
 

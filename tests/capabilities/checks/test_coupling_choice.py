@@ -19,8 +19,8 @@ from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import FlexibleCouplingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.catalogue import offer
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.config import parse
-from chainunit.study.stored_result import ResultEntries
 
 ROWS = (
     "designation,order_number,rated_torque [N.m],peak_torque [N.m],alternating_torque [N.m],"

@@ -26,9 +26,9 @@ from chainunit.capabilities.checks.coupling import (
 from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import FlexibleCouplingTable
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.blocks import at
 from chainunit.study.config import parse
-from chainunit.study.stored_result import ResultEntries
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 TABLE = FlexibleCouplingTable(

@@ -29,11 +29,11 @@ from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.drives.gearing import Transmission
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.blocks import at
 from chainunit.study import event_torques
 from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
-from chainunit.study.stored_result import ResultEntries
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"

@@ -15,6 +15,7 @@ from event_tables import event_line
 
 from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows, stall_heat
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.blocks import at
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
@@ -27,7 +28,6 @@ from chainunit.study.relay import (
     stall_trip,
     start_seconds,
 )
-from chainunit.study.stored_result import ResultEntries
 from chainunit.study.window import Phase, Window
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")

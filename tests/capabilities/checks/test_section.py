@@ -25,10 +25,10 @@ from chainunit.capabilities.checks.section_strength import (
 )
 from chainunit.capabilities.checks.tables import STEELS, SectionTable
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.tables import instance
 from chainunit.report.blocks import at
 from chainunit.study.config import parse
-from chainunit.study.stored_result import ResultEntries
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 SHAFT = {

@@ -17,9 +17,9 @@ from chainunit.capabilities.checks import starting
 from chainunit.capabilities.checks.starting import starting_rows
 from chainunit.capabilities.checks.tables import StartingTable
 from chainunit.drives.catalogue import catalogue
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.config import parse
 from chainunit.study.permitted_starts import StartingData, permitted_starts, start_torques
-from chainunit.study.stored_result import ResultEntries
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 BASE = {

@@ -229,7 +229,7 @@ def test_a_measure_of_one_alone_and_other_units(folder, tmp_path):
     shutil.copytree(folder / "a", tmp_path / "old")
     file = tmp_path / "old" / "result.json"
     data = json.loads(file.read_text())
-    steady = data["answers"]["steady"]
+    steady = data["runs"]["answers"]["steady"]
     steady["mystery_number"] = {"value": 3.0, "unit": "furlong"}
     steady["current_rms"]["unit"] = "kA"
     del steady["speed_dip"]

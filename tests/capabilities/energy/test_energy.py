@@ -30,9 +30,9 @@ from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout, declaration, quantity
 from chainunit.drives.catalogue import catalogue
 from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CompiledSimulation, Profile
 
 STUDY = """

@@ -16,7 +16,7 @@ from chainunit import InputError
 from chainunit.capabilities.handover.cycle import read_cycle
 from chainunit.capabilities.handover.page import hand_over
 from chainunit.capabilities.handover.sizing import values_of
-from chainunit.study.stored_result import ResultEntries
+from chainunit.reading.result_entries import ResultEntries
 
 pytestmark = pytest.mark.slow
 

@@ -24,6 +24,7 @@ from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.errors import InterruptedRunError
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.recordings import fit as fitting
 from chainunit.recordings.measurands import MEASURANDS
@@ -32,7 +33,6 @@ from chainunit.report import blocks
 from chainunit.report.console import Forecast, carry_out
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import Profile
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(compiler() is None, reason="no C compiler")]

@@ -12,7 +12,7 @@ from command import chainunit
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.study.stored_result import ResultEntries
+from chainunit.reading.result_entries import ResultEntries
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 GALLERY = Path(__file__).parents[3] / "examples" / "linkages"

@@ -29,12 +29,12 @@ from chainunit.capabilities.optimize.table import wishes_of
 from chainunit.capabilities.optimize.wishes import TurnLimit
 from chainunit.capabilities.optimize.words import bindings, conflict_sentences
 from chainunit.core.files import LIST
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
 from chainunit.study.heading import Heading
 from chainunit.study.parts import EXAMPLES, example
-from chainunit.study.stored_result import ResultEntries
 from chainunit.study.study_file import toml_text
 from chainunit.study.verdict import ROCKER_GOOD
 

@@ -30,6 +30,7 @@ from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.core.errors import RunError
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number as shown
 from chainunit.report.blocks import Source
@@ -42,7 +43,6 @@ from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
 from chainunit.study.rig import Rig
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation, monolithic
 from chainunit.work.job import CHECKS
 

@@ -34,12 +34,12 @@ from chainunit.capabilities.sizing.preference import order_words, rank
 from chainunit.core.errors import InputError
 from chainunit.drives.catalogue import catalogue, offer
 from chainunit.drives.gearing import ordered_torque
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import load, parse
 from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check
-from chainunit.study.stored_result import ResultEntries
 
 pytestmark = pytest.mark.slow
 

@@ -31,6 +31,7 @@ from chainunit.drives.induction_steady import breakdown, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
@@ -40,7 +41,6 @@ from chainunit.study.events import one_sided_event
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
-from chainunit.study.stored_result import ResultEntries
 from chainunit.study.verdict import SETTLING
 from chainunit.system import CompiledSimulation, CoSimulation, Profile, System
 

@@ -39,6 +39,7 @@ from chainunit.core.errors import InputError as Refusal
 from chainunit.core.files import FileList
 from chainunit.core.native.compilers import compiler
 from chainunit.core.quantities import Quantity, Variable
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.report.figure import Hatch, hatch_lines
 from chainunit.study.block_runs import Cause
@@ -47,7 +48,6 @@ from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
 from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
-from chainunit.study.stored_result import ResultEntries
 from chainunit.study.verdict import two_bars
 from chainunit.work.job import made_anew
 

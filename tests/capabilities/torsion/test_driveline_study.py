@@ -30,6 +30,7 @@ from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
 from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints, with_damping_ratio
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number
 from chainunit.report import blocks, figure
@@ -41,7 +42,6 @@ from chainunit.study.line import shaft_runs
 from chainunit.study.line.placed import Line
 from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.rig import Rig
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import CoSimulation
 
 SYSTEM = '[system]\nmachine = "Accelerator"\n'

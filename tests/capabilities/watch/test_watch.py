@@ -19,10 +19,10 @@ from chainunit.capabilities.watch import watch as watching
 from chainunit.capabilities.watch.crank_motion import crank_motion
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.recordings.recording import Recording, read_recording
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.stored_result import ResultEntries
 from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

@@ -11,12 +11,13 @@ from ... import __version__
 from ...core.descriptions import USUAL_DRIVER
 from ...core.errors import printable
 from ...core.quantities import variables
+from ...reading.result_entries import as_mapping
 from ...reading.text import entry
 from ...study.line.shaft import ShaftAnswers
 from ...study.measures import Answers
 from ...study.registry import registered
 from ...study.sections import all_choices, all_sections
-from ...study.stored_result import StoredResult, as_mapping
+from ...study.stored_result import StoredResult
 
 SIDES = ("a", "b")
 _ROUNDING = 1e-12
