@@ -16,6 +16,7 @@ import wheels
 import xarray as xr
 
 import chainunit
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import number
 
 pytestmark = pytest.mark.second
@@ -198,7 +199,7 @@ def result(house):
     assert files_of(house, lambda: house.insert("report/figures.py", "", FIGURE)) == 1
     (house.folder / "mine.toml").write_text(STUDY, "utf-8")
     house.run("study", "mine.toml", "-o", "mine")
-    return json.loads((house.folder / "mine" / "result.json").read_text("utf-8"))
+    return ResultEntries(json.loads((house.folder / "mine" / "result.json").read_text("utf-8")))
 
 
 def test_a_machine_is_a_file_and_a_line_and_has_fmu_and_study(house, result):
@@ -267,7 +268,7 @@ def test_a_part_of_the_line_is_a_file_and_a_line(house):
     assert files_of(house, part) == 2
     (house.folder / "line.toml").write_text(LINE, "utf-8")
     house.run("study", "line.toml", "-o", "line")
-    result = json.loads((house.folder / "line" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((house.folder / "line" / "result.json").read_text("utf-8")))
     assert result["status"] == "complete" and result["planetary"]["backlash"]["value"] == pytest.approx(
         np.pi / 180
     )
@@ -315,7 +316,7 @@ def test_a_capability_is_a_folder_and_a_line(house):
     schema = json.loads((house.folder / "chainunit.schema.json").read_text("utf-8"))
     assert set(schema["properties"]["pin_life"]["properties"]) == {"pin", "C", "p", "wanted"}
     house.run("study", "life.toml", "-o", "life")
-    result = json.loads((house.folder / "life" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((house.folder / "life" / "result.json").read_text("utf-8")))
     assert result["status"] == "complete"
 
     # the rocker swings about C by its angle, which the run has
@@ -331,7 +332,7 @@ def test_a_capability_is_a_folder_and_a_line(house):
     assert found["load"]["value"] == pytest.approx(load, rel=1e-3)
     assert found["life"]["value"] / 3600.0 == pytest.approx(hours, rel=4e-3)
     assert found["life"]["value"] < found["wanted"]["value"] == 7.2e7
-    said = next(warning for warning in result["warnings"] if warning["kind"] == "pin life")
+    said = next(warning for warning in result["warnings"] if warning["code"] == "pin-life")
     page, text = ((house.folder / "life" / name).read_text("utf-8") for name in ("report.html", "result.md"))
     shown = number(found["life"]["value"], "s", "hours")
     for written in (page, text):

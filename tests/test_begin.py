@@ -11,6 +11,7 @@ import xarray as xr
 from event_tables import event_line
 from reports import said_of, write
 
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_verdict
@@ -57,7 +58,7 @@ def done(tmp_path_factory):
     study = run_study(parse(DIP + LINE), folder)
     assert study.failure is None
     write(study, folder)
-    return study, folder, json.loads((folder / "result.json").read_text())
+    return study, folder, ResultEntries(json.loads((folder / "result.json").read_text()))
 
 
 def test_the_feed_comes_once_the_crank_turns_behind_its_line(done):
@@ -71,7 +72,7 @@ def test_the_feed_comes_once_the_crank_turns_behind_its_line(done):
     # the flywheel that the study has starts as the others do
     own, other = study.findings["flywheels"].wheels
     assert own.answers.start_time == time and other.answers.start_time is not None
-    assert "flywheel does not start" not in {warning.kind for warning in study.warnings}
+    assert "flywheel-does-not-start" not in {warning.code for warning in study.warnings}
 
 
 def test_every_peak_of_the_run_is_in_a_table(done):
@@ -119,10 +120,10 @@ def test_a_ripple_that_the_line_makes_is_not_the_flywheels(done):
     assert own.motor_ripple == pytest.approx(np.ptp(w) / np.mean(w), rel=1e-12) and own.motor_ripple < 0.01
     assert own.speed_ripple == pytest.approx(np.ptp(crank) / np.mean(crank), rel=1e-2)
     assert own.speed_ripple > findings.permitted_fluctuation > own.motor_ripple and findings.least is None
-    messages = {warning.kind: warning.text for warning in study.warnings}
-    assert "make the bends equal" in messages["ripple behind flywheel"]
+    messages = {warning.code: warning.text for warning in study.warnings}
+    assert "make the bends equal" in messages["ripple-behind-flywheel"]
     # nor is a heavier one praised with which the drive swings
-    assert heavy.speed_ripple > 2.0 * own.speed_ripple and "0.100 kg m" in messages["heavier flywheel worse"]
+    assert heavy.speed_ripple > 2.0 * own.speed_ripple and "0.100 kg m" in messages["heavier-flywheel-worse"]
     assert " at motor " in said_of(study)
 
 
@@ -178,10 +179,10 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
     study = _heavy(10.0, tmp_path)
     steady, start = study.answers["steady"], study.start
     assert start.start_time == pytest.approx(study.started.rig.fed_from) and 35.0 < start.start_time < 45.0
-    warnings = {each.kind: each for each in study.warnings}
-    assert not {"fed before speed", "speed drifts"} & set(warnings)
+    warnings = {each.code: each for each in study.warnings}
+    assert not {"fed-before-speed", "speed-drifts"} & set(warnings)
     # as long as that no rotor may be locked
-    long, locked = warnings["motor start"].quantities, study.config.plate.nameplate.locked_time
+    long, locked = warnings["motor-start"].quantities, study.config.plate.nameplate.locked_time
     worst = max(each.start_time for each in study.findings["starts"].starts)
     assert long["value"][0] == max(start.start_time, worst) > 2.0 * locked and long["limit"][0] == locked
     assert worst == pytest.approx(start.start_time, rel=0.01)
@@ -200,7 +201,7 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
 def test_a_feed_that_comes_before_the_speed_is_told(tmp_path):
     """A machine that would take minutes to speed up is fed, and the study says with which speed."""
     study = _heavy(400.0, tmp_path)
-    (remarks,) = [each for each in study.warnings if each.kind == "fed before speed"]
+    (remarks,) = [each for each in study.warnings if each.code == "fed-before-speed"]
     assert remarks.quantities["fed"][0] == study.started.rig.fed_from and study.start.start_time is None
     assert remarks.quantities["speed"][0] < 0.5 * study.config.run.crank_speed
     assert "larger motor" in remarks.text

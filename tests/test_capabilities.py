@@ -16,6 +16,7 @@ import wheels
 
 import chainunit
 from chainunit.core.register import entries
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.registry import CAPABILITIES, capabilities
 
 PACKAGE = Path(chainunit.__file__).parent
@@ -148,5 +149,5 @@ def test_the_rest_works_without(name, tmp_path):
     assert not set(tables) & set(said["properties"])
     assert list(said["refused"]) == tables
     assert all(f"{table}: unknown key" in words for table, words in said["refused"].items())
-    result = json.loads((tmp_path / "result" / "result.json").read_text())
+    result = ResultEntries(json.loads((tmp_path / "result" / "result.json").read_text()))
     assert result["status"] == "complete" and "jam_left" in result["answers"]

@@ -17,6 +17,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.cycle import cycle
@@ -362,7 +363,7 @@ def test_a_new_type_of_event_is_one_class(swell, tmp_path):
     (tmp_path / "swell.toml").write_text(f"{QUICK}{text}")
     process = chainunit("study", "swell.toml", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
-    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     assert numbers["event"]["swell_right"]["added"] == {"value": 45.0, "unit": "kg"}
     steady, swelld = (numbers["answers"][name] for name in ("steady", "swell_right"))
     assert swelld["crank_torque_peak"]["value"] > 1.02 * steady["crank_torque_peak"]["value"]

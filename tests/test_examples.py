@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from command import chainunit
 
+from chainunit.reading.result_entries import ResultEntries
+
 pytestmark = pytest.mark.second
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -30,7 +32,7 @@ def result(tmp_path_factory):
             # a motor that is insufficient is a run that failed
             assert process.returncode == (1 if name == "motor_rejected" else 0), process.stderr
             RUNS[name] = (
-                json.loads((folder / "out" / "result.json").read_text()),
+                ResultEntries(json.loads((folder / "out" / "result.json").read_text())),
                 process.stdout,
                 folder / "out",
             )
@@ -172,7 +174,7 @@ def test_the_worst_jam_of_the_packaged_study_with_chains_and_with_bars(tmp_path)
     for organ in ("chain", "two-bar"):
         (tmp_path / "mine.toml").write_text(f'organ = "{organ}"\n{bars}', "utf-8")
         chainunit("study", "mine.toml", "-o", organ, cwd=tmp_path)
-        answers = json.loads((tmp_path / organ / "result.json").read_text("utf-8"))["answers"]
+        answers = ResultEntries(json.loads((tmp_path / organ / "result.json").read_text("utf-8")))["answers"]
         printed += [
             f"{max(answer[name]['value'] for answer in answers.values()):{digits}} {unit}"
             for name, digits, unit in (("crank_torque_peak", ".0f", "N m"), ("current_peak", ".2f", "A"))

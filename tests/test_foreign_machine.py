@@ -25,6 +25,7 @@ from test_ssp import run as run_in
 
 from chainunit import InputError, Study
 from chainunit.core.quantities import Value, declaration, quantity
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import number as text_of
 from chainunit.study import config
 from chainunit.study.choice import choose
@@ -271,7 +272,7 @@ def test_a_study_file_with_our_motor(folder):
     (folder / "pump.toml").write_text(text)
     process = chainunit("study", "pump.toml", "-o", "out", cwd=folder)
     assert process.returncode == 0, process.stderr
-    result = json.loads((folder / "out" / "result.json").read_text())
+    result = ResultEntries(json.loads((folder / "out" / "result.json").read_text()))
     assert result["status"] == "complete" and result["machine"]["piston.mass"]["value"] == MASS
     assert result["answers"]["steady"]["speed_mean"]["value"] == pytest.approx(SPEED, rel=1e-2)
     # the gains are tuned to the inertia that the FMU shows over a turn
@@ -330,7 +331,7 @@ def test_behind_an_open_coupling_it_is_not_followed(folder, burst):
     assert answers.coupling_trip_time is not None and answers.energy_after_trip is not None
     assert answers.energy_behind is answers.standstill_time is None
     assert set(study.runs) == {"start_up", "burst"}
-    (remark,) = (each for each in study.warnings if each.kind == "trip")
+    (remark,) = (each for each in study.warnings if each.code == "trip")
     assert "the machine behind it is an FMU and is not followed" in remark.text
 
 

@@ -21,6 +21,7 @@ from chainunit import InputError, RunError
 from chainunit.core.model import Terminal
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import FOREIGN
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config, run
 from chainunit.study.choice import choose, drive_of
 from chainunit.study.drive import Drive
@@ -379,7 +380,8 @@ def folder(tmp_path_factory):
 def test_a_study_with_a_motor_of_somebody_else(folder):
     """Its answers are those of our motor of the same parameters; what only that tells is null, shown as a dash."""
     foreign, own = (
-        json.loads((folder.parent / name / "result.json").read_text()) for name in ("foreign", "own")
+        ResultEntries(json.loads((folder.parent / name / "result.json").read_text()))
+        for name in ("foreign", "own")
     )
     assert foreign["status"] == own["status"] == "complete"
     assert set(foreign["answers"]) == set(own["answers"]) == {"steady", "jam_left"}
@@ -540,7 +542,7 @@ def test_a_torque_limiter_behind_it(trip, opens, folder):
     study = run.run_study(config.parse(text, str(folder / "x.toml")), folder / "coupling")
     assert study.failure is None
     assert (study.answers["jam_left"].coupling_trip_time is not None) == opens
-    told = [remark for remark in study.warnings if remark.kind == "coupling never opens"]
+    told = [remark for remark in study.warnings if remark.code == "coupling-never-opens"]
     assert len(told) == (not opens)
     for remark in told:
         assert set(remark.quantities) == {"trip", "largest", "steady"} and remark.text.endswith("N m.")
@@ -562,9 +564,9 @@ def test_a_motor_that_saves_no_state_runs_each_event_from_rest(folder, tmp_path)
     assert study.answers == saving.answers and study.spreads == saving.spreads and study.spreads
     for name, rows in saving.runs.items():
         assert study.runs[name].drop_attrs().equals(rows.drop_attrs())
-    (note,) = [note for note in study.notes if note.kind == "state not saved"]
-    assert note.runs == ("jam_left", "blocked") and "each event was run from rest" in note.text
-    assert not [note for note in saving.notes if note.kind == "state not saved"]
+    (note,) = [note for note in study.notes if note.code == "state-not-saved"]
+    assert note.runs == ("jam_left", "blocked") and "Each event was run from rest" in note.text
+    assert not [note for note in saving.notes if note.code == "state-not-saved"]
 
 
 def test_a_reference_in_another_unit_is_refused(file, tmp_path):

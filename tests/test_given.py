@@ -17,6 +17,7 @@ from test_foreign_system import build
 
 from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report import blocks, html
 from chainunit.report.sheet import sheet
 from chainunit.report.study import report
@@ -105,7 +106,7 @@ def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
         # a flywheel that a comparison adds has the setting of a drive with one
         wheel = with_inertia(config.drive, drive, 0.1)
         assert wheel.added_inertia == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
-        (note,) = [remark.text for remark in study.remarks if remark.kind == "slip compensation"] or [""]
+        (note,) = [remark.text for remark in study.remarks if "slip-compensation" in remark.code] or [""]
         assert ("rated slip" in note) == (not given and used > 0.0)
         assert ("flywheel has to slow down" in note) == (not given and used == 0.0)
 
@@ -130,16 +131,16 @@ def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
         and origin_of(study, "event.jam_left.force") == "example"
     )
     assert origin_of(study, "motor.speed_control.kp") == "tuned"
-    (note,) = (str(each) for each in study.notes if each.kind == "assumed")
+    (note,) = (str(each) for each in study.notes if each.code.startswith("assumed"))
     assert "come from the packaged example" in note
-    (packaged,) = (str(each) for each in study_of(load(), tmp_path).notes if each.kind == "assumed")
+    (packaged,) = (str(each) for each in study_of(load(), tmp_path).notes if each.code.startswith("assumed"))
     assert "the papers print none" in packaged
     # of a machine of somebody else there is no example
     build(tmp_path, script=SCRIPT)
     study = study_of(parse(PUMP + MACHINE, str(tmp_path / "x.toml")), tmp_path)
     assert origin_of(study, "machine.throw") == origin_of(study, "motor.rotor.J") == "declared"
     assert origin_of(study, "machine.piston.mass") == "file"
-    (note,) = (str(each) for each in study.notes if each.kind == "assumed")
+    (note,) = (str(each) for each in study.notes if each.code.startswith("assumed"))
     assert "example" not in note and "An eccentric pump" in note
     assert "machine.throw" not in as_dict(study)["origins"]
 
@@ -259,7 +260,7 @@ NOT_OF_A_FILE = (
 )
 def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
     study = study_of(parse(text), tmp_path)
-    again = parse(toml_of(json.loads(json.dumps(as_dict(study)))))
+    again = parse(toml_of(ResultEntries(json.loads(json.dumps(as_dict(study))))))
     for each in dataclasses.fields(again):
         if each.name not in ("file", "machine", "events", "plans"):
             assert getattr(again, each.name) == getattr(study.config, each.name), each.name
@@ -309,7 +310,7 @@ def test_a_current_that_an_inverter_hardly_gives_has_a_note(tmp_path):
         for name, times in zip(("steady", "jam_left"), currents, strict=True):
             study.answers[name] = Answers(**none | {"current_peak": times * rated})
         remarks._on_inverter(study)
-        notes = [remark for remark in study.remarks if remark.kind == "inverter current"]
+        notes = [remark for remark in study.remarks if remark.code.startswith("inverter-")]
         assert len(notes) == len(noted)
         if noted:
             assert "(4.50)" in notes[0].text and "(1.20)" in notes[0].text

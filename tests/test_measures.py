@@ -33,14 +33,14 @@ def test_a_peak_of_the_motor_that_is_none_of_the_load_has_its_reason(swing, is_t
         drive=SimpleNamespace(foreign=None, fmu_parameters=SimpleNamespace(rotor=rotor)),
         steady=run,
         answers={"steady": SimpleNamespace(speed_ripple=0.012)},
-        note=lambda kind, text, *runs, **parts: notes.append((kind, runs, parts)),
+        say=lambda code, *runs, **values: notes.append((code.code, runs, values)),
     )
     remarks._on_rotor(study)
     if is_told:
         ((kind, runs, parts),) = notes
-        assert kind == "rotor accelerates" and runs == ("steady",)
-        assert parts["load"] == (pytest.approx(53.0, rel=1e-3), "N.m")
-        assert parts["most"] == (pytest.approx(50.0 + math.hypot(3.0, 8.5), rel=1e-3), "N.m")
+        assert kind == "rotor-accelerates" and runs == ("steady",)
+        assert parts["load"] == pytest.approx(53.0, rel=1e-3)
+        assert parts["most"] == pytest.approx(50.0 + math.hypot(3.0, 8.5), rel=1e-3)
     else:
         assert not notes
 

@@ -11,6 +11,7 @@ from reports import page_of
 from systems import pair
 
 from chainunit.models import MOTORS
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config, run
 from chainunit.study.result import as_dict
 from chainunit.system import CoSimulation, Profile, export, monolithic
@@ -57,10 +58,10 @@ def test_a_study_names_it(registered, tmp_path):
     turns = study.steady
     driving = p.coil.k * turns["motor.i"] - p.rotor.d * turns["motor.w"] - p.rotor.J * turns["motor.a"]
     np.testing.assert_allclose(driving, turns["motor.tau"], atol=1e-9)
-    kinds = {remark.kind for remark in study.warnings}
+    kinds = {remark.code for remark in study.warnings}
     reaches_limit = any(answers.current_peak > 0.999 * 3.0 for answers in study.answers.values())
-    assert ("current limit" in kinds) == reaches_limit
-    result = json.loads(json.dumps(as_dict(study)))
+    assert ("current-limit" in kinds) == reaches_limit
+    result = ResultEntries(json.loads(json.dumps(as_dict(study))))
     assert result["motor"]["kind"] == "ServoMotor" and result["speed_loop"] == {}
     assert result["control"]["crossover"]["value"] == 20.0
     page = page_of(study)

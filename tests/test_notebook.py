@@ -17,6 +17,7 @@ import pytest
 
 import chainunit
 from chainunit.core.native.compilers import compiler
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.work.progress import quiet
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -174,7 +175,7 @@ def check_words(result):
     assert result.answers.drop(columns="unit").notna().any(axis=None)
     assert isinstance(result.verdict, str) and result.verdict
     assert isinstance(result.warnings, list) and all(isinstance(words, str) for words in result.warnings)
-    assert json.loads(result.to_json())
+    assert ResultEntries(json.loads(result.to_json()))
 
 
 def check_figure(figure, *labels):

@@ -23,18 +23,27 @@ from reports import page_of, pictures, plotly_figure, said_of, write
 
 from chainunit import EMPTY, InputError, RunError
 from chainunit.capabilities.chains.analysis import rest_forces
+from chainunit.capabilities.sizing.candidate import Candidate, Standing, TrialResult
+from chainunit.capabilities.sizing.duty import CycleNumbers, Duty
+from chainunit.capabilities.sizing.findings import SizingFindings
+from chainunit.capabilities.sizing.result import DriveProtection, MotorProtection, SizedDrive
+from chainunit.core.quantities import Layout
+from chainunit.drives.catalogue import catalogue
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.machines.chain_unit import Feed
+from chainunit.reading.result_entries import ResultEntries
+from chainunit.reading.results import InUnit
 from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.reading.text import number as told_as
 from chainunit.report import html, study_motion
 from chainunit.report import study as study_report
-from chainunit.report.blocks import Report, Section, at
+from chainunit.report.blocks import Report, Section, at, found_at
 from chainunit.report.figure import Label, Mark, Shade
 from chainunit.report.live_block import Live
 from chainunit.report.packing import unpacked
 from chainunit.study import config, judgement
 from chainunit.study.cycle import cycle
+from chainunit.study.limits import Check
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
@@ -93,54 +102,47 @@ force = "60 kN"
     return run_study(config.parse(text), tmp_path_factory.mktemp("knife study"))
 
 
-def number(value, unit, **more):
-    return {"value": value, "unit": unit, **more}
+class Sized(SizingFindings):
+    """Findings of sizing with a protection that no run judged."""
+
+    def sized(self, study):
+        relay = MotorProtection(InUnit(1.6, "A", title="relay, setting"), None, None, "relay")
+        torques = ("normal_torque", "running_torque", "start_torque", "breakdown_torque")
+        protection = DriveProtection(
+            210.0,
+            8.4,
+            relay,
+            "Recommended torque limiter: 210 N m.",
+            obstacle=None,
+            why_none="",
+            **dict.fromkeys(torques, 1.0),
+            **{name: {} for name in ("effects", "overloads", "disturbances")},
+            alternatives=[],
+        )
+        return SizedDrive(self.best, self.nearest is not None, "crank", None, protection=protection)
 
 
-def candidate(motor, verdict, reason, **utilisations):
-    return {
-        "motor": motor,
-        "ratio": number(25.0, "1"),
-        "gear": "two-stage helical gear",
-        "series": "R20",
-        "flywheel": {name: number(None if name != "J" else 0.0, "1") for name in ("J", "mass", "diameter")},
-        "numbers": {"mass": number(12.0, "kg")},
-        "verdict": verdict,
-        "reason": reason,
-        "checks": {
-            name: {
-                "title": name.replace("_", "-"),
-                "utilisation": number(used, "1", kind="used"),
-                "value": number(None if used is None else 8.0 * used, "N.m"),
-                "limit": number(8.0, "N.m"),
-            }
-            for name, used in utilisations.items()
-        },
+def candidate(study, name, verdict, reason, **utilisations):
+    motor = dataclasses.replace(catalogue()[0], designation=name)
+    checks = {
+        of: Check(of.replace("_", "-"), None if used is None else 8.0 * used, 8.0, "N.m")
+        for of, used in utilisations.items()
     }
+    return Candidate(motor, study.drive, TrialResult(checks), verdict=Standing(verdict), reason=reason)
 
 
-SIZING = {
-    "asked": {"service_factor": number(1.25, "1", title="service factor")},
-    "cycle": {"torque_rms": number(28.7, "N.m")},
-    "flywheel": {
-        "inertia": number(0.04, "kg.m2", title="inertia on the motor shaft"),
-        "mass": number(7.3, "kg"),
-        "diameter": number(0.22, "m"),
-    },
-    "protection": {
-        "setting": number(1.6, "A"),
-        "trip_torque": number(210.0, "N.m"),
-        "coupling": "Recommended torque limiter: 210 N m.",
-        "alternatives": [],
-    },
-    "candidates": [
-        candidate("0.37 kW <IE3>", "chosen", "the least that fits", pull_out=0.87),
-        candidate("0.55 kW", "fits", "larger than it must be", pull_out=0.61, heat=None),
-        candidate("0.25 kW", "rejected", "too weak by 31 %", pull_out=1.31, heat=0.83),
-    ],
-    "chosen": 0,
-    "notes": ["Typical values."],
-}
+def sized(study, *names):
+    """The study with a chosen, a fitting and a rejected motor, or those of them with these `names`."""
+    candidates = [
+        candidate(study, "0.37 kW <IE3>", "chosen", "the least that fits", pull_out=0.87),
+        candidate(study, "0.55 kW", "fits", "larger than it must be", pull_out=0.61, heat=None),
+        candidate(study, "0.25 kW", "rejected", "too weak by 31 %", pull_out=1.31, heat=0.83),
+    ]
+    of_turn = CycleNumbers(**dict.fromkeys(Layout(CycleNumbers).names, 28.7))
+    duty = Duty(study.statics.normal, {}, None, of_turn)
+    kept = [each for each in candidates if not names or each.motor.designation in names]
+    findings = Sized(config.parse("[sizing]").plans["sizing"], duty, kept, ["Typical values."], 3, tried=3)
+    return dataclasses.replace(study, findings=study.findings | {"sizing": findings})
 
 
 class Reader(HTMLParser):
@@ -238,18 +240,21 @@ def test_the_drawing_has_the_dimensions_of_the_machine(study, written):
 
 def test_every_number_is_traced_to_result_json(study, written):
     reader = Reader(_DRAWING.sub("", written.read_text("utf-8")))
-    result = json.loads(json.dumps(as_dict(study)))
+    result = ResultEntries(json.loads(json.dumps(as_dict(study))))
     assert json.loads(reader.scripts["result"]) == result
     check_traced(reader, result)
     paths = {n["data-path"] for n in reader.numbers}
     for run, answers in result["answers"].items():
-        assert {f"answers.{run}.{a}" for a, entry in answers.items() if entry["value"] is not None} <= paths
+        assert {
+            f"runs.answers.{run}.{a}" for a, entry in answers.items() if entry["value"] is not None
+        } <= paths
     factors = (f"organs.overload_factors.{side}" for side in result["organs"]["overload_factors"])
     events = (f"event.{name}" for name in result["event"])
     for section in ("machine", "motor", "feed", "run", *events, "organs.limits", *factors):
-        wanted = {f"{section}.{n}" for n, e in at(result, section).items() if isinstance(e, dict)}
+        place, entries = found_at(result, section)
+        wanted = {f"{place}.{n}" for n, e in entries.items() if isinstance(e, dict)}
         assert wanted <= paths, section
-    for path in ("answers.steady.crank_torque_peak", "certificate.jam_left.energy_residual_share"):
+    for path in ("runs.answers.steady.crank_torque_peak", "runs.certificate.jam_left.energy_residual_share"):
         assert path in paths
     said = {f"{name}.{i}.text" for name in ("notes", "warnings") for i in range(len(result[name]))}
     assert said | {"verdict.model.text", "verdict.motor.text"} <= {w["data-path"] for w in reader.words}
@@ -472,10 +477,10 @@ def test_the_speed_after_the_event_is_a_sentence(study):
 def test_what_does_not_act_is_not_given(study):
     """A motor on the line follows no reference, so that no ramp of one is shown."""
     given = page_of(study)
-    assert 'data-path="run.ramp"' in given[given.index('<section id="given"') :]
+    assert 'data-path="given.run.ramp"' in given[given.index('<section id="given"') :]
     line = dataclasses.replace(study, drive=dataclasses.replace(study.drive, follows=False))
     given = page_of(line)
-    assert 'data-path="run.ramp"' not in given and 'data-path="run.crank_speed"' in given
+    assert 'data-path="given.run.ramp"' not in given and 'data-path="given.run.crank_speed"' in given
 
 
 def test_the_speeds_at_which_a_web_goes_slack_are_a_sentence(study):
@@ -493,7 +498,14 @@ def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatc
     assert as_dict(study)["verdict"]["motor"]["holds"] == "in part"
     monkeypatch.setattr(judgement, "AMPLE", 0.0)
     assert as_dict(study)["verdict"]["motor"]["holds"] == "true"
-    nearest = SimpleNamespace(name="sizing", insufficient="No motor fits.", motor=None, duty=None, keys={})
+    nearest = SimpleNamespace(
+        name="sizing",
+        insufficient="No motor fits.",
+        motor=None,
+        duty=None,
+        keys={},
+        sentence=lambda study: "Insufficient motor.",
+    )
     motor = as_dict(dataclasses.replace(study, proposal=nearest))["verdict"]["motor"]
     assert motor["holds"] == "in part" and "insufficient" in motor["text"]
 
@@ -559,7 +571,7 @@ def test_each_overload_factor_says_its_use(study, written):
             size = told_as(factor["value"], "1")
             assert (
                 size in told
-                and f'data-path="organs.overload_factors.{side}.{name}" value="{factor["value"]!r}"'
+                and f'data-path="findings.organs.overload_factors.{side}.{name}" value="{factor["value"]!r}"'
                 in page_text
             )
     factors = sides["left"]
@@ -579,7 +591,7 @@ def test_each_overload_factor_says_its_use(study, written):
     for name, factor in factors.items():
         assert (
             factor["for"] in told
-            and f'data-path="organs.overload_factors.left.{name}.for">{factor["for"]}<' in page_text
+            and f'data-path="findings.organs.overload_factors.left.{name}.for">{factor["for"]}<' in page_text
         )
 
 
@@ -596,7 +608,7 @@ def test_one_number_of_the_reserve_everywhere(study, written):
         wanted = float(np.min(1.0 - torque[driving] / (p.armature.k * current[driving])))
         assert result["answers"][run]["torque_reserve"]["value"] == pytest.approx(wanted, abs=1e-6)
     shown_there = {
-        n["data-path"].split(".")[1]: n["text"].replace("\u00a0", " ").replace("−", "-")
+        n["data-path"].split(".")[2]: n["text"].replace("\u00a0", " ").replace("−", "-")
         for n in Reader(written.read_text("utf-8")).numbers
         if n["data-path"].endswith(".torque_reserve")
     }
@@ -613,17 +625,16 @@ def test_a_long_study_is_thinned_out(study, monkeypatch):
 
 
 def test_the_drive_stands_first_with_its_shares(study):
-    result = {**as_dict(study), "sizing": SIZING}
-    text = page_of(dataclasses.replace(study, findings=study.findings | {"sizing": None}), result)
+    chosen = sized(study)
+    text, result = page_of(chosen), as_dict(chosen)
     reader = Reader(text)
     check_traced(reader, result)
     assert text.index('id="answer"') < text.index('id="sizing"') < text.index('id="plots"')
     paths = [n["data-path"] for n in reader.numbers]
-    large = re.findall(r'<span class="large[^>]*><(?:data|span)[^>]*data-path="(sizing[^"]+)"', text)
+    large = re.findall(r'<span class="large[^>]*><(?:data|span)[^>]*data-path="findings.(sizing[^"]+)"', text)
     assert large == [
         "sizing.candidates.0.motor",
         "sizing.candidates.0.ratio",
-        "sizing.flywheel.inertia",
         "sizing.protection.trip_torque",
     ]
     assert "0.37 kW &lt;IE3&gt;" in text
@@ -631,22 +642,18 @@ def test_the_drive_stands_first_with_its_shares(study):
     ratios = [p for p in paths if p.endswith(".ratio") and "candidates" in p]
     first = text[text.index('id="answer"') : text.index('id="sizing"')]
     assert first.index('class="large') < first.index('data-path="verdict.model.text"')
-    shares = re.findall(r'data-path="sizing.candidates.0.checks.(\w+).utilisation"', first)
-    assert shares == list(SIZING["candidates"][0]["checks"])
-    assert ratios[1:] == [f"sizing.candidates.{i}.ratio" for i in (0, 1, 2)]
+    shares = re.findall(r'data-path="findings.sizing.candidates.0.checks.(\w+).utilisation"', first)
+    assert shares == ["pull_out"]
+    assert ratios[1:] == [f"findings.sizing.candidates.{i}.ratio" for i in (0, 1, 2)]
     over = re.findall(r"<strong><data[^>]*>([^<]*)", text[text.index('class="candidates"') :])
     assert over == ["▲ 131\u00a0"]
     assert "service factor" in text.lower() and "Typical values." in text
     # a sentence is no cell of a table of numbers, which it would make wider than the page
-    assert text.count('data-path="sizing.protection.coupling"') == 1
+    assert text.count('data-path="findings.sizing.protection.coupling"') == 1
 
 
 def test_no_candidate_fits(study):
-    sizing = copy.deepcopy(SIZING)
-    sizing["chosen"] = None
-    sizing["candidates"] = sizing["candidates"][2:]
-    result = {**as_dict(study), "sizing": sizing}
-    text = page_of(dataclasses.replace(study, findings=study.findings | {"sizing": None}), result)
+    text = page_of(sized(study, "0.25 kW"))
     assert "No candidate fits. The reasons:" in text and "too weak by 31 %" in text
 
 
@@ -755,7 +762,7 @@ def test_factors_of_two_bars_are_not_passed_for_those_of_chains(chains, study):
 
 @pytest.mark.slow
 def test_chains_stand_beside_two_bars(chains, tmp_path):
-    result = json.loads(json.dumps(as_dict(chains)))
+    result = ResultEntries(json.loads(json.dumps(as_dict(chains))))
     found = result["chain"]
     # the sweep, the resonance in it, the study's own speed
     speeds = [2.0, found["resonance"]["value"], 10.0, 12.0]
@@ -772,7 +779,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
     assert slack and {rod["rod"] for rod in slack} <= {
         f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
     }
-    (avoid,) = (warning for warning in result["warnings"] if warning["kind"] == "speed to avoid")
+    (avoid,) = (warning for warning in result["warnings"] if warning["code"] == "speed-to-avoid")
     assert avoid["text"].startswith("Chains: the crank speed lies in a range to avoid")
 
     text = page_of(chains, result)
@@ -798,8 +805,8 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         and own[f"{name}_to"]["value"] - own[f"{name}_from"]["value"] <= 0.02 * own[name]["value"]
         for end in ("_from", "_to")
     }
-    assert {f"chain.own_speed.{name}" for name in own} - paths == {
-        f"chain.own_speed.{name}" for name in missing
+    assert {f"findings.chain.own_speed.{name}" for name in own} - paths == {
+        f"findings.chain.own_speed.{name}" for name in missing
     }
     for name in estimates:
         ends = [own[f"{name}{end}"]["value"] for end in ("_from", "", "_to")]
@@ -807,11 +814,12 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
     for k, numbers in enumerate(found["sweep"]):
         for name in estimates:
             value, low, high = (numbers[f"{name}{end}"]["value"] for end in ("", "_from", "_to"))
-            path = f"chain.sweep.{k}.{name}"
+            path = f"findings.chain.sweep.{k}.{name}"
             assert (path in paths) == (low is not None), path
             assert (f"{path}_from" in paths) == (low is not None and high - low > 0.02 * value), path
-    assert {"chain.distance_to_resonance", "chain.avoid.0.from", "chain.eta", "chain.starts"} <= paths
-    assert {f"chain.avoid.{i}.why" for i in range(len(found["avoid"]))} <= {
+    assert {f"findings.chain.{name}" for name in ("distance_to_resonance", "avoid.0.from", "starts")} <= paths
+    assert "given.chain.eta" in paths
+    assert {f"findings.chain.avoid.{i}.why" for i in range(len(found["avoid"]))} <= {
         w["data-path"] for w in reader.words
     }
     assert not re.search(r"\d", re.sub(r"\bA2\b", "", reader.rest["chains"]))

@@ -163,7 +163,7 @@ def test_a_value_with_its_unit_is_doubted_once_in_a_note(text, name):
     study = record_of(values, Drive(DcMotor, values.motor.parameters, values.machine))
     conclude(study)
     result = as_dict(study)
-    (note,) = [each["text"] for each in result["notes"] if each["kind"] == "unusual value"]
+    (note,) = [each["text"] for each in result["notes"] if each["code"] == "unusual-value"]
     assert note.startswith(f"By the file, {name} = ") and "usual: " in note and "meant" not in note
     said = said_of(study)
     assert result["slips"] == [] and said.count(f"{name} = ") == 1 and "?" not in said

@@ -462,6 +462,7 @@ def test_the_worst_overload_is_without_a_limiter_only_if_there_is_none(monkeypat
         config=SimpleNamespace(coupling=coupling),
         title_of=lambda run: run,
         titles={"surge": "rock rises"},
+        answers={"surge": SimpleNamespace(crank_torque_peak=1891.0)},
     )
     monkeypatch.setattr(runs.run_names, "title", lambda study, run: study.titles[run])
     source = b.Source({"answers": {"surge": {"crank_torque_peak": {"value": 1891.0, "unit": "N.m"}}}})

@@ -59,7 +59,7 @@ def test_on_both_sides_of_ten(place):
         assert line.driver_frequency == speed and line.ratio == pytest.approx(ratio, rel=1e-12)
         assert line.holds is holds
         remark(study)
-        told = [each for each in study.warnings if each.kind == "no rigid line"]
+        told = [each for each in study.warnings if each.code == "no-rigid-line"]
         assert len(told) == (not holds)
         for each in told:
             assert each.quantities["ratio"].value == line.ratio and "VDI 2149" in each.text
@@ -86,4 +86,4 @@ def test_a_line_without_stiffness_has_no_ratio():
     study = record_of(loaded, choose(loaded, Path(), lambda *_: None).drive)
     remark(study)
     assert study.statics.rigid_line is None and "rigid_line" not in as_dict(study)
-    assert not [each for each in study.warnings if each.kind == "no rigid line"]
+    assert not [each for each in study.warnings if each.code == "no-rigid-line"]

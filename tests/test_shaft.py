@@ -16,6 +16,7 @@ from test_page import Reader, check_traced
 from chainunit import InputError
 from chainunit.drives.shafts import hollow, stiffness
 from chainunit.models import MODELS
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.shaft import _driveline
 from chainunit.report.study_motion import motion
 from chainunit.study import config
@@ -72,7 +73,7 @@ def test_the_line_amplifies_a_jam(study):
     assert jam.amplification == pytest.approx(jam.tau2_peak / np.max(np.abs(run[RIGID])))
     assert jam.amplification > 1.2 and 1.0 < steady.amplification < 1.3
     assert jam.turns_of_steady > 10.0 and jam.range_equivalent is None
-    runs = {warning.runs: warning.text for warning in study.warnings if warning.kind == "amplification"}
+    runs = {warning.runs: warning.text for warning in study.warnings if warning.code == "amplification"}
     assert "times that of a rigid drive" in runs["jam_left",]
     before = run[RIGID].attrs
     assert before["units"] == "N.m"
@@ -224,16 +225,16 @@ def test_the_report_shows_it(study, tmp_path):
     assert (tmp_path / "driveline.png") in write(study, tmp_path)
     text = (tmp_path / "report.html").read_text("utf-8")
     reader = Reader(text)
-    check_traced(reader, json.loads((tmp_path / "result.json").read_text()))
+    check_traced(reader, ResultEntries(json.loads((tmp_path / "result.json").read_text())))
     paths = {n["data-path"] for n in reader.numbers}
     assert {
-        "shaft.jam_left.amplification",
-        "driveline.k_least",
-        "driveline.alpha1",
-        "driveline.exponent",
-        "rigid_line.natural_frequency",
-        "rigid_line.driver_frequency",
-        "rigid_line.ratio",
+        "findings.shaft.jam_left.amplification",
+        "findings.driveline.k_least",
+        "given.driveline.alpha1",
+        "given.driveline.exponent",
+        "findings.rigid_line.natural_frequency",
+        "findings.rigid_line.driver_frequency",
+        "findings.rigid_line.ratio",
     } <= paths
     assert "with a rigid shaft" in text
     assert as_dict(study)["torque_cycles"]["jam_left"]

@@ -5,15 +5,19 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from dataclasses import fields, is_dataclass
+from html import unescape
 from pathlib import Path
 
 import pytest
-from reports import screen_of
+from reports import plain, screen_of
 
 from chainunit.reading.text import number
 from chainunit.report import blocks as b
+from chainunit.report import html, pdf
 from chainunit.report import study as study_report
 from chainunit.report.lines import Number, Words, pieces
+from chainunit.report.markdown import markdown as markdown_of
+from chainunit.report.sheet import sheet
 from chainunit.study import config
 from chainunit.study.run import run_study
 
@@ -141,6 +145,24 @@ def test_one_screen_has_the_answer_and_one_table(study, report):
     assert ("Motor: " in text or "Insufficient motor: " in text) == ("sizing" in report.result)
 
 
+def test_the_sized_drive_is_said_first_everywhere_in_one_sentence(study, report):
+    """It stood on the terminal alone, below the verdicts."""
+    sentence = report.result.get("sentence")
+    assert (sentence is not None) == (study.proposal is not None)
+    if sentence is None:
+        return
+    assert list(report.result).index("sentence") < list(report.result).index("verdict")
+    page = html.render(report).split("<main>")[1].split("<script")[0]
+    paper = pdf.page_text(sheet(study, report), {}).split("</nav>")[1]
+    markdown = re.sub(r"\\(.)", r"\1", markdown_of(report, ()))
+    printed = " ".join(" ".join(screen_of(report)).split())
+    texts = [printed, " ".join(plain(report, 10_000).split()), markdown.split("## ", 1)[1]]
+    for text in (*texts, *(unescape(re.sub(r"<[^>]+>", " ", each)) for each in (page, paper))):
+        assert text.count(sentence) == 1
+        # nothing but the heading of the section stands before it
+        assert len(text.split(sentence)[0].split()) < 5
+
+
 def rows_of(result):
     return result.get("checks", {}).get("rows", [])
 
@@ -150,7 +172,8 @@ def test_a_quantity_has_one_value(study, report):
     values = defaultdict(dict)
     plan = study.config.plans["checks"].relay
     factor = 3.0**0.5 if study.drive.star_delta is not None and plan.is_in_phases else 1.0
-    for place, value in leaves(report.result):
+    for whole, value in leaves(report.result):
+        place = whole.removeprefix("given.").removeprefix("runs.").removeprefix("findings.")
         if value is not None and re.fullmatch(IN_PHASES, place):
             value *= factor
         for name, places in QUANTITIES.items():
@@ -233,7 +256,7 @@ def test_a_heading_names_the_speed_that_was_run(study, report):
     (table,) = (
         block
         for block in report.blocks("long")
-        if isinstance(block, b.Table) and "answers.steady.current_rms" in paths_of(block)
+        if isinstance(block, b.Table) and "runs.answers.steady.current_rms" in paths_of(block)
     )
     assert shown in str(table.columns[0].short)
     (lead,) = (
@@ -242,7 +265,7 @@ def test_a_heading_names_the_speed_that_was_run(study, report):
         if isinstance(block, b.Text) and str(pieces(block.line)[0]).startswith("First the values of steady")
     )
     assert {piece.path for piece in pieces_of(lead) if isinstance(piece, Number)} == {
-        "answers.steady.speed_mean"
+        "runs.answers.steady.speed_mean"
     }
 
 

@@ -525,7 +525,7 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
     assert not status and out.startswith("ChainUnitDrive.ssp: SSP 1.0, ")
     assert out.count("\n") == 3 and "\nNot in it: the events " in out
     assert (
-        "\nRocker torque of two bars: 10 % up to a crank speed of 2.03 rad/s; this study turns at 3.00 rad/s;"
+        "\nRocker torque of two bars: 10 % up to a crank speed of 2.03 rad/s. This study turns at 3.00 rad/s."
         in out
     )
     before = Path("ChainUnitDrive.ssp").read_bytes()

@@ -10,6 +10,7 @@ from reports import said_of, write
 
 from chainunit.core.errors import InputError
 from chainunit.drives.contactor import CONTACTOR_EDGE
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.block_runs import BlockRuns, RunPoint
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
@@ -195,7 +196,7 @@ def test_a_motor_on_an_inverter_is_not_cut_off(tmp_path):
     reclosing behind it would be that of a line."""
     study = run_study(parse(STUDY.replace('"star-delta"', '"inverter"')), tmp_path)
     assert study.failure is None and "interruption" not in study.answers
-    (left_out,) = [remark for remark in study.remarks if remark.kind == "event left out"]
+    (left_out,) = [remark for remark in study.remarks if remark.code == "event-left-out"]
     assert "no contactor on the line" in left_out.text
 
 
@@ -221,7 +222,7 @@ def test_a_study_tells_of_both(tmp_path):
     study = run_study(parse(STUDY), tmp_path)
     assert study.failure is None
     write(study, tmp_path)
-    result = json.loads((tmp_path / "result.json").read_text())
+    result = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     assert result["start"] == "star-delta" and "interruption" in result["answers"]
     certificate = result["certificate"]["interruption"]["energy_residual_share"]["value"]
     assert certificate < 1e-4
@@ -240,7 +241,7 @@ def test_sizing_with_a_star_delta_starter(tmp_path):
     study = run_study(parse(head + STARTER), tmp_path)
     write(study, tmp_path)
     assert study.failure is None
-    result = json.loads((tmp_path / "result.json").read_text())
+    result = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     best = result["sizing"]["candidates"][0]
     assert best["checks"]["start"]["value"]["value"] > 0.0
     assert "star-delta starter, 0.5 s in star" in " ".join((tmp_path / "result.md").read_text().split())

@@ -72,19 +72,19 @@ def test_the_worst_start_is_named_with_its_angle(pump):
     steady = pump.answers["steady"].crank_torque_peak
     assert found.running == pytest.approx(steady) and found.worst.quasi_static < 2.0 * steady
     assert found.transient == max(start.gear_torque for start in found.starts) > 2.0 * steady
-    assert not [each for each in pump.warnings if each.kind == "start at gear"]
+    assert not [each for each in pump.warnings if each.code.startswith("start-at-gear")]
     hard, warned = dataclasses.replace(found, running=0.4 * found.worst.quasi_static), []
     study = SimpleNamespace(
         config=pump.config,
         drive=pump.drive,
         title_of=pump.title_of,
-        warn=lambda kind, text, *runs, **parts: warned.append(parts),
+        say=lambda code, *runs, **values: warned.append(values),
     )
     hard.remark(study)
     (numbers,) = warned
-    assert numbers["torque"] == (found.worst.quasi_static, "N.m") and numbers["over"][0] == pytest.approx(2.5)
-    assert numbers["angle"] == (found.worst.angle, "rad")
-    assert "(an upper bound, as the shafts are rigid): " in numbers["transient"]
+    assert numbers["torque"] == found.worst.quasi_static and numbers["over"] == pytest.approx(2.5)
+    assert numbers["angle"] == found.worst.angle and numbers["most"] == found.transient
+    assert "(an upper bound, as the shafts are rigid)" in numbers["transient"]
 
 
 def test_a_start_of_a_wheel_by_hand(tmp_path):
@@ -208,12 +208,12 @@ def test_the_gear_has_a_limit_of_its_own_in_a_start(pump, factor, passed):
     assert given.drive.gear.start_limit == pytest.approx(factor * limit)
     found = dataclasses.replace(pump.findings["starts"], limit=given.drive.gear.start_limit)
     said = SimpleNamespace(
-        config=given, drive=pump.drive, warn=lambda kind, text, *runs, **parts: kinds.append((kind, parts))
+        config=given, drive=pump.drive, say=lambda code, *runs, **values: kinds.append((code.code, values))
     )
     kinds: list[tuple[str, dict]] = []
     found.remark(said)
-    assert [kind for kind, _ in kinds] == (["start at gear"] if passed else [])
-    assert not passed or kinds[0][1]["limit"] == (given.drive.gear.start_limit, "N.m")
+    assert [kind for kind, _ in kinds] == (["start-at-gear"] if passed else [])
+    assert not passed or kinds[0][1]["limit"] == given.drive.gear.start_limit
 
 
 def test_no_start_is_permitted_where_running_alone_is_too_hot():

@@ -16,6 +16,7 @@ from command import chainunit
 from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult, WriteError
 from chainunit.app import studies
 from chainunit.core.files import LIST, FileList, claim
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.record import StudyRecord
 
 FILE = """
@@ -64,12 +65,14 @@ def test_python_and_the_command_find_the_same(result, command, tmp_path):
     assert {p.name for p in (tmp_path / "out").iterdir()} == {p.name for p in command.iterdir()}
     for name in ("ChamberForces.fmu", "DcMotor.fmu"):
         assert (tmp_path / "out" / "fmu" / name).stat().st_size > 1000
-    python, by_command = (json.loads((f / "result.json").read_text()) for f in (tmp_path / "out", command))
+    python, by_command = (
+        ResultEntries(json.loads((f / "result.json").read_text())) for f in (tmp_path / "out", command)
+    )
     assert python.pop("source") == "tables in Python" and by_command.pop("source") == "short.toml"
     # a file has lines, tables have none
     assert python.pop("places") == {} and by_command.pop("places")
     assert python == by_command
-    assert json.loads(result.to_json())["answers"] == python["answers"]
+    assert ResultEntries(json.loads(result.to_json()))["answers"] == python["answers"]
 
 
 def test_a_foreign_fmu_is_seen_before_earlier_results_are_removed(tmp_path):
@@ -106,7 +109,7 @@ def test_a_file_that_cannot_be_written_is_a_public_error(result, tmp_path, monke
 
 
 def test_answers_are_a_table_with_units(result):
-    numbers, table = json.loads(result.to_json()), result.answers
+    numbers, table = ResultEntries(json.loads(result.to_json())), result.answers
     assert list(table.columns) == ["unit", "start_up", "steady", "jam_left"]
     for run in ("steady", "jam_left"):
         for name, entry in numbers["answers"][run].items():
@@ -135,7 +138,7 @@ def test_runs_are_the_tree_in_the_file(result, command):
 
 
 def test_verdict_warnings_and_notes_are_texts(result, monkeypatch):
-    numbers = json.loads(result.to_json())
+    numbers = ResultEntries(json.loads(result.to_json()))
     assert result.verdict.split("\n") == [numbers["verdict"][of]["text"] for of in ("model", "motor")]
     assert "Model of the organs, two bars" in result.verdict and "not valid" in result.verdict
     assert result.warnings == [each["text"] for each in numbers["warnings"]] and len(result.warnings) >= 2
@@ -201,7 +204,9 @@ def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
     partial = caught.value.partial
     assert isinstance(partial, StudyResult) and "The run stopped early: " in repr(partial)
     assert "The run stopped early: " in partial._repr_html_()
-    assert json.loads((tmp_path / "out" / "result.json").read_text())["status"].startswith("failed")
+    assert ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))["status"].startswith(
+        "failed"
+    )
     assert set(partial.answers.columns) <= {"unit", "start_up", "steady"}
 
 

@@ -21,6 +21,7 @@ from chainunit import EMPTY, ChainUnitMachine, SideLoads
 from chainunit.capabilities.sides.analysis import factors_for, sides_over_speed
 from chainunit.core.files import LIST, FileList
 from chainunit.machines.chain_unit import Feed
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.report import series
 from chainunit.report import study as study_report
@@ -97,7 +98,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
 
 def test_study_numbers_are_those_of_the_series(done):
     _, folder = done
-    numbers = json.loads((folder / "result.json").read_text())
+    numbers = ResultEntries(json.loads((folder / "result.json").read_text()))
     assert numbers["status"] == "complete"
     with xr.open_datatree(folder / "result.nc") as tree:
         overloads = {f"{side}_empties" for side in ("left", "right")}
@@ -139,7 +140,7 @@ def test_study_numbers_are_those_of_the_series(done):
 
 
 def test_study_certifies_itself(done):
-    numbers = json.loads((done[1] / "result.json").read_text())
+    numbers = ResultEntries(json.loads((done[1] / "result.json").read_text()))
     shares = [c["energy_residual_share"] for c in numbers["certificate"].values()]
     assert len(shares) == 7 and max(s["value"] for s in shares) < 2e-3
     # --check compares every run; a start in 0.3 s at 4 ms: 6.9e-5 at 2 ms and 1.8e-5 at 1 ms; a jam that rises in
@@ -181,7 +182,7 @@ def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
     for name in ("crank_torque", "motor_torque", "rocker_torque"):
         peak = getattr(other.answers["blocked"], f"{name}_peak")
         assert peak == pytest.approx(result.peaks[name][1], rel=1e-6)
-    (note,) = (note for note in study.notes if note.kind == "assumption")
+    (note,) = (note for note in study.notes if note.code == "assumption")
     assert note.runs == ("blocked",)
     assert "are assumed and decide the peak" in note.text and "distance from the pivot C" in note.text
     peaks = as_dict(study)["block_peaks"]["blocked"]
@@ -256,7 +257,9 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
     study = run_study(config.parse(SHORT), tmp_path)
     assert "it broke" in str(study.failure) and "start_up" in study.runs and "unfinished" in study.runs
     write(study, tmp_path)
-    assert json.loads((tmp_path / "result.json").read_text())["status"].startswith("failed: motor: step")
+    assert ResultEntries(json.loads((tmp_path / "result.json").read_text()))["status"].startswith(
+        "failed: motor: step"
+    )
     with xr.open_datatree(tmp_path / "result.nc") as tree:
         assert {"start_up", "unfinished"} <= set(tree.children)
 
@@ -298,7 +301,7 @@ def test_ctrl_c_keeps_what_was_computed(tmp_path):
     _, err = running.communicate(timeout=60)
     assert running.returncode == 130, err
     assert "interrupted at t = " in err and "Traceback" not in err
-    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     assert numbers["status"].startswith("failed: interrupted")
     with xr.open_datatree(tmp_path / "out" / "result.nc") as tree:
         assert len(tree["unfinished"]["time"]) > 1
@@ -319,7 +322,7 @@ def test_a_motor_that_cannot_reach_the_speed_is_told(tmp_path):
     result = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
     assert result.returncode == 1, result.stderr
     assert "in place of 6 rad/s" in result.stdout and "does not return" not in result.stdout
-    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     assert numbers["answers"]["jam_left"]["recovery_time"]["value"] is None
 
 
@@ -337,7 +340,7 @@ right = { material_mass = 0, processing_force = 0 }
     process = chainunit("study", "empty.toml", "-o", "[red]out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     assert "[/foo] mill" in process.stdout and "[red]out/result.json" in process.stdout
-    numbers = json.loads((tmp_path / "[red]out" / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "[red]out" / "result.json").read_text()))
     for side in ("left", "right"):
         assert numbers["organs"]["overload_factors"][side]["rocker_torque"]["value"] is None
     assert numbers["organs"]["limits"]["slack_speed"]["value"] is None
@@ -354,7 +357,7 @@ def test_every_number_has_its_unit(done):
             # a flag is no number
             assert isinstance(node, bool) or not isinstance(node, float | int), where
 
-    check(json.loads((done[1] / "result.json").read_text()), "result")
+    check(ResultEntries(json.loads((done[1] / "result.json").read_text())), "result")
 
 
 def test_gains_that_are_not_given_are_tuned(tmp_path):
@@ -619,15 +622,15 @@ def test_the_study_waits_until_the_turns_close(tmp_path):
     study, _ = ran(UNSETTLED, tmp_path)
     assert study.steady_begin > study.config.operation.steady_begin + 1.5
     assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
-    assert not any(warning.kind == "turns do not close" for warning in study.warnings)
+    assert not any(warning.code == "turns-do-not-close" for warning in study.warnings)
 
 
 @pytest.mark.second
 @pytest.mark.parametrize(
     ("text", "told", "there"),
     [
-        (UNSETTLED, "turns do not close", True),
-        (LIGHT + "[motor]\nlimit = { i = 0.2 }\n", "no whole turn", False),
+        (UNSETTLED, "turns-do-not-close", True),
+        (LIGHT + "[motor]\nlimit = { i = 0.2 }\n", "no-whole-turn", False),
     ],
 )
 def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkeypatch):
@@ -636,7 +639,7 @@ def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkey
     monkeypatch.setattr(start_up, "PATIENCE", 0.0)
     monkeypatch.setattr(start_up, "_SETTLES", 0.0)
     study, _ = ran(text, tmp_path)
-    assert any(warning.kind == told for warning in study.warnings)
+    assert any(warning.code == told for warning in study.warnings)
     assert (tmp_path / "load_cycle.csv").exists() == there
 
 

@@ -14,6 +14,7 @@ from command import chainunit
 from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config
 
 pytestmark = pytest.mark.second
@@ -73,7 +74,7 @@ def test_the_force_rises_and_falls_and_the_torque_follows(result):
 
 
 def test_random_surges_reach_other_processes(result):
-    data = json.loads((result / "result.json").read_text("utf-8"))
+    data = ResultEntries(json.loads((result / "result.json").read_text("utf-8")))
     assert data["status"] == "complete" and data["monte_carlo"]["runs"]["value"] == 2
     drawn = xr.open_dataset(result / data["monte_carlo"]["file"])["drawn_factor"].values
     assert len(set(drawn)) == 2 and all(1.5 <= factor <= 4.0 for factor in drawn)

@@ -11,6 +11,7 @@ import pytest
 from chainunit.capabilities.chains.judgement import chains
 from chainunit.reading.results import as_data
 from chainunit.study.pulls import LeastPull
+from chainunit.study.remark import Remark
 from chainunit.study.verdict import (
     CRANK_GOOD,
     RESIDUAL,
@@ -73,8 +74,8 @@ def test_a_rod_of_which_only_an_end_is_pushed_is_no_slack_rod():
     assert verdict.text.endswith(
         " Limits: in steady running, too, bar ends are in compression, where a chain sags."
     )
-    ((topic, line),) = verdict.details(CALLED)
-    assert topic == "end pushed" and line == (
+    (remark,) = verdict.details(CALLED)
+    assert remark.code == "model-end-pushed" and remark.text == (
         "Bar ends in compression, where a chain sags (force in that pin, hardly the torques): steady running (web "
         "end pull at B -341 N); a lump jams (web end pull at B -341 N)."
     )
@@ -93,7 +94,7 @@ def test_a_pull_below_zero_in_the_start_up_is_told_by_name():
         "Bars in compression, where a chain goes slack: start-up (web mean pull "
         "-1304 N, wall mean pull -433 N)."
     )
-    assert verdict.details(CALLED | {"start_up": "start-up"}) == [("pushed", words)]
+    assert verdict.details(CALLED | {"start_up": "start-up"}) == [Remark("model-pushed", "fault", words)]
     both = bars(pulls=started | {"jam_left": least(-1.0, 1.0)})
     assert "in the start-up and in overloads bars are" in both.text
 
@@ -102,12 +103,11 @@ def test_the_speed_is_the_one_that_the_crank_has():
     """Judged at the larger one that is asked for, which is named as such."""
     slow = bars(30.0, 50.0, 4.58, actual=1.57)
     assert "two bars, crank at 1.57 rad/s, judged at the required 30.0 rad/s: not valid. " in slow.text
-    assert slow.details(CALLED)[0] == ("slack speed", "A web goes slack from a crank speed of 4.58 rad/s on.")
+    assert slow.details(CALLED)[0].text == "A web goes slack from a crank speed of 4.58 rad/s on."
     data = as_data(slow)
     assert (data["speed"]["value"], data["reached"]["value"]) == (30.0, 1.57)
     assert "required" not in bars(3.0, actual=2.999).text
-    _, rest = bars(1.57, 50.0, 0.0).details(CALLED)[0]
-    assert rest == "A web is slack at rest already."
+    assert bars(1.57, 50.0, 0.0).details(CALLED)[0].text == "A web is slack at rest already."
 
 
 def test_each_reason_has_its_own_remedy():
@@ -208,8 +208,9 @@ def test_words_and_data():
         'Take organ = "chain".'
     )
     # once, with all runs, webs and walls
-    topics, lines = zip(*verdict.details(CALLED | {"feed_left": "feed to left"}), strict=True)
-    assert topics == ("pushed", "rocker torque") and lines == (
+    remarks = verdict.details(CALLED | {"feed_left": "feed to left"})
+    assert [each.code for each in remarks] == ["model-pushed", "model-rocker-torque"]
+    assert tuple(each.text for each in remarks) == (
         "Bars in compression, where a chain goes slack: feed to left (web mean pull -44.3 N, "
         "wall mean pull -26.2 N); a lump jams (wall mean pull -995 N).",
         "Rocker torque of two bars: 10 % up to a crank speed of 2.00 rad/s.",

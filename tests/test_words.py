@@ -14,6 +14,7 @@ from event_tables import event_line
 from reports import said_of
 
 from chainunit.core.quantities import Quantity
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import chosen_units, number, shown_in
 from chainunit.report.blocks import Source
 from chainunit.report.lines import Words
@@ -114,15 +115,15 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
     event = event_line("overload", turns=1)
     study = run_study(parse(f"{event}{ROTOR}[machine]\npin = {{ friction = {friction} }}\n"), tmp_path)
     assert study.failure is None
-    kinds = {note.kind for note in study.notes}
-    assert ("smoothed friction" in kinds) is (friction > 0.0)
+    kinds = {note.code for note in study.notes}
+    assert ("smoothed-friction" in kinds) is (friction > 0.0)
     # nor has it a crank
     text = said_of(study) + markdown(report(study), [])
     assert not re.search(r"\bcrank\b", text, re.I)
     assert "accelerator torque, peak" in text
     assert "the accelerator at " in study_words(study)
     # its inertia is constant: one row of the speed loop
-    loops = json.loads(json.dumps(as_dict(study)["speed_loop"]))
+    loops = ResultEntries(json.loads(json.dumps(as_dict(study)["speed_loop"])))
     assert len(loops) == 1
     table = said_of(study).partition("The linearised speed loop")[2]
     assert "constant inertia" in table and "least inertia" not in table
@@ -139,13 +140,13 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
             "[coupling]\ntrip_torque = 1000\n[motor]\nlimit = { i = 8, v = 400 }\narmature = { k = 1.27 }\n",
             None,
         ),
-        ('[system]\nmachine = "KnifeDrive"\n', "The file leaves out the motor (IE3 4-pole 2.2 kW, 100L): "),
+        ('[system]\nmachine = "KnifeDrive"\n', "The file leaves out the motor (IE3 4-pole 2.2 kW, 100L). "),
     ],
 )
 def test_decisive_values_that_the_file_leaves_out_are_named_once(text, said, tmp_path):
     event = event_line("dip" if "Knife" in text else "jam_left", turns=1)
     study = run_study(parse(event + text + SHORT), tmp_path)
-    words = [note.text for note in study.notes if note.kind == "values left out"]
+    words = [note.text for note in study.notes if note.code == "values-left-out"]
     assert len(words) == (1 if said else 0)
     if said:
         assert words[0].startswith(said) and said_of(study).count("The file leaves out") == 1

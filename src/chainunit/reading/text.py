@@ -268,6 +268,11 @@ def number(
     return texts[0] + "".join(f" ({other})" for other in texts[1:] if beside)
 
 
+def aside(text: str | None) -> str:
+    """The text in brackets, to follow a word; empty for none."""
+    return f" ({text})" if text else ""
+
+
 _PLAIN = {"−": "-", _THIN: "", "°C": "degC", "°": "deg", "Ω": "Ohm", "∞": "inf"}
 
 

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ..core.descriptions import of_driver
+from ..core.quantities import finite
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
+from ..study.remark import Remark
 from . import blocks as b
 from . import run_names
 from .capability import capabilities
-from .lines import Line, Strong, join, line
+from .lines import Line, Number, Strong, capital, join, line
 from .runs import number
 
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """The drive where it was chosen, the verdicts, the cards and the warnings."""
+    """The drive where it was chosen, first in a sentence; the verdicts, the cards and the warnings."""
+    yield from sentence(s)
     for part in capabilities():
         yield from part.head(s, study)
     for of in ("model", "motor"):
@@ -48,8 +51,29 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     warnings: list[b.Block] = [b.Judgement("warning", each) for each in s.lines("warnings")]
     warnings += (each for part in capabilities() for each in part.warnings(s))
     yield from warnings
+    yield from remark_tables(study.warnings, "warnings")
     if answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
+
+
+def remark_tables(remarks: Sequence[Remark], path: str) -> Iterator[b.Table]:
+    """A table for each remark with more numbers than its sentences have."""
+    for k, remark in enumerate(remarks):
+        rows = tuple(
+            b.TableRow(
+                (size.title, Number(size.value, size.unit, size.kind, f"{path}.{k}.quantities.{name}"))
+            )
+            for name, size in remark.quantities.items()
+            if size.title
+        )
+        if rows:
+            yield b.Table(rows, title=capital(remark.code.replace("-", " ")))
+
+
+def sentence(s: b.Source) -> Iterator[b.Block]:
+    """The sentence on the drive where it was chosen."""
+    if "sentence" in s.result:
+        yield b.Text(s.words("sentence"), central=True)
 
 
 def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:
@@ -75,7 +99,7 @@ def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:
 
 def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:
     """The answer `name` in the overload in which it is largest; nothing where there is no overload."""
-    sizes = {run: s.value(f"answers.{run}.{name}") for run in study.overloads}
+    sizes = {run: finite(getattr(study.answers[run], name)) for run in study.overloads}
     magnitudes = {run: abs(size) for run, size in sizes.items() if size is not None}
     if magnitudes:
         run = max(magnitudes, key=lambda run: magnitudes[run])

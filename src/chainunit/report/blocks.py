@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import Layout
+from ..reading.result_entries import PARTS, ResultEntries
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
 from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
@@ -225,18 +226,24 @@ class Report:
 # -- from a result
 
 
-def at(result: Any, path: str) -> Any:
-    """The entry of a result at the dotted `path`. A key may itself have dots ("machine.crank.m"); the key of an item
-    of a list is its number.
+def found_at(result: Any, path: str) -> tuple[str, Any]:
+    """The place and the entry of a result at the dotted `path`; in the result of a study the path may leave out the
+    part of the result. A key may itself have dots ("machine.crank.m"); the key of an item of a list is its number.
 
     Raises
     ------
     KeyError
         where the result has no such entry.
     """
-    for node in _matches(result, path):
-        return node
+    for part in ("", *(f"{name}." for name in reversed(PARTS))):
+        for node in _matches(result, part + path):
+            return part + path, node
     raise KeyError(path)
+
+
+def at(result: Any, path: str) -> Any:
+    """The entry of a result at the dotted `path`, see `found_at`."""
+    return found_at(result, path)[1]
 
 
 def _matches(node: Any, path: str) -> Iterator[Any]:
@@ -263,24 +270,11 @@ class Source:
     def number(self, path: str, *items: int, **more: Any) -> Number:
         """The number at `path`; where an array stands there, the number at the places `items` in it. `more` are
         further fields of `Number`."""
-        node = at(self.result, path)
-        value, place = node["value"], path
+        place, node = found_at(self.result, path)
+        value = node["value"]
         for i, item in enumerate(items):
             value, place = value[item], f"{place}{'.' if i else '.value.'}{item}"
         return Number(value, node["unit"], **{"kind": node.get("kind", ""), "path": place, **more})
-
-    def check(self, path: str, over: bool | None = None) -> Share:
-        """The cell of the check at `path`. It stands out where it is `over`, by default over its limit."""
-        check = at(self.result, path)
-        used = f"{path}.utilisation"
-        if "forbidden" in check:
-            return Share(self.number(used, none="none permitted", over=True), self.words(f"{path}.forbidden"))
-        if over is None:
-            size = self.value(used)
-            over = size is not None and size > 1.0
-        known = "value" in check and "limit" in check
-        of = self.line(f"{{{path}.value}} of {{{path}.limit}}") if known else ()
-        return Share(self.number(used, none="no value", over=over), of)
 
     def value(self, path: str) -> float | None:
         """The value of the number at `path`, without its unit."""
@@ -334,7 +328,8 @@ class Source:
 
     def words(self, path: str) -> Words:
         """The words at `path`."""
-        return Words(str(at(self.result, path)), path)
+        place, node = found_at(self.result, path)
+        return Words(str(node), place)
 
     def source_line(self) -> Line:
         """Project, author, date and revision, where the file gives them; the study file, and the version."""
@@ -361,6 +356,9 @@ class Source:
         """Given values: the quantities that an instance or class declares and the result has at `path` (by default
         at `name`). A range gives two values, its ends."""
         path = path or name
+        if isinstance(self.result, ResultEntries) and PARTS[0] in self.result:
+            # findings may have the name of the table to which they belong
+            path = f"{PARTS[0]}.{path}"
         entries = at(self.result, path)
         cls = declaration if isinstance(declaration, type) else type(declaration)
         for v in Layout(cls).variables:

@@ -82,9 +82,9 @@ def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
     if "steady" in study.answers:
         speed = study.answers["steady"].speed_mean * study.drive.ratio
         yield fig.Mark(speed, "steady running, mean", look="mark")
-    if "rated_torque" in s.result["motor"]:
-        speed, torque = (s.value(f"motor.rated_{name}") for name in ("speed", "torque"))
-        yield fig.Mark(float(torque or 0.0), "rated torque (S1)", axis="y", look="reference")
+    if study.plate is not None:
+        speed, torque = study.plate.nameplate.speed, study.plate.nameplate.torque
+        yield fig.Mark(torque, "rated torque (S1)", axis="y", look="reference")
         yield fig.Curve("rated point", [speed], [torque], marker="o", has_line=False)
 
 
@@ -157,13 +157,7 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
     panels = (
         (frequency, fig.Axis("gain of the open loop", log=True), "frequency", "gain", "Gain"),
         (frequency, fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0), "frequency", "phase", "Phase"),
-        (
-            time,
-            fig.Axis("speed deviation", "rad/(N.m.s)"),
-            "time",
-            "deviation",
-            "Disturbance step",
-        ),
+        (time, fig.Axis("speed deviation", "rad/(N.m.s)"), "time", "deviation", "Disturbance step"),
     )
 
     def items(over: str, of: str) -> Iterator[fig.Item]:

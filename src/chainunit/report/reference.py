@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, get_type_hints
 
+from ..core.descriptions import of_driver
 from ..core.errors import InputError, near_name
 from ..core.messages import unit_behind
 from ..core.model import Model
@@ -16,6 +17,8 @@ from ..models import MODELS
 from ..reading.results import documented, results_in
 from ..study.analyses import all_analyses
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
+from ..study.remark import SEVERITIES
+from ..study.remarks import declared_remarks
 from .blocks import Block, Column, Report, Section, Table, TableRow, Text, heads
 
 _KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
@@ -128,6 +131,7 @@ def reference(
         Section(f"result-{name}", f"result.json: {name}", (_parts(of),))
         for name, of in _results(contents).items()
     ]
+    sections.append(Section("remarks", "Warnings and notes of a study", tuple(_remarks())))
     for name, words, options in commands:
         rows = tuple(TableRow((option, words)) for option, words in options)
         sections.append(
@@ -151,6 +155,25 @@ def _parts(of: type) -> Table:
     """A row for each part of a result."""
     rows = (TableRow((name or "(the number)", unit or "-", words)) for name, unit, words in documented(of))
     return Table(tuple(rows), heads("name", "unit", "meaning"), numeric=False)
+
+
+def _remarks() -> Iterator[Block]:
+    """A row for each declared remark."""
+    meanings = "; ".join(f"{severity}: {meaning}" for severity, meaning in SEVERITIES.items())
+    yield Text(f"By their code in result.json, the gravest first. {meanings}.")
+    rows = (
+        TableRow(
+            (
+                each.code,
+                each.severity,
+                of_driver(" ".join(each.sentences)),
+                of_driver(each.remedy) or "-",
+                ", ".join(f"{name} [{size.unit}]" for name, size in each.sizes.items()) or "-",
+            )
+        )
+        for each in declared_remarks()
+    )
+    yield Table(tuple(rows), heads("code", "severity", "sentences", "remedy", "numbers"), numeric=False)
 
 
 def _variables(model: Model) -> Iterator[Block]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ..core.errors import InputError
 from ..core.inputs import JSON, file_bytes, json_of
+from ..reading.result_entries import ResultEntries
 
 
 class ResultKind(NamedTuple):
@@ -25,4 +26,4 @@ class ResultKind(NamedTuple):
             result = json_of(file_bytes(folder / self.file, JSON), self.file)
         except InputError:
             return False
-        return isinstance(result, dict) and self.key in result
+        return isinstance(result, dict) and self.key in ResultEntries(result)

@@ -13,6 +13,8 @@ from ..study.record import StudyRecord
 from ..study.window import Phase
 from . import blocks as b
 from . import run_names
+from .cited import cited
+from .cited import number as cited_number
 from .lines import Number, capital, join, line, spoken
 from .terminal import plain_line
 
@@ -27,8 +29,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         if s.result.get(run):
             yield from _begin(s, study, run, phase)
     if s.result["pins"]:
-        yield _pins(s, study)
-        yield _largest_pin(s, study)
+        yield _pins(study)
+        yield _largest_pin(study)
     if loops := s.result.get("speed_loop"):
         title = "The linearised speed loop; deviation and settling are those after a step of the load torque"
         rows = {loop: spoken(loop) if len(loops) > 1 else "constant inertia" for loop in loops}
@@ -107,9 +109,7 @@ def _beside_the_worst(s: b.Source, study: StudyRecord, whole: b.Table) -> b.Tabl
     """Of the table of all runs, steady running beside the overload with the largest crank torque, for one screen."""
     runs = by_side(study, s.result["answers"])
     shown = [run for run in ("steady",) if run in runs] or runs[:1]
-    peaks = {
-        run: s.value(f"answers.{run}.crank_torque_peak") or 0.0 for run in study.overloads if run in runs
-    }
+    peaks = {run: study.answers[run].crank_torque_peak for run in study.overloads if run in runs}
     title = whole.title
     if peaks:
         shown.append(max(peaks, key=lambda run: abs(peaks[run])))
@@ -122,31 +122,30 @@ def _beside_the_worst(s: b.Source, study: StudyRecord, whole: b.Table) -> b.Tabl
     return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")
 
 
-def _largest_pin(s: b.Source, study: StudyRecord) -> b.Text:
+def _largest_pin(study: StudyRecord) -> b.Text:
     """The pin with the largest force of all runs, for one screen."""
-    runs = {pin: hardest_run(study.pins, pin) for pin in next(iter(s.result["pins"].values()))}
-    pin = max(runs, key=lambda pin: s.value(f"pins.{runs[pin]}.{pin}.peak") or 0.0)
-    run = runs[pin]
-    size = s.number(f"pins.{run}.{pin}.peak")
-    return b.Text(line(f"Largest force in a pin: {pin} ", size, f" ({study.title_of(run)})."), form="screen")
+    forces = {pin: _peak(study, pin) for pin in next(iter(study.pins.values()))}
+    pin = max(forces, key=lambda pin: forces[pin].value or 0.0)
+    worst = study.title_of(hardest_run(study.pins, pin))
+    return b.Text(line(f"Largest force in a pin: {pin} ", forces[pin], f" ({worst})."), form="screen")
 
 
-def _pins(s: b.Source, study: StudyRecord) -> b.Table:
-    tables = s.result["pins"]
-    reference = "steady" if "steady" in tables else next(iter(tables))
-    sizes = list(next(iter(tables[reference].values())))
+def _peak(study: StudyRecord, pin: str) -> Number:
+    """The largest force in a pin of all runs."""
+    run = hardest_run(study.pins, pin)
+    return Number(study.pins[run][pin]["peak"], "N", path=f"runs.pins.{run}.{pin}.peak")
+
+
+def _pins(study: StudyRecord) -> b.Table:
+    reference = "steady" if "steady" in study.pins else next(iter(study.pins))
+    tables = study.pins[reference]
+    sizes = list(next(iter(tables.values())))
 
     def row(pin: str) -> b.TableRow:
         worst = hardest_run(study.pins, pin)
-        own = (s.number(f"pins.{reference}.{pin}.{size}") for size in sizes)
+        own = (Number(tables[pin][size], "N", path=f"runs.pins.{reference}.{pin}.{size}") for size in sizes)
         return b.TableRow(
-            (
-                pin,
-                *own,
-                s.number(f"pins.{worst}.{pin}.peak"),
-                study.title_of(worst),
-                run_names.short(study, worst),
-            )
+            (pin, *own, _peak(study, pin), study.title_of(worst), run_names.short(study, worst))
         )
 
     columns = (
@@ -154,7 +153,7 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
         for size in sizes
     )
     return b.Table(
-        tuple(map(row, tables[reference])),
+        tuple(map(row, tables)),
         (
             b.Column("pin"),
             *columns,
@@ -169,4 +168,5 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
 def number(s: b.Source, study: StudyRecord, run: str, name: str) -> Number:
     """The answer `name` of a run."""
     back = name == "recovery_time" and run != "steady" and study.returns
-    return s.number(f"answers.{run}.{name}", none="not reached" if back else "-")
+    answers = cited(study.answers[run], f"runs.answers.{run}")
+    return cited_number(getattr(answers, name), none="not reached" if back else "-")

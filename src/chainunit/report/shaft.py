@@ -14,6 +14,7 @@ from ..study.record import StudyRecord
 from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
+from .cited import cited, number
 from .pictures import Pictures
 from .runs import by_side, over_runs
 
@@ -27,7 +28,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the driveline."""
     if not shaft_findings(study).answers:
         return
-    yield _shaft(s, study)
+    yield _shaft(study)
     if not is_examined("driveline", study.findings):
         yield b.Table(s.rows(LineModes, "driveline"), title="The driveline's torsion")
     yield _rigid(s)
@@ -46,11 +47,12 @@ def _rigid(s: b.Source) -> b.Judgement:
     return b.Judgement("good" if holds else "partly", text)
 
 
-def _shaft(s: b.Source, study: StudyRecord) -> b.Table:
+def _shaft(study: StudyRecord) -> b.Table:
     """The table of the demands of each run on the driveline."""
-    runs = by_side(study, s.result["shaft"])
+    answers = cited(shaft_findings(study), "findings.shaft").answers
+    runs = by_side(study, answers)
     rows = (
-        b.TableRow((v.description, *(s.number(f"shaft.{run}.{v.name}") for run in runs)))
+        b.TableRow((v.description, *(number(getattr(answers[run], v.name)) for run in runs)))
         for v in Layout(ShaftAnswers).variables
     )
     return over_runs(study, runs, rows, "Torque in the driveline")

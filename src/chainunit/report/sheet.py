@@ -1,4 +1,4 @@
-"""The sheet of a study that an engineer signs: question, drawing, answer, checks, energy, assumptions, basis, and
+"""The sheet of a study that an engineer signs: answer, question, drawing, checks, energy, assumptions, basis, and
 what was not checked; the rest of the report is its annex."""
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .lines import Line, Number, capital, line
 from .pdf import Sheet
 from .study import basis, software
 
-_FIRST = ("question", "answer")
+_FIRST = ("answer", "question")
 _BEYOND = (
     "fatigue of links, welds and frame; wear of pins; bearings of the motor",
     "play in pins and gear; bending of links; vibration of frame and foundation",
@@ -36,11 +36,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     sections = [
         *(given[name] for name in _FIRST if name in given),
         *(_on_sheet(given[name]) for name in sheets),
-        b.Section(
-            "assumptions",
-            "Assumptions: values that no file gives",
-            tuple(_assumed(given, study)),
-        ),
+        b.Section("assumptions", "Assumptions: values that no file gives", tuple(_assumed(given, study))),
         *([_basis(s, study)] if "basis" in given else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]

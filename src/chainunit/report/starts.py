@@ -6,35 +6,32 @@ from collections.abc import Iterator
 
 from ..study.event_torques import running_words
 from ..study.record import StudyRecord
-from ..study.starts import transient_words
+from ..study.starts import StartFindings, transient_words
 from . import blocks as b
+from .cited import cited, number, table
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The worst start in a sentence, and a table of all starts."""
-    if "starts" not in s.result:
+    findings = StartFindings.found_in(study)
+    if findings is None:
         return
     place = "output of the gear" if study.drive.is_geared else study.driver_noun
     worst = (
         f"Start: load and acceleration load the {place} with up to {{starts.worst.quasi_static}}, from "
         "{a driver} angle of {starts.worst.angle}: {starts.over_running} times {running}, {starts.running}."
     )
-    running = running_words(study, s.result["starts"]["running_in"])
+    running = running_words(study, findings.running_in)
     transient = "" if study.drive.follows else f" The {transient_words(study)}: {{starts.transient}}."
     yield b.Text(s.line(worst + transient, running=running))
-    count = len(s.result["starts"]["from"])
-    names = ("angle", "quasi_static", "gear_torque", "coupling_torque", "start_time")
-    rows = tuple(
-        b.TableRow(tuple((s.number(f"starts.from.{k}.{name}", none="not reached"),) for name in names))
-        for k in range(count)
-    )
-    columns = b.heads(
-        f"{study.driver_noun} angle",
-        "torque at the gear" if study.drive.is_geared else f"torque at the {study.driver_noun}",
-        "with the transient",
-        "torque on a coupling",
-        "start-up time",
-    )
-    yield b.Table(
-        rows, columns, title=f"Starts from rest, from several {study.driver_noun} angles", form="long"
+    at_gear = "torque at the gear" if study.drive.is_geared else f"torque at the {study.driver_noun}"
+    yield from table(
+        cited(findings, "findings.starts").starts,
+        (f"{study.driver_noun} angle", lambda start: number(start.angle)),
+        (at_gear, lambda start: number(start.quasi_static, none="not reached")),
+        ("with the transient", lambda start: number(start.gear_torque, none="not reached")),
+        ("torque on a coupling", lambda start: number(start.coupling_torque, none="not reached")),
+        ("start-up time", lambda start: number(start.start_time, none="not reached")),
+        title=f"Starts from rest, from several {study.driver_noun} angles",
+        form="long",
     )

@@ -58,7 +58,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
 def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
     s = b.Source(as_dict(study) if result is None else result, study.driver_noun)
-    blocks: list[b.Block] = []
+    blocks: list[b.Block] = list(answer.sentence(s))
     with shown_in(study.config.units):
         for block in answer.blocks(s, study):
             if isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
@@ -183,6 +183,7 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 def basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The notes on a study, and its energy certificate."""
     yield from (b.Text(each, "note") for each in s.lines("notes"))
+    yield from answer.remark_tables(study.notes, "notes")
     if s.result["certificate"]:
         yield from _certificate(s, study, s.result["certificate"])
 
@@ -218,7 +219,7 @@ def _certificate(
     yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for shares in certificate.values() for name in shares):
         compared_runs = [run for run, shares in certificate.items() if name in shares]
-        run = max(compared_runs, key=lambda run: s.value(f"certificate.{run}.{name}") or 0.0)
+        run = max(compared_runs, key=lambda run: study.certificate[run][name])
         most = f"{{certificate.{run}.{name}}}"
         text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {most} of the energy moved."
         if name.endswith(DIFFERENCE):

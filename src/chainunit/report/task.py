@@ -30,10 +30,7 @@ Writer = Callable[[], list[Path]]
 """A function that writes files, and returns them."""
 
 
-_OF_BASE = {
-    "study": ResultKind("a study", key="answers"),
-    "linkage": ResultKind("a linkage", "linkage.json"),
-}
+_OF_BASE = {"study": ResultKind("a study", key="answers"), "linkage": ResultKind("a linkage", "linkage.json")}
 
 
 def result_kinds() -> Mapping[str, ResultKind]:

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Layout
-from ..reading.text import number
+from ..reading.text import number as number_words
 from ..study.record import StudyRecord
-from ..study.turn import Reaction, Turn, TurnFindings
+from ..study.turn import Turn, TurnFindings
 from . import blocks as b
 from . import figure as fig
+from .cited import cited, number, table
 
 PICTURE = "turn.png"
 
@@ -43,14 +43,16 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         s.rows(Turn, "constant_speed", none="none"), title=f"A turn at constant speed{bars}", form="long"
     )
     if turn.pins:
-        names = Layout(Reaction).names
-        rows = (
-            b.TableRow((pin, *(s.number(f"constant_speed.pins.{pin}.{name}") for name in names)))
-            for pin in turn.pins
+        yield from table(
+            cited(turn, "findings.constant_speed").pins.items(),
+            ("pin", lambda row: row[0]),
+            ("peak, with feed", lambda row: number(row[1].peak)),
+            ("at", lambda row: number(row[1].angle)),
+            ("peak, without feed", lambda row: number(row[1].peak_free)),
+            ("at", lambda row: number(row[1].angle_free)),
+            title=f"Largest forces in the pins over a turn at constant speed{bars}",
+            form="long",
         )
-        heads = b.heads("pin", "peak, with feed", "at", "peak, without feed", "at")
-        title = f"Largest forces in the pins over a turn at constant speed{bars}"
-        yield b.Table(tuple(rows), heads, title=title, form="long")
     yield _figure(turn, angle_axis(study), bars, study.driver_noun)
 
 
@@ -77,7 +79,7 @@ def _reactions(turn: TurnFindings) -> fig.Panel:
         (2, 0.2, "without feed", "peak_free", "angle_free"),
     ):
         peaks = [(getattr(r, size), getattr(r, angle)) for r in pins.values()]
-        places = tuple(f"{number(peak, 'N')} at {number(at, 'rad')}" for peak, at in peaks)
+        places = tuple(f"{number_words(peak, 'N')} at {number_words(at, 'rad')}" for peak, at in peaks)
         at = np.arange(len(pins)) + shift
         items.append(fig.Bars(words, at, [peak for peak, _ in peaks], 0.38, look, words=places))
     # 30 % of room for the words beside the bars

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from ..reading.text import number
 from .event import Role
@@ -12,6 +11,7 @@ from .event_torques import from_event_on, peaks_in_events
 from .ram_force import TIMES, RamForce, rams
 from .readings import pull_out_torque
 from .record import StudyRecord
+from .remark import note, warning
 from .starts import StartFindings, transient_words
 from .torques import on_coupling, quasi_static_peak
 from .verdict import START
@@ -69,7 +69,7 @@ def transient_of_starts(study: StudyRecord) -> StartPeak:
 
 
 TRIPS_IN_TRANSIENT = (
-    "A friction clutch slips in it for this time; a ball detent or a shear pin that is set lower may open in it, "
+    "A friction clutch slips in it for this time. A ball detent or a shear pin that is set lower may open in it, "
     "unless the line between motor and coupling is soft"
 )
 """The response of a coupling to the electromagnetic transient, in words."""
@@ -95,75 +95,86 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     # the limit of a foreign motor is not known
     most = None if study.drive.foreign else pull_out(study)
     peaks, shocks = peaks_in_events(study), peaks_in_events(study, Role.SHOCK)
-    amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
-    warn = study.warn
     start, quick = hardest_start(study), transient_of_starts(study)
     if start.torque > trip:
-        warn(
-            "coupling opens in start",
-            "The torque limiter opens at {trip}, and a start puts up to {start} on it ({where}): it opens in some "
-            'of the starts. Set it higher, or start softer (start = "soft" or "inverter").',
-            "start_up",
-            where=start.title(study),
-            start=(start.torque, "N.m"),
-            **amounts,
-        )
+        study.say(_OPENS_IN_START, START, trip=trip, where=start.title(study), start=start.torque)
     elif quick.transient > trip:
-        warn(
-            "coupling opens in start",
-            "The torque limiter is set to {trip}. Load and acceleration put {start} on it in a start at most; the "
-            "{transient}: {most} ({where}). {words}.",
-            "start_up",
+        study.say(
+            _OPENS_IN_TRANSIENT,
+            START,
+            trip=trip,
             where=quick.title(study),
-            start=(start.torque, "N.m"),
+            start=start.torque,
             transient=transient_words(study),
-            most=(quick.transient, "N.m"),
-            words=TRIPS_IN_TRANSIENT,
-            **amounts,
+            most=quick.transient,
         )
     openings = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
     if nuisances := [name for name in openings if name not in shocks]:
-        warn(
-            "nuisance trip",
-            "The torque limiter, set to {trip}, opens where no shock asks for it, a nuisance trip that protects "
-            "nothing: {where}.",
-            *nuisances,
-            where="; ".join(map(study.title_of, nuisances)),
-            **amounts,
-        )
+        study.say(_NUISANCE, *nuisances, trip=trip, where="; ".join(map(study.title_of, nuisances)))
     if shocks and not set(openings) & set(shocks):
-        warn(
-            "coupling never opens",
-            "The torque limiter opens in no overload of this study ({where}): it is set to {trip}, they put "
-            "{largest} on it at most, steady running {steady}"
-            + ("." if most is None else "; the motor gives {motor} at most."),
+        study.say(
+            _NEVER_OPENS,
             *shocks,
             where="; ".join(map(study.title_of, shocks)),
-            largest=(max(shocks.values()), "N.m"),
-            steady=(on_coupling(study.drive, study.steady), "N.m"),
-            **amounts,
+            trip=trip,
+            largest=max(shocks.values()),
+            steady=on_coupling(study.drive, study.steady),
+            motor=most,
         )
     elif most is not None and trip > (least := (1.0 - LESS_TORQUE) * most if study.plate else most):
-        tolerance = " (by IEC 60034-1 it may be as little as {least})" if study.plate else ""
-        warn(
-            "coupling above motor",
-            f"The torque limiter is set to {{trip}} and the motor gives {{motor}} at most{tolerance}: a load that "
-            "rises slowly may stall the motor and not open it.",
-            least=(least, "N.m"),
-            **amounts,
-        )
+        study.say(_ABOVE_MOTOR, trip=trip, motor=most, least=least if study.plate else None)
 
 
-_RAM = (
-    "A coupling {set_for}that opens at {trip} does not limit the force on {ram} near the dead centre, at "
-    "{a driver} angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg "
-    "and {ten} at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin "
-    "pushes with {working} at most; "
+_OPENS_IN_START = warning(
+    "coupling-opens-in-start",
+    "The torque limiter opens at {trip}, and a start puts up to {start} on it ({where}). It opens in some of the "
+    "starts.",
+    remedy='Set it higher, or start softer (start = "soft" or "inverter").',
+    sizes={"N.m": "trip start"},
 )
-_RAM_WITHIN, _RAM_ALWAYS = "within {angle}, the last {way}, ", "at every angle "
-_RAM_END = (
-    "it can push with more than {times} times that while the coupling stays shut. A device at the link protects it "
-    "there, such as an overload cushion or a shear plate of a press, or the relief valve of a pump."
+_OPENS_IN_TRANSIENT = warning(
+    "coupling-opens-in-transient",
+    "The torque limiter is set to {trip}, and load and acceleration put {start} on it in a start at most. The "
+    "{transient}, with {most} at most ({where}).",
+    *(f"{each}." for each in TRIPS_IN_TRANSIENT.split(". ")),
+    sizes={"N.m": "trip start most"},
+)
+_NUISANCE = warning(
+    "nuisance-trip",
+    "The torque limiter, set to {trip}, opens where no shock asks for it, a nuisance trip that protects nothing: "
+    "{where}.",
+    sizes={"N.m": "trip"},
+)
+_NEVER_OPENS = warning(
+    "coupling-never-opens",
+    "The torque limiter opens in no overload of this study ({where}). It is set to {trip}, they put {largest} on it "
+    "at most, steady running {steady}. The motor gives {motor} at most.",
+    sizes={"N.m": "trip largest steady motor"},
+)
+_ABOVE_MOTOR = warning(
+    "coupling-above-motor",
+    "The torque limiter is set to {trip} and the motor gives {motor} at most. By IEC 60034-1 it may give as little "
+    "as {least}. A load that rises slowly may stall the motor and not open it.",
+    sizes={"N.m": "trip motor least"},
+)
+_RAM = note(
+    "coupling-at-ram",
+    "A coupling {set_for}that opens at {trip} does not limit the force on {ram} near the dead centre, at "
+    "{a driver} angle of {dead}. At the dead centre the force has no limit. In running the pin pushes with "
+    "{working} at most. Within {angle}, the last {way}, it can push with more than {times} times that while the "
+    "coupling stays shut. At every angle it can push with more than {times} times that while the coupling stays "
+    "shut{always}.",
+    remedy="A device at the link protects it there, such as an overload cushion or a shear plate of a press, or the "
+    "relief valve of a pump.",
+    sizes={
+        "N.m": "trip",
+        "rad": "angle",
+        ("N", "", 3, "force on the link at the setting, where it is fastest"): "fastest",
+        ("N", "", 3, "30 deg before the dead centre"): "thirty",
+        ("N", "", 3, "10 deg before the dead centre"): "ten",
+        "N": "working",
+        ("m", "millimetres"): "way",
+    },
 )
 
 
@@ -175,21 +186,19 @@ def remark_on_rams(study: StudyRecord, torque: float, set_for: str = "") -> None
         alike.setdefault((f"{ram.least(torque):.4g}", f"{ram.working:.4g}"), []).append(ram)
     for group in alike.values():
         ram, names = group[0], [ram.ram for ram in group]
-        overloaded = ram.overloaded(torque)
-        quantities: dict[str, Any] = {}
-        if overloaded is not None:
-            quantities = {"angle": (overloaded[0], "rad"), "way": (overloaded[1], "m", "millimetres")}
-        study.note(
-            "coupling at ram",
-            _RAM + (_RAM_WITHIN if quantities else _RAM_ALWAYS) + _RAM_END,
-            trip=(torque, "N.m"),
+        angle, way = ram.overloaded(torque) or (None, None)
+        study.say(
+            _RAM,
+            trip=torque,
             set_for=set_for,
             ram=f"the link{'s' if names[1:] else ''} {' and '.join(names)}",
             dead=" and ".join(number(ram.dead, "rad") for ram in group),
-            fastest=(ram.least(torque), "N"),
-            thirty=(ram.before(torque, math.radians(30.0)), "N"),
-            ten=(ram.before(torque, math.radians(10.0)), "N"),
-            working=(ram.working, "N"),
+            fastest=ram.least(torque),
+            thirty=ram.before(torque, math.radians(30.0)),
+            ten=ram.before(torque, math.radians(10.0)),
+            working=ram.working,
             times=f"{TIMES:g}",
-            **quantities,
+            angle=angle,
+            way=way,
+            always="" if angle is None else None,
         )

@@ -20,16 +20,7 @@ from ..drives.motor import Motor
 from ..drives.speed_control import Tuning
 from ..machines.api import ChainUnitMachine
 from ..machines.machine import Machine
-from ..system import (
-    Bond,
-    Component,
-    FmuComponent,
-    ModelComponent,
-    Profile,
-    System,
-    in_line,
-    torque_names,
-)
+from ..system import Bond, Component, FmuComponent, ModelComponent, Profile, System, in_line, torque_names
 from ..system.graph import Connection
 from .foreign_machine import ForeignMachine
 from .line.placed import Line, PlacedPart

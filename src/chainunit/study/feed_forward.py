@@ -10,6 +10,7 @@ from .analysis import Analysis, Findings, Work
 from .drive import Drive
 from .measures import read_measure
 from .record import StudyRecord
+from .remark import note
 from .verdict import STEADY
 from .window import Phase, whole_turns
 
@@ -25,14 +26,14 @@ class RippleWithout(Findings):
     def remark(self, study: StudyRecord) -> None:
         """The fluctuation with feed-forward beside it."""
         if self.ripple is not None:
-            study.note(
-                "feed-forward",
-                "Feed-forward of the machine's torque brings the ripple of the speed from {without} to "
-                "{speed_ripple}.",
-                STEADY,
-                without=(self.ripple, "1", "percent"),
-                speed_ripple=(study.answers[STEADY].speed_ripple, "1", "percent"),
-            )
+            study.say(_RIPPLE, STEADY, without=self.ripple, speed_ripple=study.answers[STEADY].speed_ripple)
+
+
+_RIPPLE = note(
+    "feed-forward",
+    "Feed-forward of the machine's torque brings the ripple of the speed from {without} to {speed_ripple}.",
+    sizes={("1", "percent"): "without speed_ripple"},
+)
 
 
 class FeedForwardAnalysis(Analysis):

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
 from ..reading.results import part, result
-from ..reading.text import number
 from .analysis import Analysis, Findings, Work
 from .drive import Drive
 from .readings import shaft_power
 from .record import StudyRecord
+from .remark import note
 from .verdict import STEADY
 from .window import Phase
 
@@ -46,29 +46,32 @@ class GearFindings(Findings):
         """The loss beside the power of the machine, and its parts."""
         loss = self.loss
         noun = study.drive.transmission
-        text = f"The {noun} {'take' if ' and ' in noun else 'takes'} {{total}} in steady running"
-        if loss.share is not None:
-            text += ", {share} of the {net_power} that the machine takes in the mean"
-        text += (
-            ": {by_load} by load, at an efficiency of {efficiency}, and {without_load} without load (gear.d)."
-        )
-        if loss.passed_power > SWINGS * loss.net_power:
-            text += (
-                " The machine swings energy to and fro, {passed_power} in the mean of both ways, and each way "
-                "costs its share."
-            )
-        study.note(
-            "gear loss",
-            text,
+        study.say(
+            _LOSS,
             STEADY,
-            total=(loss.whole, "W"),
-            share=(loss.share, "1", "percent"),
-            net_power=(loss.net_power, "W"),
-            by_load=(loss.by_load, "W"),
-            without_load=(loss.without_load, "W"),
-            passed_power=(loss.passed_power, "W"),
-            efficiency=number(self.efficiency, "1", "percent"),
+            gear=f"{noun} {'take' if ' and ' in noun else 'takes'}",
+            total=loss.whole,
+            share=loss.share,
+            net_power=loss.net_power,
+            by_load=loss.by_load,
+            efficiency=self.efficiency,
+            without_load=loss.without_load,
+            passed_power=loss.passed_power if loss.passed_power > SWINGS * loss.net_power else None,
         )
+
+
+_LOSS = note(
+    "gear-loss",
+    "The {gear} {total} in steady running. This is {share} of the {net_power} that the machine takes in the mean. "
+    "The machine swings energy to and fro, {passed_power} in the mean of both ways, and each way costs its share.",
+    sizes={
+        "W": "total net_power passed_power",
+        ("1", "percent"): "share",
+        ("W", "", 3, "loss by load"): "by_load",
+        ("1", "percent", 3, "efficiency under load"): "efficiency",
+        ("W", "", 3, "loss without load (gear.d)"): "without_load",
+    },
+)
 
 
 class GearAnalysis(Analysis):

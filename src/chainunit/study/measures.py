@@ -356,19 +356,13 @@ class Answers:
     shaking_moment: Value = measure("N.m", "shaking moment", lambda w: w.swing("machine.frame.moment"))
     torque_reserve: Value = measure("1", "reserve of torque", _reserve, kind="percent", during=_AT_SPEED)
     stall_time: Value = measure(
-        "s",
-        "{driver} stands after",
-        lambda w: stall(w.since, w.speed, w.normal_speed),
-        during=_EVENTS,
+        "s", "{driver} stands after", lambda w: stall(w.since, w.speed, w.normal_speed), during=_EVENTS
     )
     thermal_trip_time: Value = measure(
         "s", "thermal relay trips after, at the latest", _relay, during=_EVENTS
     )
     coupling_trip_time: Value = measure(
-        "s",
-        "torque limiter trips after",
-        lambda w: w.trip.time - w.begin if w.trip else None,
-        during=_EVENTS,
+        "s", "torque limiter trips after", lambda w: w.trip.time - w.begin if w.trip else None, during=_EVENTS
     )
     energy_after_trip: Value = measure(
         "J", "energy after the trip", lambda w: w.trip.energy if w.trip else None, during=_EVENTS

@@ -31,7 +31,7 @@ from .drive import Drive
 from .operation import OperatingConditions
 from .organ_limits import limits_of_organs
 from .registry import parts_of_line
-from .verdict import at_speed, passed_limits
+from .verdict import on_limit, passed_limits
 
 
 def study_system(drive: Drive, operation: OperatingConditions) -> System:
@@ -167,10 +167,10 @@ def remarks_on_export(config: Config) -> list[str]:
 def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
     """A line for each limit of two bars an organ that a crank speed [rad/s] passes, see `study.verdict`."""
     limits = limits_of_organs(machine, feed, ("N.m",))
-    reasons = [at_speed(each.topic, speed, each.speed) for each in passed_limits(limits, speed)]
-    at = number(speed, "rad/s", "speed", beside=False)
-    remedy = 'for chains give the study organ = "chain"'
-    return [f"{reason.speed_limit}; this study turns at {at}; {remedy}." for reason in reasons]
+    passed = passed_limits(limits, speed)
+    turns = number(speed, "rad/s", "speed", beside=False)
+    end = f'This study turns at {turns}. For chains give the study organ = "chain".'
+    return [f"{on_limit(limit.topic, limit.speed)} {end}" for limit in passed]
 
 
 def _is_of(model: Model, drive: Drive) -> bool:
@@ -205,7 +205,7 @@ def drive_to_export(
         turn = cycle(config.machine, config.run.crank_speed, config.feed)
         choice = choose_for(turn, config, folder, lambda what, done, todo: progress(what), backend)
     if choice.proposal is not None and choice.proposal.insufficient:
-        raise RunError(f"[{choice.proposal.name}]: {choice.proposal.answer}")
+        raise RunError(f"[{choice.proposal.name}]: {choice.proposal.reason}")
     return with_parts_beside(choice.drive, config.plans, config.feed, turn)
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..drives.catalogue import CatalogueMotor
 from .drive import Drive
 from .drive_tables import DriveTables
 from .torques import DutyPeak
+
+if TYPE_CHECKING:
+    from .record import StudyRecord
 
 
 @dataclass(frozen=True)
@@ -27,8 +30,10 @@ class DriveProposal:
     """the tables of the study, with the values that follow from the drive"""
     question: str
     """the question that it answers about the machine {noun}"""
-    answer: str
+    reason: str
     """the choice and its reason, in words"""
+    sentence: Callable[[StudyRecord], str]
+    """the sentence on the drive of a study with these runs"""
     insufficient: str = ""
     """the sentence on a study in which no drive fits, so that all is run with the nearest; empty where one fits"""
     keys: Mapping[str, str] = field(default_factory=dict)

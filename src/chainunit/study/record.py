@@ -6,16 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from ..core.brief import briefly_shown
-from ..core.descriptions import of_driver
 from ..core.errors import RunError
 from ..drives.catalogue import CatalogueMotor
 from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
-from ..reading.results import InUnit, as_data, part, result
-from ..reading.text import number
+from ..reading.results import as_data
 from . import verdict
 from .config import Config
 from .drive import Drive
@@ -25,6 +23,7 @@ from .measures import Answers, not_known
 from .proposal import DriveProposal
 from .pulls import LeastPull
 from .relay import LIGHT
+from .remark import Remark, RemarkCode, Value
 from .start_up import StartUp
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
@@ -39,38 +38,6 @@ LOAD_CYCLE = "load_cycle.csv"
 
 SPEED_MISSED = "The motor does not keep the speed asked for."
 """The sentence on a study whose crank does not turn at the requested speed."""
-
-Amount: TypeAlias = (
-    tuple[float | None, str] | tuple[float | None, str, str] | tuple[float | None, str, str, int]
-)
-"""A number and its unit; optionally the kind by which it is shown, and the number of digits."""
-
-
-@result
-class Remark:
-    """A remark that the reader needs beside the numbers: a `warning` of a fault or of a demand that is not
-    met, or a `note` on an assumption behind the numbers."""
-
-    severity: Literal["warning", "note"]
-    kind: str = part("the subject of the remark")
-    text: str = part("the remark, a sentence")
-    runs: tuple[str, ...] = part("the runs that it is about", default=())
-    quantities: Mapping[str, InUnit] = part(
-        "the numbers of the text; a number of one run among several is named ``run.quantity``",
-        default_factory=dict,
-    )
-
-    @classmethod
-    def of(
-        cls, severity: Literal["warning", "note"], kind: str, text: str, /, *runs: str, **parts: Amount | str
-    ) -> Remark:
-        """Make a remark; its `text` has the names of the `parts` (amounts and words) in braces."""
-        amounts = {name: InUnit(*x[:3]) for name, x in parts.items() if not isinstance(x, str)}
-        said = text.format_map({name: x if isinstance(x, str) else number(*x) for name, x in parts.items()})
-        return cls(severity, kind, said[:1].upper() + said[1:], runs, amounts)
-
-    def __str__(self) -> str:
-        return self.text
 
 
 @dataclass
@@ -126,21 +93,17 @@ class StudyRecord:
 
     @property
     def warnings(self) -> list[Remark]:
-        """Remarks on faults, and on demands that are not met."""
-        return [remark for remark in self.remarks if remark.severity == "warning"]
+        """Remarks on faults and on limits that are passed, the gravest first."""
+        return sorted((each for each in self.remarks if each.severity != "note"), key=lambda each: each.rank)
 
     @property
     def notes(self) -> list[Remark]:
         """Remarks on the assumptions behind the numbers."""
         return [remark for remark in self.remarks if remark.severity == "note"]
 
-    def warn(self, kind: str, text: str, /, *runs: str, **parts: Amount | str) -> None:
-        """Add a warning, see `Remark.of`; its text may have slots for the driver, see `of_driver`."""
-        self.remarks.append(Remark.of("warning", kind, of_driver(text, self.driver_noun), *runs, **parts))
-
-    def note(self, kind: str, text: str, /, *runs: str, **parts: Amount | str) -> None:
-        """Add a note, see `warn`."""
-        self.remarks.append(Remark.of("note", kind, of_driver(text, self.driver_noun), *runs, **parts))
+    def say(self, code: RemarkCode, *runs: str, **values: Value) -> None:
+        """Add a remark with that code, see `RemarkCode.remark`."""
+        self.remarks.append(code.remark(*runs, driver=self.driver_noun, **values))
 
     @property
     def titles(self) -> dict[str, str]:

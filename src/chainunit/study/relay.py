@@ -114,12 +114,7 @@ def time_constant(seconds: float, pick_up: float = _PICK_UP) -> float:
 
 
 def relay_image(
-    time: Any,
-    current: Any,
-    setting: float,
-    before: float,
-    seconds: float = LIGHT,
-    pick_up: float = _PICK_UP,
+    time: Any, current: Any, setting: float, before: float, seconds: float = LIGHT, pick_up: float = _PICK_UP
 ) -> Any:
     """Thermal image of a relay, set to `setting` [A], over `time` [s] with `current` [A], shape (n,); it
     trips at 1.

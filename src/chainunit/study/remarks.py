@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib import import_module
+from pkgutil import iter_modules
 
 import numpy as np
 
-from ..reading.text import number
+from ..reading.text import aside, number
+from .analyses import all_analyses
 from .arrays import peak
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
@@ -16,50 +19,47 @@ from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
 from .measures import STARTED, Answers
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
-from .record import LOAD_CYCLE, Amount, StudyRecord
+from .record import LOAD_CYCLE, StudyRecord
 from .registry import capabilities, parts_of_line
+from .remark import DECLARED, SEVERITIES, RemarkCode, fault, note, warning
 from .starts import StartFindings
 from .verdict import START, STEADY, shown_speed
 from .window import CLOSED, DRIFT, STORED
 
+WITHOUT_COMPILER = note(
+    "no-compiler",
+    "No C compiler was found, so that the FMUs run in Python. With one the runs take about a tenth of the time.",
+    remedy="Install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
+)
+EVENT_LEFT_OUT = note("event-left-out", "{title}: it was left out, as {reason}.")
+STATE_NOT_SAVED = note(
+    "state-not-saved",
+    "{title} cannot save its state (canGetAndSetFMUstate). Each event was run from rest, through the same start-up. "
+    "With an FMU that can, the study takes less time.",
+)
+
 
 def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
-    config, note = study.config, study.note
-    assumed = "Values that no file names are the program's defaults, which are assumed."
+    config, machine = study.config, study.drive.foreign_machine
     if config.file.is_packaged:
-        assumed = "Masses, pins, feed and drive are assumed; the papers print none."
+        study.say(_PACKAGED)
     elif config.file.of_example:
-        assumed = (
-            "Values that the study file does not name come from the packaged example, whose masses and drive "
-            "are assumed."
-        )
-    elif study.drive.foreign_machine:
-        assumed = (
-            "The machine is an FMU, {description}. Values that the study file does not "
-            "name are the start values of this FMU, which alone computes the turn at constant speed. Its bearings "
-            "and its motion behind an open coupling are not known."
-        )
-    machine = study.drive.foreign_machine
-    note("assumed", assumed, description=machine.model.description if machine else "")
+        study.say(_OF_EXAMPLE)
+    elif machine:
+        study.say(_FOREIGN, description=machine.model.description)
+    else:
+        study.say(_DEFAULTS)
     if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
-        note(
-            "smoothed friction",
-            "Static friction is not modelled; breakaway torque from a loaded stop is not included.",
-        )
+        study.say(_FRICTION)
     for value in config.file.unusual:
         if value.with_unit:
-            note("unusual value", "By the file, {value}.", value=str(value))
+            study.say(_UNUSUAL, value=str(value))
     if left_out := list(_left_out(study)):
-        note(
-            "values left out",
-            "The file leaves out {what}: the packaged values are used, and the result depends on them.",
-            what=" and ".join(left_out),
-        )
+        study.say(_LEFT_OUT, what=" and ".join(left_out))
     if study.answers:
         study.verdict = replace(model_verdict(study), step=config.run.step)
-        for topic, line in study.verdict.details(study.titles):
-            study.warn(f"model {topic}", "{line}", line=line)
+        study.remarks += study.verdict.details(study.titles)
     for part in capabilities():
         part.remark(study)
     if STEADY in study.answers:
@@ -86,6 +86,27 @@ def conclude(study: StudyRecord) -> None:
             findings.remark(study)
 
 
+_PACKAGED = note("assumed-packaged", "Masses, pins, feed and drive are assumed, as the papers print none.")
+_OF_EXAMPLE = note(
+    "assumed-of-example",
+    "Values that the study file does not name come from the packaged example, whose masses and drive are assumed.",
+)
+_FOREIGN = note(
+    "assumed-of-foreign-machine",
+    "The machine is an FMU, {description}. Values that the study file does not name are the start values of this "
+    "FMU, which alone computes the turn at constant speed. Its bearings and its motion behind an open coupling are "
+    "not known.",
+)
+_DEFAULTS = note("assumed", "Values that no file names are the program's defaults, which are assumed.")
+_FRICTION = note(
+    "smoothed-friction",
+    "Static friction is not modelled, and breakaway torque from a loaded stop is not included.",
+)
+_UNUSUAL = note("unusual-value", "By the file, {value}.")
+_LEFT_OUT = note(
+    "values-left-out",
+    "The file leaves out {what}. The packaged values are used, and the result depends on them.",
+)
 _RATING = ("limit.i", "limit.v", "armature.k")
 """Parameters that limit the torque of a motor without a nameplate."""
 
@@ -118,33 +139,54 @@ def _on_start(study: StudyRecord) -> None:
     requested = study.config.run.crank_speed
     # the row at which the speed is passed is the last of the start
     if speed < STARTED * requested:
-        study.warn(
-            "fed before speed",
-            "start-up: the motor does not bring the empty machine to its speed in a reasonable time: the feed comes "
-            "after {fed}, with the {driver} at {speed} in place of {wanted}; take a larger motor or a lighter "
-            "flywheel.",
+        study.say(
+            _FED_BEFORE_SPEED,
             START,
-            fed=(feed_time, "s"),
-            speed=(speed, "rad/s", "speed"),
-            wanted=number(requested, "rad/s", "speed", full=False, beside=False),
+            fed=feed_time,
+            speed=speed,
+            asked=number(requested, "rad/s", "speed", full=False, beside=False),
         )
 
 
+_FED_BEFORE_SPEED = fault(
+    "fed-before-speed",
+    "In the start-up the motor does not bring the empty machine to its speed in a reasonable time. The feed comes "
+    "after {fed}, with the {driver} at {speed} in place of {asked}.",
+    remedy="Take a larger motor or a lighter flywheel.",
+    sizes={"s": "fed", ("rad/s", "speed"): "speed"},
+)
+_HEAVIER = "Take a larger motor, less load, or for a load that comes and goes a heavier flywheel."
 _LIMITS = {
-    "temperature": "steady running: the winding comes to {value} if it goes on for ever, permitted is {limit} "
-    "({key}): take a larger motor, less load, or for a load that comes and goes a heavier flywheel.",
-    "current": "steady running: the RMS current is {value}, rated is {limit}: a lasting excess overheats the motor; "
-    "take a larger motor, less load, or for a load that comes and goes a heavier flywheel.",
-    "start": "start-up: it takes {value}, with up to {peak}; the rotor of a warm motor may be locked for {limit}, "
-    "and a start that takes longer overheats it as a locked rotor does: take a lighter flywheel, a larger motor, or "
-    'start = "inverter".',
+    "temperature": warning(
+        "motor-temperature",
+        "In steady running the winding comes to {value} if it goes on for ever, permitted is {limit} ({key}).",
+        remedy=_HEAVIER,
+    ),
+    "current": warning(
+        "motor-current",
+        "In steady running the RMS current is {value}, rated is {limit}. A lasting excess overheats the motor.",
+        remedy=_HEAVIER,
+    ),
+    "start": warning(
+        "motor-start",
+        "The start-up takes {value}, with up to {peak}. The rotor of a warm motor may be locked for {limit}, and a "
+        "start that takes longer overheats it as a locked rotor does.",
+        remedy='Take a lighter flywheel, a larger motor, or start = "inverter".',
+        sizes={"A": "peak"},
+    ),
 }
-"""By limit of the motor, the warning where it is exceeded."""
+"""By limit of the motor, the warning if it is exceeded."""
+_NO_RESERVE = fault(
+    "no-reserve",
+    "In steady running of the motor {passes}. A heavier load or a dip of the voltage stalls it{turns}.",
+    remedy="Take a larger motor or a heavier flywheel.",
+    sizes={("1", "percent"): "over"},
+)
 
 
 def _on_limits(study: StudyRecord) -> None:
     """Warn where the motor exceeds a limit in its start or in steady running."""
-    steady, warn = study.answers[STEADY], study.warn
+    steady = study.answers[STEADY]
     key, permitted = study.config.permitted_temperature
     for name, check in motor_limits(study).items():
         if not check.over:
@@ -155,27 +197,21 @@ def _on_limits(study: StudyRecord) -> None:
             if not math.isfinite(value):
                 # that case has its own remark
                 continue
-        peak = 0.0 if study.start is None else study.start.current_peak
-        unit = check.unit
-        warn(
-            f"motor {name}",
+        study.say(
             _LIMITS[name],
             START if name == "start" else STEADY,
-            value=(value, unit),
-            limit=(limit, unit),
-            peak=number(peak, "A"),
+            value=(value, check.unit),
+            limit=(limit, check.unit),
+            **({"peak": study.start.current_peak if study.start else 0.0} if name == "start" else {}),
             key=key,
         )
     if steady.torque_reserve is not None and steady.torque_reserve < 0.0:
-        turns = _stall_speed(study, steady) is None
-        stalls = "; a heavier load or a dip of the voltage stalls it" if turns else ""
-        warn(
-            "no reserve",
-            "steady running of the motor: {passes}{stalls}; take a larger motor or a heavier flywheel.",
+        study.say(
+            _NO_RESERVE,
             STEADY,
-            stalls=stalls,
+            turns="" if _stall_speed(study, steady) is None else None,
             passes=no_reserve(STEADY, steady.torque_reserve),
-            over=(-steady.torque_reserve, "1", "percent"),
+            over=-steady.torque_reserve,
         )
 
 
@@ -188,97 +224,130 @@ def _stall_speed(study: StudyRecord, steady: Answers) -> float | None:
     return breakdown if steady.speed_mean < breakdown else None
 
 
-def _why_missed(study: StudyRecord, steady: Answers) -> str:
-    """The reason why the crank does not turn at the requested speed."""
-    if (breakdown := _stall_speed(study, steady)) is not None:
-        below = number(breakdown, "rad/s", "speed", beside=False)
-        return (
-            f"the motor stalls below its pull-out speed, {below}; take a larger motor, less load, or for a load that "
-            "comes and goes a heavier flywheel"
-        )
+def _speed_missed(code: str, why: str, remedy: str = "") -> RemarkCode:
+    missed = "In steady running the {driver} turns at {speed_mean} in place of {asked}."
+    begin = "The overloads begin from this state{overloads}."
+    return fault(code, missed, why, begin, remedy=remedy, sizes={("rad/s", "speed"): "speed_mean"})
+
+
+_STALLED = _speed_missed(
+    "motor-below-pull-out", "The motor stalls below its pull-out speed, {below}.", _HEAVIER
+)
+_SPEEDS_UP = _speed_missed(
+    "start-does-not-end",
+    "The machine still speeds up, too slowly for a start that ends.",
+    "Take a larger motor, a lighter flywheel or less load.",
+)
+_AT_ITS_LIMIT = _speed_missed(
+    "speed-missed", "The motor's voltage or current is at its limit, or the run is too short to settle."
+)
+_BY_SLIP = _speed_missed(
+    "speed-by-slip", "A motor on the line takes the speed that gear ratio and slip give."
+)
+
+
+def _why_missed(study: StudyRecord, steady: Answers) -> RemarkCode:
+    """The remark on a crank that does not turn at the requested speed, by the reason."""
+    if _stall_speed(study, steady) is not None:
+        return _STALLED
     if steady.energy_gap > STORED:
-        return (
-            "the machine still speeds up, too slowly for a start that ends; take a larger motor, a lighter flywheel "
-            "or less load"
-        )
-    if study.drive.follows:
-        return "the motor's voltage or current is at its limit, or the run is too short to settle"
-    return "a motor on the line takes the speed that gear ratio and slip give"
+        return _SPEEDS_UP
+    return _AT_ITS_LIMIT if study.drive.follows else _BY_SLIP
+
+
+_NO_MEAN = (
+    "Mean power, electric power and the temperature of the winding have no value{refused}.",
+    "No mean of these turns stands for running that lasts{refused}.",
+)
+_NO_TURN = fault(
+    "no-whole-turn",
+    f"In steady running {{made}}, so that means are over this time and there is no {LOAD_CYCLE}.",
+    *_NO_MEAN,
+)
+_NOT_CLOSED = fault(
+    "turns-do-not-close",
+    "In steady running the turns do not close, as their ends differ by {cycle_gap} in speed or torque ({repeats}).",
+    *_NO_MEAN,
+    remedy="Raise run.settle_turns or run.turns.",
+    sizes={("1", "percent"): "cycle_gap"},
+)
+_SPEED_DRIFTS = fault(
+    "speed-drifts",
+    "In steady running the machine still {moves}. The change of its speed over the evaluated turns is {speed_drift} "
+    "of the ripple. Ripple and RMS are not those of steady running.",
+    remedy="Raise run.settle_turns.",
+    sizes={("1", "percent"): "speed_drift"},
+)
+_ENERGY_TAKEN = fault(
+    "energy-taken-up",
+    "In steady running the moving masses {take}, over the evaluated turns {energy_gap} of the energy that passes "
+    "the motor's shaft. Mean powers are given without it{lasts}.",
+    *_NO_MEAN,
+    "The peaks, RMS and ripple are not those of steady running.",
+    remedy="Raise run.settle_turns.",
+    sizes={("1", "percent"): "energy_gap"},
+)
+_NO_THERMAL = fault(
+    "no-thermal-steady-state",
+    "In steady running the winding has no thermal steady state, as its loss grows faster than the cooling.",
+)
 
 
 def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
-    requested, warn = study.config.run.crank_speed, study.warn
+    requested = study.config.run.crank_speed
     never = study.drive.simulated_machine.model.never_repeats
+    refused = None if lasts(study) else ""
     if not study.reaches:
-        why, addition = _why_missed(study, steady), ""
-        if any(not study.config.events[name].from_rest for name in study.overloads):
-            addition = " The overloads begin from this state."
-        warn(
-            "speed missed",
-            "steady running: the {driver} turns at {speed_mean} in place of {wanted}; {why}.{branched}",
+        from_here = any(not study.config.events[name].from_rest for name in study.overloads)
+        below = _stall_speed(study, steady)
+        study.say(
+            _why_missed(study, steady),
             STEADY,
-            speed_mean=(shown_speed(steady.speed_mean, requested), "rad/s", "speed"),
-            asked=(requested, "rad/s", "speed"),
-            wanted=number(requested, "rad/s", "speed", full=False),
-            why=why,
-            branched=addition,
+            speed_mean=shown_speed(steady.speed_mean, requested),
+            asked=number(requested, "rad/s", "speed", full=False),
+            below=None if below is None else number(below, "rad/s", "speed", beside=False),
+            overloads="" if from_here else None,
         )
     if not has_turn(study.drive, study.steady):
-        warn(
-            "no whole turn",
-            f"steady running: {{made}}; means are over this time, and there is no {LOAD_CYCLE}.{{refused}}",
-            STEADY,
-            made=less_than_a_turn(study.drive, study.steady),
-            refused="" if lasts(study) else _REFUSED,
-        )
+        study.say(_NO_TURN, STEADY, made=less_than_a_turn(study.drive, study.steady), refused=refused)
     elif steady.cycle_gap > CLOSED:
-        warn(
-            "turns do not close",
-            "steady running: the turns do not close, their ends differ by {cycle_gap} in speed or torque: {repeats}; "
-            "raise run.settle_turns or run.turns.{refused}",
+        study.say(
+            _NOT_CLOSED,
             STEADY,
-            cycle_gap=(steady.cycle_gap, "1", "percent"),
-            refused="" if lasts(study) else _REFUSED,
+            cycle_gap=steady.cycle_gap,
+            refused=refused,
             repeats=never or "the machine has not settled",
         )
     elif abs(steady.speed_drift) > DRIFT and not never:
-        warn(
-            "speed drifts",
-            "steady running: the machine still {moves}: the change of its speed over the evaluated turns is "
-            "{speed_drift} of the ripple, so that ripple and RMS are not those of steady running; raise "
-            "run.settle_turns.",
+        study.say(
+            _SPEED_DRIFTS,
             STEADY,
             moves="speeds up" if steady.speed_drift > 0.0 else "slows down",
-            speed_drift=(abs(steady.speed_drift), "1", "percent"),
+            speed_drift=abs(steady.speed_drift),
         )
     elif abs(steady.energy_gap) > STORED and not never:
-        warn(
-            "energy taken up",
-            "steady running: the moving masses {take}, over the evaluated turns {energy_gap} of the energy that "
-            "passes the motor's shaft. {means} peaks, RMS and ripple are not those of "
-            "steady running: raise run.settle_turns.",
+        study.say(
+            _ENERGY_TAKEN,
             STEADY,
             take="still take up energy" if steady.energy_gap > 0.0 else "still give energy",
-            energy_gap=(abs(steady.energy_gap), "1", "percent"),
-            means="Mean powers are told without it;" if lasts(study) else f"{_REFUSED.strip()} The",
+            energy_gap=abs(steady.energy_gap),
+            lasts="" if lasts(study) else None,
+            refused=refused,
         )
     if steady.winding_temperature is not None and not math.isfinite(steady.winding_temperature):
-        warn(
-            "no thermal steady state",
-            "steady running: the winding has no thermal steady state, its loss grows faster than the cooling.",
-            STEADY,
-        )
-
-
-_REFUSED = (
-    " Mean power, electric power and the temperature of the winding have no value: no mean of these turns stands for "
-    "running that lasts."
-)
+        study.say(_NO_THERMAL, STEADY)
 
 
 _FULL_STAR = 0.8
 """Share of the synchronous speed from which on a motor in star may be changed over to delta: below it the current
 jumps almost to the one of a start direct on line."""
+_STAR_TOO_SHORT = warning(
+    "star-too-short",
+    "In the start-up the motor has {share} of its synchronous speed after {time} in star. The current jumps from "
+    "{star} to {delta}.",
+    remedy="Take more time in star (starter.star_delta.time), less load, or another start.",
+    sizes={"s": "time", ("1", "percent"): "share", "A": "star delta"},
+)
 
 
 def _on_star(study: StudyRecord) -> None:
@@ -291,77 +360,116 @@ def _on_star(study: StudyRecord) -> None:
     current = np.abs(run[f"motor.{drive.motor.current}"].values)
     share = float(np.interp(time, times, speeds)) / study.plate.nameplate.synchronous
     if share < _FULL_STAR and times[-1] > drive.switched_until:
-        study.warn(
-            "star too short",
-            "start-up: after {time} in star the motor has {share} of its synchronous speed, and the current jumps "
-            "from {star} to {delta}. Take more time in star (starter.star_delta.time), less load, or another start.",
-            START,
-            time=(time, "s"),
-            share=(share, "1", "percent"),
-            star=(float(np.interp(time, times, current)), "A"),
-            delta=(peak(current[times >= drive.switched_until]), "A"),
-        )
+        before, after = np.interp(time, times, current), peak(current[times >= drive.switched_until])
+        study.say(_STAR_TOO_SHORT, START, time=time, share=share, star=float(before), delta=after)
 
 
 _HAPPENINGS = {
-    "rod end pushed": "An end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer to a "
-    "chain",
-    "current limit": "The motor runs into its current limit of {limit}",
-    "stall": "The {driver} stands after the event",
-    "slowed": "The motor is pulled below half its speed, as in a stall",
-    "trip": "The torque limiter opens after the event",
-    "not recovered": "The speed does not return to its steady band within the time followed",
+    code.code: code
+    for code in (
+        warning(
+            "rod-end-pushed",
+            "An end of a rod is pushed, though the rod is pulled in the mean: {where}.",
+            remedy="More rods are nearer to a chain.",
+        ),
+        warning(
+            "current-limit",
+            "The motor runs into its current limit of {passed}: {where}.",
+            sizes={"A": "passed"},
+        ),
+        fault("stall", "The {driver} stands after the event: {where}.", sizes={"s": "stall_time"}),
+        warning(
+            "slowed",
+            "The motor is pulled below half its speed, as in a stall: {where}.",
+            sizes={("1", "percent"): "speed_dip"},
+        ),
+        warning(
+            "trip",
+            "The torque limiter opens after the event: {where}.",
+            sizes={"s": "coupling_trip_time", "J": "energy_after_trip energy_behind"},
+        ),
+        fault(
+            "not-recovered", "The speed does not return to its steady band within the time followed: {where}."
+        ),
+    )
 }
-"""By kind of happening in a run, the begin of its warning, with the limit that is exceeded."""
+"""By code, the remarks on a happening in runs."""
 
 
 def _on_runs(study: StudyRecord) -> None:
     """A remark for each kind of happening in the runs, with all runs in which it occurred."""
-    limits: dict[str, Amount] = {}
-    if (largest := study.drive.motor.current_limit(study.motor)) is not None:
-        limits["current limit"] = largest, "A"
-    happenings = [(name, *each) for name in study.answers for each in _happenings(study, name)]
-    for kind in dict.fromkeys(kind for _, kind, *_ in happenings):
-        runs = {name: (text, amounts) for name, each, text, amounts in happenings if each == kind}
-        where = (f"{study.title_of(name)}{f' ({text})' if text else ''}" for name, (text, _) in runs.items())
-        limit = {"passed": limits[kind]} if kind in limits else {}
-        study.warn(
-            kind,
-            f"{_HAPPENINGS[kind]}: {{where}}.",
+    happenings = [(name, *happening) for name in study.answers for happening in _happenings(study, name)]
+    for code in dict.fromkeys(code for _, code, *_ in happenings):
+        runs = {name: (text, sizes) for name, kind, text, sizes in happenings if kind == code}
+        where = (f"{study.title_of(name)}{aside(text)}" for name, (text, _) in runs.items())
+        limit = {"passed": study.drive.motor.current_limit(study.motor)} if code == "current-limit" else {}
+        study.say(
+            _HAPPENINGS[code],
             *runs,
             where="; ".join(where),
-            limit=number(*limits[kind], full=False) if limit else "",
             **limit,
-            **{f"{name}.{size}": x for name, (_, amounts) in runs.items() for size, x in amounts.items()},
+            **{f"{name}.{size}": x for name, (_, sizes) in runs.items() for size, x in sizes.items()},
         )
 
 
-def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[str, Amount]]]:
-    """Each happening in a run: its kind, its numbers in words, and its numbers as data."""
+def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[str, float | None]]]:
+    """Each happening in a run: its code, its numbers in words, and its numbers as data."""
     config, answers = study.config, study.answers[name]
     pulls = answers.web_pull_least, answers.wall_pull_least
     is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and is_pushed:
-        yield "rod end pushed", "", {}
+        yield "rod-end-pushed", "", {}
     largest = study.drive.motor.current_limit(study.motor)
     if largest is not None and answers.current_peak > 0.999 * largest:
-        yield "current limit", "", {}
+        yield "current-limit", "", {}
     if answers.stall_time is not None:
         late = answers.stall_time > 10.0 * config.run.step
         after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"
-        yield "stall", after, {"stall_time": (answers.stall_time, "s")}
+        yield "stall", after, {"stall_time": answers.stall_time}
     if (dip := slowed(study).get(name)) is not None:
-        yield "slowed", f"by {number(dip, '1', 'percent')}", {"speed_dip": (dip, "1", "percent")}
+        yield "slowed", f"by {number(dip, '1', 'percent')}", {"speed_dip": dip}
     if answers.coupling_trip_time is not None:
-        units = {"coupling_trip_time": "s", "energy_after_trip": "J", "energy_behind": "J"}
-        amounts: dict[str, Amount] = {each: (getattr(answers, each), unit) for each, unit in units.items()}
-        time, energy, behind = (number(*amount) for amount in amounts.values())
+        names = ("coupling_trip_time", "energy_after_trip", "energy_behind")
+        sizes = {each: getattr(answers, each) for each in names}
+        time, energy, behind = (number(x, unit) for x, unit in zip(sizes.values(), "sJJ", strict=True))
         stays = "the machine behind it is an FMU and is not followed"
         if answers.energy_behind is not None:
             stays = f"{behind} stay behind it"
-        yield "trip", f"after {time}; {energy} pass it while it opens, {stays}", amounts
+        yield "trip", f"after {time}; {energy} pass it while it opens, {stays}", sizes
     elif name in config.events and answers.recovery_time is None and study.returns:
-        yield "not recovered", "", {}
+        yield "not-recovered", "", {}
+
+
+_ROTOR = note(
+    "rotor-accelerates",
+    "In steady running load and losses take {load} at the motor's shaft at most, and the motor gives {most}. The "
+    "rest accelerates its rotor, as the speed swings by {ripple}.",
+    sizes={"N.m": "load most", ("1", "percent"): "ripple"},
+)
+_NO_SLIP = note(
+    "no-slip-compensation",
+    "The inverter does not compensate the slip of the motor (starter.inverter.slip). It would raise its frequency "
+    "in each peak of the load, where the flywheel has to slow down to give its energy.",
+)
+_SLIP = note(
+    "slip-compensation",
+    "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip).",
+    sizes={"Hz/(N.m)": "slip"},
+)
+_RATED_SUFFICES = note(
+    "inverter-with-rated-current",
+    "An inverter with the rated current of the motor, {rated}, suffices for running, all starts and all events. It "
+    "carries {overload} times that for up to 60 s (starter.overload).",
+    sizes={"A": "rated"},
+)
+_INVERTER = note(
+    "inverter-current",
+    "An inverter carries {overload} times its rated current for up to 60 s (starter.overload). One with the rated "
+    "current of the motor, whose own limit of {held} holds its frequency back, {limited}. Times the rated {rated} "
+    "of the motor: {cases}.",
+    remedy="Order one of at least {current}, for {case}.",
+    sizes={"A": "current rated held"},
+)
 
 
 def _on_rotor(study: StudyRecord) -> None:
@@ -369,15 +477,8 @@ def _on_rotor(study: StudyRecord) -> None:
     torque, acceleration = (study.steady[f"motor.{name}"].values for name in ("air_gap_tau", "a"))
     most, load = peak(torque), peak(torque - study.drive.fmu_parameters.rotor.J * acceleration)
     if most > 1.05 * load:
-        study.note(
-            "rotor accelerates",
-            "steady running: load and losses take {load} at the motor's shaft at most, and the motor gives {most}: "
-            "the rest accelerates its rotor, as the speed swings by {ripple}.",
-            STEADY,
-            load=(load, "N.m"),
-            most=(most, "N.m"),
-            ripple=(study.answers[STEADY].speed_ripple, "1", "percent"),
-        )
+        ripple = study.answers[STEADY].speed_ripple
+        study.say(_ROTOR, STEADY, load=load, most=most, ripple=ripple)
 
 
 def _on_inverter(study: StudyRecord) -> None:
@@ -387,54 +488,50 @@ def _on_inverter(study: StudyRecord) -> None:
         return
     if SLIP not in study.config.file.given:
         slip = study.drive.parameters.inverter.slip
-        without = (
-            "The inverter does not compensate the slip of the motor (starter.inverter.slip): it would raise "
-            "its frequency in each peak of the load, where the flywheel has to slow down to give its energy."
-        )
-        compensated = (
-            "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip)."
-        )
-        study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
+        if slip:
+            study.say(_SLIP, slip=slip)
+        else:
+            study.say(_NO_SLIP)
     need, overload = inverter_need(study), study.config.drive.starter.overload
     if need is None:
         return
     high = {case: peak for case, peak in need.peaks.items() if peak > 1.001 * overload * rated_current}
     if not high and need.current <= 1.001 * rated_current:
         if study.proposal is not None:
-            study.note(
-                "inverter current",
-                "An inverter with the rated current of the motor, {rated}, suffices for running, all starts and all "
-                "events: it carries {overload} times that for up to 60 s (starter.overload).",
-                rated=(rated_current, "A"),
-                overload=f"{overload:g}",
-            )
+            study.say(_RATED_SUFFICES, rated=rated_current, overload=f"{overload:g}")
         return
-    study.note(
-        "inverter current",
-        "An inverter carries {overload} times its rated current for up to 60 s (starter.overload): order one of at "
-        "least {current}, for {case}{limited}. Times the rated {rated} of the motor: {cases}.",
+    held, limited = _limited(study)
+    study.say(
+        _INVERTER,
         overload=f"{overload:g}",
-        current=(need.current, "A"),
+        current=need.current,
         case=need.case,
-        rated=(rated_current, "A"),
+        rated=rated_current,
         cases="; ".join(f"{case} ({number(peak / rated_current, '1')})" for case, peak in need.peaks.items()),
-        limited=_limited(study),
+        held=held,
+        limited=limited,
     )
 
 
-def _limited(study: StudyRecord) -> str:
-    """Words on the starts with the current limit of an inverter with the rated current of the motor, to follow the
-    order; empty where there are none."""
+def _limited(study: StudyRecord) -> tuple[float | None, str]:
+    """The current limit of an inverter with the rated current of the motor [A], and words on the starts with it; None
+    where there are none."""
     found = StartFindings.found_in(study)
     if found is None or found.current_limit is None:
-        return ""
-    held = number(found.current_limit, "A")
-    limit = f"one with the rated current of the motor, whose own limit of {held} holds its frequency back"
+        return None, ""
     if stuck := [start for start in found.limited if start.start_time is None]:
         where = " and ".join(number(start.angle, "rad") for start in stuck)
-        return f"; {limit}, does not bring the {study.driver_noun} to its speed from {where}"
+        return found.current_limit, f"does not bring the {study.driver_noun} to its speed from {where}"
     time = number(max(start.start_time or 0.0 for start in found.limited), "s")
-    return f"; {limit}, starts in up to {time}"
+    return found.current_limit, f"starts in up to {time}"
+
+
+_ASSUMPTION = note(
+    "assumption",
+    "{title}: {text}",
+    "These peaks are without the torque limiter, which opens at {trip}.",
+    sizes={"N.m": "crank_torque_low crank_torque_high"},
+)
 
 
 def _on_assumptions(study: StudyRecord) -> None:
@@ -442,15 +539,24 @@ def _on_assumptions(study: StudyRecord) -> None:
     coupling = study.config.coupling
     for name, spread in study.spreads.items():
         event = study.config.events[name]
-        without = " These peaks are without the torque limiter, which opens at {trip}." if coupling else ""
         low, high = spread.peaks["crank_torque"]
-        study.note(
-            "assumption",
-            "{title}: {text}" + without,
+        study.say(
+            _ASSUMPTION,
             name,
             title=event.title,
             text=event.assumption(spread.peaks),
-            trip=number(coupling.trip_torque, "N.m") if coupling else "",
-            crank_torque_low=(low, "N.m"),
-            crank_torque_high=(high, "N.m"),
+            trip=number(coupling.trip_torque, "N.m") if coupling else None,
+            crank_torque_low=low,
+            crank_torque_high=high,
         )
+
+
+def declared_remarks() -> list[RemarkCode]:
+    """All declared remarks, the gravest first, then by code."""
+    all_analyses()
+    for part in capabilities():
+        folder = import_module(str(import_module(type(part).__module__).__package__))
+        for module in iter_modules(folder.__path__):
+            import_module(f"{folder.__name__}.{module.name}")
+    order = list(SEVERITIES)
+    return sorted(DECLARED.values(), key=lambda each: (order.index(each.severity), each.code))

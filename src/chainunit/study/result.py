@@ -8,6 +8,7 @@ from typing import Any
 from ..core.quantities import quantity, variables
 from ..drives.catalogue import CatalogueMotor
 from ..drives.speed_control import Loop, Tuning
+from ..reading.result_entries import ResultEntries
 from ..reading.results import InUnit, as_data, part, result
 from ..reading.tables import UnusualValue
 from ..reading.text import entries, entry, shown_in
@@ -19,7 +20,8 @@ from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import Answers, measures_of
 from .origins import origin_of, place_of
-from .record import Remark, StudyRecord
+from .record import StudyRecord
+from .remark import Remark
 from .verdict import Verdict
 from .window import Phase
 
@@ -83,6 +85,18 @@ class RunData:
     ripple_without_feed_forward: float | None = part(
         "fluctuation of the speed without feed-forward", unit="1", kind="percent", default=None
     )
+    fmus: Mapping[str, str] = part("origin of each FMU", default_factory=dict)
+
+
+@result
+class DriveFindings:
+    """What follows from the drive alone."""
+
+    speed_loop: Mapping[str, Loop] = part("the linearised speed loop, by inertia")
+    rigid_line: RigidLine | None = part(
+        "whether a rigid model of the drive holds; of a drive with an elastic line", optional=True
+    )
+    control: Tuning | str = part("the tuned gains of the speed control, or words on it")
 
 
 @result
@@ -90,6 +104,7 @@ class StudyData:
     """The results of the base of a study, beside its given values and the findings of its analyses."""
 
     heading: Heading = part(inline=True)
+    sentence: str | None = part("the sized drive in a sentence", optional=True)
     status: str = part("whether the study is complete")
     failure: str | None = part("the error that ended the study early")
     verdict: Verdicts = part("the verdicts")
@@ -97,26 +112,24 @@ class StudyData:
     notes: list[Remark] = part("assumptions behind the numbers")
     slips: tuple[UnusualValue, ...] = part("given values without a unit that are of an unusual size")
     driver: str = part("the noun of the link that the motor turns")
-    speed_loop: Mapping[str, Loop] = part("the linearised speed loop, by inertia")
-    rigid_line: RigidLine | None = part(
-        "whether a rigid model of the drive holds; of a drive with an elastic line", optional=True
-    )
-    control: Tuning | str = part("the tuned gains of the speed control, or words on it")
-    runs: RunData = part(inline=True)
-    fmus: Mapping[str, str] = part("origin of each FMU")
+    runs: RunData = part("the runs and the numbers read from them")
+    findings: DriveFindings = part("what follows from the drive alone, beside the findings of each analysis")
 
 
-def as_dict(study: StudyRecord) -> dict[str, Any]:
-    """All results except the time series, ready for JSON, each number with its unit."""
+def as_dict(study: StudyRecord) -> ResultEntries:
+    """All results except the time series, ready for JSON, each number with its unit; given values, runs and findings
+    are three parts."""
     with shown_in(study.config.units):
         base, given = as_data(_data(study)), _given_values(study)
-        return base | given | {name: given.get(name, {}) | each for name, each in _parts(study).items()}
+        runs, findings = base.pop("runs"), base.pop("findings") | _parts(study)
+        return ResultEntries(base | {"given": given, "runs": runs, "findings": findings})
 
 
 def _data(study: StudyRecord) -> StudyData:
     drive, failure = study.drive, study.failure
     return StudyData(
         heading=Heading.of(study.config.title, study.config.file),
+        sentence=None if study.proposal is None else study.proposal.sentence(study),
         status=f"failed: {failure}" if failure else "complete",
         failure=str(failure) if failure else None,
         verdict=Verdicts(study.verdict, motor_verdict(study)),
@@ -124,16 +137,17 @@ def _data(study: StudyRecord) -> StudyData:
         notes=study.notes,
         slips=study.config.file.slips,
         driver=study.driver_noun,
-        speed_loop=study.statics.loops,
-        rigid_line=study.statics.rigid_line,
-        control=drive.tuning
-        or (
-            drive.motor.control
-            if drive.follows
-            else "none: the motor takes the speed that its supply and the load give"
-        ),
         runs=_runs(study),
-        fmus={name: str(origin) for name, origin in study.fmus.items()},
+        findings=DriveFindings(
+            study.statics.loops,
+            study.statics.rigid_line,
+            drive.tuning
+            or (
+                drive.motor.control
+                if drive.follows
+                else "none: the motor takes the speed that its supply and the load give"
+            ),
+        ),
     )
 
 
@@ -183,6 +197,7 @@ def _runs(study: StudyRecord) -> RunData:
         pins=study.pins,
         certificate=study.certificate,
         block_peaks={name: _spread(study, name) for name in study.spreads},
+        fmus={name: str(origin) for name, origin in study.fmus.items()},
     )
 
 

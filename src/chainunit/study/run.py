@@ -33,7 +33,7 @@ from .readings import crank_angle
 from .record import Spread, StudyRecord
 from .registry import registered
 from .relay import class_holding, protecting_class, start_seconds
-from .remarks import conclude
+from .remarks import EVENT_LEFT_OUT, STATE_NOT_SAVED, WITHOUT_COMPILER, conclude
 from .rig import Rig
 from .start_up import start_up
 from .starts import StartAnalysis, StartFindings
@@ -47,10 +47,6 @@ if TYPE_CHECKING:
 
 _AFTER_TRIP = 1.0
 """Time for which a start in which the coupling opens is followed without it [s]: the first swings are the largest."""
-_WITHOUT_COMPILER = (
-    "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: install gcc "
-    "or clang, or the compiler that comes with pip install 'chainunit[cross]'."
-)
 _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
 """The peaks that are given over the range of an assumption."""
 
@@ -98,7 +94,7 @@ def run_study(
         )
         rig = Rig(config.operation, drive, files)
         if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
-            study.note("no compiler", _WITHOUT_COMPILER)
+            study.say(WITHOUT_COMPILER)
         runner = Runner(study, rig, progress)
         with _ending(study):
             runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
@@ -209,24 +205,13 @@ class Runner:
         """Add a remark on each event for which the system has no input."""
         for event in self.study.config.events.values():
             if event not in (*self.events, *self.starts):
-                self.study.note(
-                    "event left out",
-                    "{title}: it was left out, as {reason}.",
-                    event.name,
-                    title=event.title,
-                    reason=event.without,
-                )
+                self.study.say(EVENT_LEFT_OUT, event.name, title=event.title, reason=event.without)
 
     def _note_states(self, simulation: Simulation) -> None:
         """Add a remark on each FMU that cannot save its state."""
         for part in simulation.without_states if self.events else ():
-            self.study.note(
-                "state not saved",
-                "{title} cannot save its state (canGetAndSetFMUstate): each event was run from rest, through the "
-                "same start-up. With an FMU that can, the study takes less time.",
-                *(event.name for event in self.events),
-                title=self.rig.graph.components[part].title,
-            )
+            title = self.rig.graph.components[part].title
+            self.study.say(STATE_NOT_SAVED, *(event.name for event in self.events), title=title)
 
     def _start_up(self, simulation: Simulation) -> None:
         """Make the start-up and steady running, and read their answers.

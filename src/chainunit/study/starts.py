@@ -15,10 +15,12 @@ from .analysis import Analysis, Findings, Work
 from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
+from .remark import fault, warning
 from .rig import Rig
 from .sections import SOFTER
 from .start_runs import StartNumbers, longest_start, starts_from_all
 from .torques import at_gear
+from .verdict import START
 
 LIMIT = "starter.inverter.limit"
 """Key of the current limit of the inverter."""
@@ -77,52 +79,61 @@ class StartFindings(Findings):
         from which the motor does not start."""
         worst, start = self.worst, _STARTERS[study.config.drive.start]
         numbers: dict[str, Any] = {
-            "torque": (worst.quasi_static, "N.m"),
-            "running": (self.running, "N.m"),
-            "over": (self.over_running, "1"),
-            "angle": (worst.angle, "rad"),
-            "transient": f"{transient_words(study)}: {number(self.transient, 'N.m')}",
+            "start": start,
+            "torque": worst.quasi_static,
+            "angle": worst.angle,
+            "transient": transient_words(study),
+            "most": self.transient,
+            "softer": SOFTER[study.config.drive.start],
         }
         if worst.quasi_static > self.limit:
-            study.warn(
-                "start at gear",
-                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and "
-                "acceleration; the gear permits {limit} in a start (gear.torque_limit x gear.start_factor): "
-                "{remedy}. The {transient}.",
-                "start_up",
-                start=start,
-                limit=(self.limit, "N.m"),
-                remedy=SOFTER[study.config.drive.start],
-                **numbers,
-            )
+            study.say(_OVER_LIMIT, START, limit=self.limit, **numbers)
         elif (
             study.drive.is_geared
             and math.isinf(self.limit)
             and worst.quasi_static > START_FACTOR * self.running
         ):
-            study.warn(
-                "start at gear",
-                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and "
-                "acceleration, {over} times the {running} of {running_in}. Gears of catalogues commonly permit about "
-                "{large} times their rated torque in a start: choose the gear by this torque (gear.torque_limit, "
-                "gear.start_factor), or {remedy}. The {transient}.",
-                "start_up",
-                start=start,
+            study.say(
+                _OVER_RUNNING,
+                START,
                 large=f"{START_FACTOR:g}",
+                over=self.over_running,
+                running=self.running,
                 running_in=running_words(study, self.running_in),
-                remedy=SOFTER[study.config.drive.start],
                 **numbers,
             )
         if self.stuck:
-            study.warn(
-                "no start",
-                "The motor does not bring the {driver} to its speed from {where}: take a larger motor{ramp}.",
-                "start_up",
+            study.say(
+                _NO_START,
+                START,
                 where=" and ".join(number(each.angle, "rad") for each in self.stuck),
                 ramp=", or a higher voltage of the soft starter"
                 if study.config.drive.start == "soft"
                 else "",
             )
+
+
+_PUTS = "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and acceleration"
+_OVER_LIMIT = warning(
+    "start-at-gear",
+    f"{_PUTS}.",
+    "The gear permits {limit} in a start (gear.torque_limit x gear.start_factor). The {transient}, {most}.",
+    remedy="{softer}.",
+    sizes={"N.m": "torque limit most", "rad": "angle"},
+)
+_OVER_RUNNING = warning(
+    "start-at-gear-over-running",
+    f"{_PUTS}, {{over}} times the {{running}} of {{running_in}}.",
+    "Gears of catalogues commonly permit about {large} times their rated torque in a start. The {transient}, "
+    "{most}.",
+    remedy="Choose the gear by this torque (gear.torque_limit, gear.start_factor), or {softer}.",
+    sizes={"N.m": "torque running most", "rad": "angle", "1": "over"},
+)
+_NO_START = fault(
+    "no-start",
+    "The motor does not bring the {driver} to its speed from {where}.",
+    remedy="Take a larger motor{ramp}.",
+)
 
 
 def _with_own_limit(

@@ -9,14 +9,10 @@ from typing import Any
 
 from ..core.errors import InputError, printable
 from ..core.inputs import JSON, file_bytes, json_of
+from ..reading.result_entries import ResultEntries, as_mapping
 
 FILE = "result.json"
 _TITLES = {"steady": "steady running", "start_up": "start-up", "settling": "settling"}
-
-
-def as_mapping(node: Any) -> Mapping[str, Any]:
-    """A node of a result, where it is a mapping; else an empty one."""
-    return node if isinstance(node, Mapping) else {}
 
 
 @dataclass(frozen=True)
@@ -61,6 +57,7 @@ def stored_result(file: Path, data: Any) -> StoredResult:
     InputError
         for the content of another file.
     """
-    if not isinstance(data, dict) or not isinstance(data.get("answers"), dict) or "chainunit" not in data:
+    entries = ResultEntries(data) if isinstance(data, dict) else ResultEntries()
+    if not isinstance(entries.get("answers"), dict) or "chainunit" not in entries:
         raise InputError(f"{file}: is no result of a study; a run into a folder writes {FILE}")
-    return StoredResult(file, data)
+    return StoredResult(file, entries)

@@ -18,6 +18,7 @@ from ..machines.chain_unit import RodName
 from ..reading.results import OWN, derived, part, result
 from ..reading.text import number
 from .pulls import LeastPull
+from .remark import Remark, RemarkCode, fault, warning
 
 ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6
 """Crank speeds, relative to the lowest natural frequency of the organ, up to which two bars give the rocker
@@ -43,19 +44,15 @@ _SUBJECTS: Mapping[Subject, str] = {
     "machine": "Model of the machine, {}",
     "energy balance": "Energy balance of a machine that is an FMU",
 }
-_HOLDS: Mapping[Holds, str] = {
-    "true": "valid",
-    "in part": "valid in steady running{}",
-    "false": "not valid",
-}
+_HOLDS: Mapping[Holds, str] = {"true": "valid", "in part": "valid in steady running{}", "false": "not valid"}
 _BARS_IN_PART = " for crank torque and motor (10 %)"
 
 
 class Topic(NamedTuple):
-    """The words on a kind of fault: in the verdict, at the begin of the line with its numbers, and its remedy."""
+    """A kind of fault: its words in the verdict, the remark with its numbers, and its remedy in the verdict."""
 
     short: str
-    begin: str
+    remark: RemarkCode
     remedy: str = ""
 
 
@@ -64,42 +61,54 @@ _FINER = "{finer}"
 TOPICS: Mapping[str, Topic] = {
     "pushed": Topic(
         "bars are in compression, where a chain goes slack: rocker torque and organ forces are no predictions",
-        "Bars in compression, where a chain goes slack",
+        fault("model-pushed", "Bars in compression, where a chain goes slack: {where}."),
         _FINER,
     ),
     "end pushed": Topic(
         "bar ends are in compression, where a chain sags",
-        "Bar ends in compression, where a chain sags (force in that pin, hardly the torques)",
+        warning(
+            "model-end-pushed",
+            "Bar ends in compression, where a chain sags (force in that pin, hardly the torques): {where}.",
+        ),
     ),
     "slack speed": Topic(
         "the crank turns faster than the speed at which a web goes slack",
-        "Crank speed at or above the speed at which a web goes slack",
+        fault("model-slack-speed", "A web goes slack from a crank speed of {limit} on{where}."),
         _FINER,
     ),
     "crank torque": Topic(
         "the torques of rocker and crank may be off by more than 10 %, as a chain resonates",
-        "Crank speed too high for the crank torque of two bars, which may be off by more than 10 %; the limit for "
-        "the rocker torque is lower",
+        fault(
+            "model-crank-torque",
+            "Crank torque of two bars: 10 % up to a crank speed of {limit}, rocker torque less far{where}.",
+        ),
         _FINER,
     ),
     "rocker torque": Topic(
         "the rocker torque may be off by more than 10 %, as a chain resonates",
-        "Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %",
+        warning(
+            "model-rocker-torque", "Rocker torque of two bars: 10 % up to a crank speed of {limit}{where}."
+        ),
         _FINER,
     ),
     "energy": Topic(
         "the energy balance is not kept",
-        "Energy residual over the energy moved; a run above the limit counts as wrong",
+        fault(
+            "model-energy",
+            "Energy residual over the energy moved (above the limit a run counts as wrong): {where}.",
+        ),
         "shorten run.step",
     ),
 }
 """By kind of fault, its words."""
-_UP_TO = {
-    "slack speed": "A web goes slack from a crank speed of {} on",
-    "crank torque": "Crank torque of two bars: 10 % up to a crank speed of {}, rocker torque less far",
-    "rocker torque": "Rocker torque of two bars: 10 % up to a crank speed of {}",
+_SLACK_AT_REST = fault("model-slack-at-rest", "A web is slack at rest already{where}.")
+_BEYOND = {
+    "slack speed": "Crank speed at or above the speed at which a web goes slack",
+    "crank torque": "Crank speed too high for the crank torque of two bars, which may be off by more than 10 %; the "
+    "limit for the rocker torque is lower",
+    "rocker torque": "Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %",
 }
-"""By kind of fault at a crank speed: the line that names its limit."""
+"""By limit of the crank speed, the words on speeds beyond it."""
 
 
 @result
@@ -127,13 +136,6 @@ class Reason:
         rod += f"at {self.place} " if self.place else ""
         value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
         return f"{rod}{value}{f', limit {limit}' if self.limit else ''}"
-
-    @property
-    def speed_limit(self) -> str:
-        """The begin of a line on a crank speed that passes this limit: the verdict itself gives the speed."""
-        if self.topic == "slack speed" and self.limit == 0.0:
-            return "A web is slack at rest already"
-        return _UP_TO[self.topic].format(_speed(self.limit))
 
 
 @result
@@ -233,28 +235,28 @@ class Verdict:
         limits = f"{'Limits' if self.holds == 'in part' else 'Reason'}: {'; '.join(why)}" if why else ""
         return ". ".join(filter(None, (f"{line}: {holds}", limits, remedy))) + "."
 
-    def details(self, titles: Mapping[str, str]) -> list[tuple[str, str]]:
-        """The topics, each with its line: the runs, by their `titles`, with their numbers."""
+    def details(self, titles: Mapping[str, str]) -> list[Remark]:
+        """A remark for each topic: the runs, by their `titles`, with their numbers."""
         lines, titles = [], {**titles, **self.titles}
-        for topic, (_, begin, _) in self.topics.items():
+        for topic, (_, code, _) in self.topics.items():
             runs: dict[str, list[str]] = {}
-            limits: dict[str, list[str]] = {}
+            limits: dict[float, list[str]] = {}
             for reason in self.reasons:
                 if reason.topic != topic:
                     continue
                 if reason.quantity == "crank_speed":
-                    limits.setdefault(reason.speed_limit, []).append(reason.run)
+                    limits.setdefault(reason.limit, []).append(reason.run)
                 else:
                     runs.setdefault(reason.run, []).append(reason.numbers)
-            for limit, where in limits.items():
-                of = "; ".join(titles.get(run, run) for run in where if run)
-                lines.append((topic, f"{limit}{of and f': {of}'}."))
-            each = [
+            for limit, judged in limits.items():
+                where = "; ".join(titles.get(run, run) for run in judged if run)
+                lines.append(on_limit(topic, limit, where and f": {where}"))
+            places = [
                 f"{titles.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
                 for run, sizes in runs.items()
             ]
-            if each:
-                lines.append((topic, f"{begin}: {'; '.join(each)}."))
+            if places:
+                lines.append(code.remark(where="; ".join(places)))
         return lines
 
     @derived("rad/s", "speed")
@@ -278,6 +280,12 @@ def shown_speed(speed: float, requested: float) -> float:
 
 def _speed(speed: float) -> str:
     return number(speed, "rad/s", "speed", beside=False)
+
+
+def on_limit(topic: str, limit: float, where: str = "") -> Remark:
+    """The remark on a crank speed beyond its `limit` [rad/s]; `where` are its runs in words."""
+    at_rest = topic == "slack speed" and limit == 0.0
+    return (_SLACK_AT_REST if at_rest else TOPICS[topic].remark).remark(limit=_speed(limit), where=where)
 
 
 def at_speed(topic: str, speed: float, limit: float, run: str = "", grave: bool = False) -> Reason:
@@ -312,7 +320,7 @@ class SpeedLimit:
     @derived(name="text")
     def words(self) -> str:
         """The begin of a sentence on speeds beyond it."""
-        return TOPICS[self.topic].begin
+        return _BEYOND[self.topic]
 
 
 def speed_limits(slack_speed: float, mode: float, empty: bool = False) -> tuple[SpeedLimit, ...]:

@@ -16,6 +16,7 @@ from chainunit.study.bearings import mean_load
 from chainunit.study.drive import Drive
 from chainunit.study.readings import machine_series
 from chainunit.study.record import StudyRecord
+from chainunit.study.remark import warning
 from chainunit.study.verdict import STEADY
 from chainunit.study.window import whole_turns
 
@@ -50,16 +51,22 @@ class PinLife(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of a life that is too short."""
         if self.is_short:
-            study.warn(
-                "pin life",
-                "a bearing at the pin {pin} has a rating life of {life}, and {wanted} are wanted: take one with a "
-                "load rating of {needed}.",
+            study.say(
+                TOO_SHORT,
                 STEADY,
                 pin=self.pin,
-                life=(self.numbers.life, "s", "hours"),
-                wanted=(self.wanted, "s", "hours"),
-                needed=(self.numbers.needed, "N"),
+                life=self.numbers.life,
+                wanted=self.wanted,
+                needed=self.numbers.needed,
             )
+
+
+TOO_SHORT = warning(
+    "pin-life",
+    "A bearing at the pin {pin} has a rating life of {life}, and {wanted} are wanted.",
+    remedy="Take one with a load rating of {needed}.",
+    sizes={("s", "hours"): "life wanted", "N": "needed"},
+)
 
 
 class PinLifeAnalysis(Analysis):

@@ -24,7 +24,7 @@ _HEAD = ("chainunit", "title", "source", "status", "pin_life")
 def _report(study: StudyRecord) -> b.Report:
     result = as_dict(study)
     result = {name: result[name] for name in _HEAD if name in result} | {
-        "warnings": [each for each in result["warnings"] if each["kind"] == "pin life"],
+        "warnings": [each for each in result["warnings"] if each["code"] == "pin-life"],
     }
     s = b.Source(result)
     with shown_in(study.config.units):

@@ -40,7 +40,7 @@ def test_a_lump_that_the_web_folds_before_is_told(tmp_path):
     study = run_study(parse(SHORT + LUMPS), tmp_path)
     peaks = {run: study.answers[run].crank_torque_peak for run in ("steady", "jam_right", "pulled")}
     assert peaks["pulled"] > 2.0 * peaks["jam_right"] and peaks["jam_right"] < 1.1 * peaks["steady"], peaks
-    remarks = [remark for remark in study.warnings if remark.kind == "lump not felt"]
+    remarks = [remark for remark in study.warnings if remark.code == "lump-not-felt"]
     assert [remark.runs for remark in remarks] == [("jam_right",)]
     assert 'crank_angle = "180 deg"' in remarks[0].text
 

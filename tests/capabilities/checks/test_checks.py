@@ -18,6 +18,7 @@ from chainunit.capabilities.checks import plain, rolling
 from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import BearingTable
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.tables import instance
 from chainunit.reading.text import number
 from chainunit.report.blocks import at
@@ -261,7 +262,7 @@ def done(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(done):
-    return json.loads((done / "result.json").read_text("utf-8"))
+    return ResultEntries(json.loads((done / "result.json").read_text("utf-8")))
 
 
 def rows_of(result, pin):
@@ -310,7 +311,7 @@ def test_the_numbers_follow_from_the_stored_runs(done, result):
     assert whys["C rocker pivot, rating life"].startswith(
         "its swing of 17.3 deg stays below 33.3 deg, from where on"
     )
-    (warning,) = (each for each in result["warnings"] if each["kind"] == "check")
+    (warning,) = (each for each in result["warnings"] if each["code"] == "check")
     assert warning["text"].startswith("C rocker pivot: swing 17.3 deg, and at least 33.3 deg are needed")
 
 
@@ -324,7 +325,8 @@ def test_both_supports_have_the_bearing_of_their_common_name(result):
 def test_page_markdown_and_result_have_one_share(done, result):
     page, text = ((done / name).read_text("utf-8") for name in ("report.html", "result.md"))
     for k, row in enumerate(result["checks"]["rows"]):
-        written = f'data-path="checks.rows.{k}.utilisation" value="{json.dumps(row["utilisation"]["value"])}"'
+        used = json.dumps(row["utilisation"]["value"])
+        written = f'data-path="findings.checks.rows.{k}.utilisation" value="{used}"'
         assert written in page
         line = next(line for line in text.splitlines() if line.startswith(f"| {row['of']}: {row['title']} |"))
         assert number(row["utilisation"]["value"], "1", "used") in line
@@ -395,7 +397,7 @@ def test_a_crank_that_stands_has_no_cycle_to_check(tmp_path):
     text = f'event = []\n[system]\nmachine = "{crusher}"\n[motor_shaft]\noverhung_load = 2000\n'
     (tmp_path / "s.toml").write_text(text, "utf-8")
     chainunit("study", "s.toml", "-o", "out", cwd=tmp_path)
-    checks = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))["checks"]
+    checks = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))["checks"]
     assert checks["rows"] == [] and checks["rolling"] == {} and "motor_shaft" not in checks
     missing = {each["what"]: each["why"] for each in checks["not_checked"]}
     cycle = "bearings, gear, shaft of the motor, coupling, shaft sections"

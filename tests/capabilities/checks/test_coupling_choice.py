@@ -19,6 +19,7 @@ from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import FlexibleCouplingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.catalogue import offer
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.config import parse
 
 ROWS = (
@@ -254,7 +255,7 @@ def test_each_coupling_is_tried_in_the_cycle_of_the_study(studied):
     """The shares of each row are those of the equations of motion with its own stiffness, damping and inertia; the
     chosen one is the cheapest that keeps each limit by them."""
     folder, _ = studied
-    result = json.loads((folder / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((folder / "out" / "result.json").read_text("utf-8")))
     of = result["checks"]["flexible_coupling"]
     with xr.open_dataset(folder / "out" / "result.nc", group="start_up") as run:
         angle = run["motor.phi"].values / result["machine"]["ratio"]["value"]

@@ -26,6 +26,7 @@ from chainunit.capabilities.checks.coupling import (
 from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import FlexibleCouplingTable
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.blocks import at
 from chainunit.study.config import parse
 
@@ -197,7 +198,7 @@ temperature_factor = 1.2
 def test_the_numbers_of_a_study_follow_from_its_runs(tmp_path):
     (tmp_path / "mine.toml").write_text(STUDY, "utf-8")
     assert chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path).returncode == 0
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     of = result["checks"]["flexible_coupling"]
     ratio = result["machine"]["ratio"]["value"]
     with xr.open_dataset(tmp_path / "out" / "result.nc", group="start_up") as run:

@@ -29,6 +29,7 @@ from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.drives.gearing import Transmission
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.blocks import at
 from chainunit.study import event_torques
 from chainunit.study.bearings import driver_bearing
@@ -210,7 +211,7 @@ def test_running_puts_its_torque_of_the_run_on_the_gear_not_that_of_the_curve(mo
 
 @pytest.mark.second
 def test_the_numbers_of_a_study_follow_from_its_runs(done):
-    result = json.loads((done / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((done / "result.json").read_text("utf-8")))
     found, shaft = result["checks"]["gear"], result["checks"]["motor_shaft"]
     with xr.open_dataset(done / "result.nc", group="start_up") as run:
         angle = run["machine.phi0"].values / found["ratio"]["value"]

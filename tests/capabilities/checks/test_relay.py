@@ -15,6 +15,7 @@ from event_tables import event_line
 
 from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows, stall_heat
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.blocks import at
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
@@ -180,7 +181,7 @@ def done(tmp_path_factory):
 
 @pytest.mark.second
 def test_the_numbers_of_a_study_follow_from_its_run(done):
-    result = json.loads((done / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((done / "result.json").read_text("utf-8")))
     found = result["checks"]["relay"]
     plate = 750.0 / (0.825 * 0.75 * math.sqrt(3.0) * 400.0)
     assert found["setting"]["value"] == pytest.approx(plate, rel=1e-9)

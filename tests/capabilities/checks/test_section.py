@@ -25,6 +25,7 @@ from chainunit.capabilities.checks.section_strength import (
 )
 from chainunit.capabilities.checks.tables import STEELS, SectionTable
 from chainunit.core.errors import InputError
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.tables import instance
 from chainunit.report.blocks import at
 from chainunit.study.config import parse
@@ -276,7 +277,7 @@ def done(tmp_path_factory):
 
 @pytest.mark.second
 def test_the_stresses_of_a_study_follow_from_its_runs(done):
-    result = json.loads((done / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((done / "result.json").read_text("utf-8")))
     found = result["checks"]["section"]
     with xr.open_dataset(done / "result.nc", group="start_up") as run:
         angle = run["machine.phi0"].values / 50.0

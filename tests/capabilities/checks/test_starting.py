@@ -17,6 +17,7 @@ from chainunit.capabilities.checks import starting
 from chainunit.capabilities.checks.starting import starting_rows
 from chainunit.capabilities.checks.tables import StartingTable
 from chainunit.drives.catalogue import catalogue
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.config import parse
 from chainunit.study.permitted_starts import StartingData, permitted_starts, start_torques
 
@@ -131,7 +132,7 @@ permitted = 2000
 def test_the_numbers_of_a_study_follow_from_its_run(tmp_path):
     (tmp_path / "mine.toml").write_text(STUDY, "utf-8")
     assert chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path).returncode == 0
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     found = {name: each["value"] for name, each in result["checks"]["starting"].items()}
     start = result["start_up"]["start_time"]["value"]
     with xr.open_dataset(tmp_path / "out" / "result.nc", group="start_up") as run:

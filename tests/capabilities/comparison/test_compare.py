@@ -13,7 +13,7 @@ from chainunit.reading.text import number as shown
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.study.stored_result import read_result
+from chainunit.study.stored_result import ResultEntries, read_result
 
 STUDY = """
 title = "{title}"
@@ -53,7 +53,7 @@ def folder(tmp_path_factory):
 
 
 def numbers(folder, name):
-    return json.loads((folder / name / "result.json").read_text())
+    return ResultEntries(json.loads((folder / name / "result.json").read_text()))
 
 
 def rows_of(folder, title):
@@ -117,9 +117,9 @@ def test_verdicts_and_warnings_of_one_alone_come_first(folder):
         assert all(f"Warning: only {name.upper()}: {text}" in printed for text in data["warnings"][name])
 
 
-def test_warnings_are_compared_by_their_kinds_and_runs(folder, tmp_path):
-    """No sentence is read: the same kind in the same runs is the same warning, whatever its words. One in the same
-    words is the same under any kind: an earlier version named it otherwise."""
+def test_warnings_are_compared_by_their_codes_and_runs(folder, tmp_path):
+    """No sentence is read: the same code in the same runs is the same warning, whatever its words. An earlier version
+    has a kind in place of a code."""
     speed, far, hot = (
         ("Speed 3.1 rad/s, too high: 1", "model speed"),
         ("Not so far: 2", "far"),
@@ -127,11 +127,11 @@ def test_warnings_are_compared_by_their_kinds_and_runs(folder, tmp_path):
     )
     results = []
     a = [speed, far, ("Pushed: 4", "model")]
-    b = [("Far off: 3", "far"), ("Hot", "model speed"), hot, ("Pushed: 4", "model pushed")]
-    for name, warnings in (("a", a), ("b", b)):
+    b = [("Far off: 3", "far"), ("Hot", "model speed"), hot, ("Pushed: 4", "model")]
+    for name, warnings, key, sign in (("a", a, "kind", " "), ("b", b, "code", "-")):
         data = numbers(folder, name)
         data["warnings"] = [
-            {"kind": kind, "text": text, "runs": [name] if kind == "model speed" else []}
+            {key: kind.replace(" ", sign), "text": text, "runs": [name] if kind == "model speed" else []}
             for text, kind in warnings
         ]
         (tmp_path / name).mkdir()
@@ -201,7 +201,7 @@ def test_a_result_beside_itself_differs_in_nothing(folder, tmp_path):
 
 
 def test_numbers_have_the_noun_of_a_common_driver(folder, tmp_path):
-    one, other = (json.loads((folder / "a" / "result.json").read_text()) for _ in range(2))
+    one, other = (ResultEntries(json.loads((folder / "a" / "result.json").read_text())) for _ in range(2))
     one["driver"] = other["driver"] = "eccentric"
     for driver, noun in (("eccentric", "eccentric"), ("crank", "driver")):
         other["driver"] = driver
@@ -229,7 +229,7 @@ def test_a_measure_of_one_alone_and_other_units(folder, tmp_path):
     shutil.copytree(folder / "a", tmp_path / "old")
     file = tmp_path / "old" / "result.json"
     data = json.loads(file.read_text())
-    steady = data["answers"]["steady"]
+    steady = data["runs"]["answers"]["steady"]
     steady["mystery_number"] = {"value": 3.0, "unit": "furlong"}
     steady["current_rms"]["unit"] = "kA"
     del steady["speed_dip"]

@@ -30,6 +30,7 @@ from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout, declaration, quantity
 from chainunit.drives.catalogue import catalogue
 from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
 from chainunit.system import CompiledSimulation, Profile
@@ -157,10 +158,10 @@ def test_cost_and_co2_follow_from_the_energy(study):
 
 def test_an_inverter_has_losses_and_a_line_has_none(study):
     assert (found(study).own.mean.inverter is not None) == study.drive.follows
-    kinds = {remark.kind for remark in study.remarks}
-    assert "losses in iron" in kinds and ("losses of the inverter" in kinds) == study.drive.follows
+    kinds = {remark.code for remark in study.remarks}
+    assert "losses-in-iron" in kinds and ("losses-of-the-inverter" in kinds) == study.drive.follows
     # half of the feed goes with the loss of the whole feed in the gear
-    assert "gear at other loads" in kinds
+    assert "gear-at-other-loads" in kinds
 
 
 # -- inverter
@@ -264,7 +265,7 @@ def test_a_motor_of_75_kw_below_ie4_is_warned_of(tmp_path):
     text = 'event = []\ncatalogue = "motors.csv"\n[system]\nmotor = "Old 75"\n[run]\nsettle_turns = 1\n'
     made = run_study(parse(text, source=str(tmp_path / "study.toml")), tmp_path / "out")
     assert isinstance(made.findings["motor_class"], MotorClass)
-    (warning,) = [remark for remark in made.warnings if remark.kind == "efficiency class"]
+    (warning,) = [remark for remark in made.warnings if remark.code == "efficiency-class"]
     assert "is IE3" in warning.text and "asks IE4" in warning.text and "brake motors" in warning.text
 
 
@@ -321,7 +322,7 @@ def test_the_reports_have_the_numbers_of_the_result(tmp_path, monkeypatch, capsy
         cli.main()
     assert ended.value.code == 0
     out = tmp_path / "out"
-    energy = json.loads((out / "result.json").read_text("utf-8"))["energy"]
+    energy = ResultEntries(json.loads((out / "result.json").read_text("utf-8")))["energy"]
     assert energy["own"]["energy"]["unit"] == "J" and energy["own"]["energy"]["kind"] == "energy"
     assert set(energy["loads"]) == set(SHARES)
     page, words, said = (
@@ -359,7 +360,7 @@ def test_a_duty_that_is_too_hot_is_warned_of(tmp_path):
     (warning,) = [
         remark
         for remark in made.warnings
-        if remark.kind == "energy of a winding too hot"
+        if remark.code == "energy-of-a-winding-too-hot"
         and own.motor in remark.text.split("winding of")[1][:30]
     ]
     assert "120 degC" in warning.text and "usage.load.factor" in warning.text
@@ -466,7 +467,7 @@ def test_a_study_tells_that_the_class_of_its_motor_is_not_checked(name, poles, w
         plate=motor,
         drive=SimpleNamespace(foreign=None),
         config=SimpleNamespace(plans={"energy": None}),
-        note=lambda kind, text: notes.append(text),
+        say=lambda code, **values: notes.append(code.remark(**values).text),
     )
     found = MotorClassAnalysis.find(study, None)
     if not words:

@@ -16,6 +16,7 @@ from chainunit import InputError
 from chainunit.capabilities.handover.cycle import read_cycle
 from chainunit.capabilities.handover.page import hand_over
 from chainunit.capabilities.handover.sizing import values_of
+from chainunit.reading.result_entries import ResultEntries
 
 pytestmark = pytest.mark.slow
 
@@ -72,7 +73,7 @@ def only(name):
 
 
 def numbers(folder):
-    return json.loads((folder / "results" / "result.json").read_text("utf-8"))
+    return ResultEntries(json.loads((folder / "results" / "result.json").read_text("utf-8")))
 
 
 def plain(folder):
@@ -177,7 +178,7 @@ def test_a_sized_drive_has_one_number_for_each_utilisation(folder):
     assert [row["reason"] for row in rows] == [each["reason"] for each in found["candidates"]]
     for name, check in checks.items():
         assert float(rows[0][f"{name}.utilisation"]) == check["utilisation"]["value"]
-    for name, check in (("torque_used", "peak_torque"), ("temperature_used", "temperature")):
+    for name, check in (("torque_utilisation", "peak_torque"), ("temperature_utilisation", "temperature")):
         share = checks[check]["utilisation"]["value"]
         assert value_of(data, f"motor.{name}") == pytest.approx(100.0 * share, rel=1e-12)
     assert value_of(data, "motor.winding_temperature") == pytest.approx(
@@ -252,7 +253,7 @@ def test_wrong_results_are_refused(results):
     assert "which has four columns" in refused(results)
     (results / "load_cycle.csv").unlink()
     assert "makes no whole turn in steady running" in refused(results)
-    data = json.loads((results / "result.json").read_text())
+    data = ResultEntries(json.loads((results / "result.json").read_text()))
     (results / "result.json").write_text(json.dumps(data | {"status": "failed: no"}))
     assert "is not complete (failed: no)" in refused(results)
 

@@ -24,6 +24,7 @@ from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.errors import InterruptedRunError
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.recordings import fit as fitting
 from chainunit.recordings.measurands import MEASURANDS
@@ -125,7 +126,7 @@ def folder(tmp_path_factory):
 
 def test_the_numbers_are_found_and_written(folder):
     """Within four standard deviations; the study file has them, and runs; the page and the pictures are there."""
-    result = json.loads((folder / "identified" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((folder / "identified" / "result.json").read_text("utf-8")))
     for name, true in TRUTH.items():
         own = result["numbers"][name]
         assert own["told"] and abs(own["value"]["value"] - true) < 4.0 * own["deviation"]["value"], name
@@ -158,7 +159,7 @@ def test_the_numbers_are_found_and_written(folder):
 
 def test_the_courses_are_means_of_the_recordings(folder):
     """By a second route: classes of the angle between two passes of the mark."""
-    result = json.loads((folder / "identified" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((folder / "identified" / "result.json").read_text("utf-8")))
     time, current, _, _, mark = np.loadtxt(folder / "empty.csv", delimiter=",", skiprows=1).T
     passed = time[mark > 0.5] - 0.0025
     angle = np.interp(time, passed, 2.0 * math.pi * np.arange(len(passed))) + 0.1
@@ -188,7 +189,7 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     words = " ".join(done.stdout.split())
     assert "These recordings determine 2 of 4 numbers" in words
     assert "No trace in any column: left.material_mass" in words or "left.web_mass up by 1 kg" in words
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     own = result["numbers"]["machine.left.web_mass"]
     assert (
         not own["told"] and own["value"]["value"] is None and own["from"]["value"] < 24.5 < own["to"]["value"]
@@ -209,7 +210,7 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     assert abs(total["value"]["value"] - true) < 4.0 * total["deviation"]["value"] < 2.0
     found = Study.from_file(tmp_path / "mine.toml").identify(tmp_path / "again")
     assert found.is_described and "A mill" in repr(found)
-    again = json.loads((tmp_path / "again" / "result.json").read_text("utf-8"))
+    again = ResultEntries(json.loads((tmp_path / "again" / "result.json").read_text("utf-8")))
     assert again["numbers"] == result["numbers"] and again["courses"] == result["courses"]
     numbers = found.answers
     assert list(numbers.index) == list(TRUTH) and numbers["is_determined"].sum() == 2
@@ -218,7 +219,7 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
 
 def found_within(done, folder, most=4.0):
     """The numbers of a finished identification that are told, each within its deviations."""
-    result = json.loads((folder / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((folder / "result.json").read_text("utf-8")))
     assert done.returncode == 0, done.stdout + done.stderr
     told = {name: own for name, own in result["numbers"].items() if own["told"]}
     for name, own in told.items():
@@ -311,7 +312,7 @@ def test_a_wrong_crank_is_recognised(tmp_path):
     assert "The model does not describe the recordings. No number is determined" in " ".join(
         done.stdout.split()
     )
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     assert any(not each["is_noise"] for each in result["residuals"])
     assert result["told"]["value"] == 0 and result["combinations"] == [] == result["proposals"]
     for own in result["numbers"].values():
@@ -401,7 +402,7 @@ def test_an_interrupted_search_for_suspects_leaves_the_fit(wrong_gain, monkeypat
     shown = capsys.readouterr()
     assert "The search for suspects was interrupted" in shown.out
     assert "The run stopped early: the search for suspects was interrupted" in shown.err
-    result = json.loads((folder / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((folder / "result.json").read_text("utf-8")))
     assert result["fit"]["is_ended"] and result["suspects"] == [] and "was interrupted" in result["status"]
 
 
@@ -411,7 +412,7 @@ def test_a_fit_without_an_end(tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text(FILE, "utf-8")
     monkeypatch.setattr(fitting, "MOST_ROUNDS", 2)
     found = Study.from_file(tmp_path / "mine.toml").identify()
-    assert not found.is_described and not json.loads(found.to_json())["fit"]["is_ended"]
+    assert not found.is_described and not ResultEntries(json.loads(found.to_json()))["fit"]["is_ended"]
     (words,) = [each for each in sentences(found.found) if "still improved" in each]
     assert re.search(r"farthest from (motor\.[iuw]|mark) of the run loaded, with residuals of", words)
 
@@ -426,7 +427,7 @@ def test_what_was_known_and_is_contradicted(tmp_path):
     done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 1
     words = " ".join(sentences(Study.from_file(tmp_path / "mine.toml").identify().found))
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     assert "machine.left.web_mass = " in words and "deviations beside the known value, 21.6 kg" in words
     assert (
         "machine.joint_damping = 1.1 N m s/rad lies at its upper bound, and the recordings contradict"

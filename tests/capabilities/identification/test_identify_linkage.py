@@ -12,6 +12,7 @@ from command import chainunit
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.result_entries import ResultEntries
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 GALLERY = Path(__file__).parents[3] / "examples" / "linkages"
@@ -67,7 +68,7 @@ def test_a_linkage_is_identified(name, tmp_path):
     (tmp_path / "mine.toml").write_text(study(name, speed, numbers), "utf-8")
     done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     for key, true in truth.items():
         own = result["numbers"][key]
         assert own["told"] and abs(own["value"]["value"] - true) < 4.0 * own["deviation"]["value"], key

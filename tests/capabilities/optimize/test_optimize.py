@@ -29,6 +29,7 @@ from chainunit.capabilities.optimize.table import wishes_of
 from chainunit.capabilities.optimize.wishes import TurnLimit
 from chainunit.capabilities.optimize.words import bindings, conflict_sentences
 from chainunit.core.files import LIST
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
@@ -622,7 +623,7 @@ def test_the_command(tmp_path, best):
     folder = tmp_path / "out" / "deep"
     names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", LIST, *OF_STUDY}
     assert {file.name for file in folder.iterdir()} == names
-    result = json.loads((folder / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((folder / "result.json").read_text("utf-8")))
     assert result["quantities"]["peak(crank_torque)"]["best"]["value"] == pytest.approx(
         best.answer.value, rel=1e-6
     )
@@ -712,7 +713,10 @@ def test_in_python(best):
     result = Study.from_text(TABLE).optimize()
     assert result.met and result.best.answer.value == pytest.approx(best.answer.value, rel=1e-6)
     assert result.study.machine.by_name == result.machine.by_name
-    assert "peak(crank_torque)" in repr(result) and json.loads(result.to_json())["status"] == "complete"
+    assert (
+        "peak(crank_torque)" in repr(result)
+        and ResultEntries(json.loads(result.to_json()))["status"] == "complete"
+    )
 
 
 @pytest.mark.parametrize("name", [*EXAMPLES, "table"])

@@ -30,6 +30,7 @@ from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.core.errors import RunError
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number as shown
 from chainunit.report.blocks import Source
@@ -427,12 +428,12 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
     random = SimpleNamespace(quantiles=quantiles, shortage="", damaged_batches=1, file_name="runs.nc")
     notes = {}
-    study = SimpleNamespace(drive=drive, note=lambda kind, words, **of: notes.update({kind: of}))
+    study = SimpleNamespace(drive=drive, say=lambda code, **values: notes.update({code.code: values}))
     monte_carlo.MonteCarloResult.remark(random, study)
-    at = notes.get("random overloads at current limit")
-    assert at == ({"limit": (4.4, "A")} if told else None)
+    at = notes.get("random-overloads-at-current-limit")
+    assert at == ({"limit": 4.4} if told else None)
     words = "1 batch of runs in runs.nc was damaged, and was computed anew"
-    assert notes["runs made anew"] == {"text": words}
+    assert notes["runs-made-anew"] == {"text": words}
 
 
 @pytest.mark.slow
@@ -441,11 +442,11 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
     (tmp_path / "study.toml").write_text("event = []\n" + STUDY.format(runs=6))
     process = chainunit("study", "study.toml", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
-    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     quantiles_of = result["monte_carlo"]["quantiles"]
     opens = shown(quantiles_of["trips"]["share"]["value"], "1", "percent")
     assert quantiles_of["trips"]["share"]["value"] > 0.0
-    (warning,) = (each for each in result["warnings"] if each["kind"] == "random overload trips")
+    (warning,) = (each for each in result["warnings"] if each["code"] == "random-overload-trips")
     assert warning["text"] == f"Overloads at random: in {opens} of them the torque limiter opens."
     text = " ".join((tmp_path / "out" / "result.md").read_text().split())
     _, _, answer = text.partition("## The answer")

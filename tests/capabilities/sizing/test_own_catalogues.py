@@ -34,6 +34,7 @@ from chainunit.capabilities.sizing.preference import order_words, rank
 from chainunit.core.errors import InputError
 from chainunit.drives.catalogue import catalogue, offer
 from chainunit.drives.gearing import ordered_torque
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import load, parse
@@ -374,7 +375,7 @@ def test_the_example_ends_in_a_list_of_parts(tmp_path):
     candidates as CSV."""
     done = chainunit("study", EXAMPLE, "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     listed = result["sizing"]["parts"]
     assert [each["part"] for each in listed["parts"]] == ["motor", "gear", "torque limiter"]
     best = result["sizing"]["candidates"][0]
@@ -433,7 +434,7 @@ def test_a_gear_that_an_overload_breaks_is_told_with_a_stronger_one(tmp_path):
     text = text.replace(line, "service_factor = 1")
     (tmp_path / "weak.toml").write_text(text, encoding="utf-8")
     chainunit("study", "weak.toml", "-o", "out", cwd=tmp_path)
-    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
     (warning,) = [each["text"] for each in result["warnings"] if "carries it" in each["text"]]
     gear = result["sizing"]["candidates"][0]["parts"][1]["designation"]
     assert warning.startswith(

@@ -23,16 +23,17 @@ from chainunit.capabilities.sizing.alternatives import (
     on_motor_side,
     slip_run,
 )
+from chainunit.capabilities.sizing.candidate import DriveNumbers
 from chainunit.capabilities.sizing.coupling import effects, recommended_setting
 from chainunit.capabilities.sizing.coupling_words import _bound, coupling_sentence, way_words
 from chainunit.capabilities.sizing.gear_order import gear_order
-from chainunit.capabilities.sizing.page import _best, _relay, _starter
+from chainunit.capabilities.sizing.page import _relay, _starter
 from chainunit.capabilities.sizing.protection import CouplingEffect, Obstacle, Setting, Way
-from chainunit.capabilities.sizing.result import DriveProtection
+from chainunit.capabilities.sizing.result import DriveProtection, MotorProtection, OrderedInverter, SizedDrive
 from chainunit.capabilities.sizing.result import _relay as _relay_of
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.errors import InputError
-from chainunit.core.quantities import variables
+from chainunit.core.quantities import Layout, variables
 from chainunit.drives.gearing import ordered_torque
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import steady
@@ -40,9 +41,10 @@ from chainunit.drives.induction_steady import steady as on_curve
 from chainunit.drives.motor import T_RATED
 from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
-from chainunit.reading.results import as_data
+from chainunit.reading.results import InUnit, as_data
 from chainunit.reading.text import entry, number
 from chainunit.report import blocks, terminal
+from chainunit.report.cited import cited
 from chainunit.study import config, run
 from chainunit.study.analyses import all_analyses
 from chainunit.study.analysis import Analysis, Work
@@ -66,6 +68,12 @@ from chainunit.study.torques import quasi_static_peak
 from chainunit.study.transients import follow
 from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic
+
+
+def chosen_in(study):
+    """The chosen motor of a study, by which a way to a limiter is judged."""
+    sizing = sizing_of(study)
+    return coupling_alternatives.ChosenMotor(sizing.plan, sizing.duty, sizing.best)
 
 
 def sizing_of(study):
@@ -290,11 +298,9 @@ def test_the_line_of_the_relay_tells_of_the_tolerance_of_the_current(trip_class,
     study = SimpleNamespace(drive=drive, relay_class=trip_class, findings={"starts": found})
 
     def line():
-        none = {"trip_torque": entry(None, "N.m")}
-        protection = none | as_data(_relay_of(study, 8.04), titled=True)
-        (line,) = map(terminal.plain_line, _relay(blocks.Source({"sizing": {"protection": protection}})))
-        assert protection["relay_class"]["value"] == f"class {trip_class}"
-        return line
+        protection = _relay_of(study, 8.04)
+        assert protection.relay_class["value"] == f"class {trip_class}"
+        return terminal.plain_line(_relay(protection, cited(protection)))
 
     assert line() == f"relay at 8.04 A, class {trip_class}" if words is None else line().endswith(f"{words})")
     # a start that fails is no start of a motor with more current
@@ -475,7 +481,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     near = {n for n in opened if trial.answers[n].crank_torque_peak < 1.02 * numbers.setting}
     assert opened - near == set(each.opens) - near and opened - near
     assert largest(trial, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
-    assert not [warning for warning in trial.warnings if warning.kind == "coupling opens in start"]
+    assert not [warning for warning in trial.warnings if warning.code == "coupling-opens-in-start"]
 
 
 @pytest.mark.slow
@@ -496,7 +502,7 @@ def test_a_way_is_judged_by_the_limits_of_the_motor(on_line, way):
         Way.INVERTER: coupling_alternatives._inverter,
         Way.SLIP_CLUTCH: coupling_alternatives._slip_clutch,
     }[way]
-    left_out = make(hot, Rig(on_line.config.operation, on_line.drive, None), sizing.setting)
+    left_out = make(hot, Rig(on_line.config.operation, on_line.drive, None), sizing.setting, chosen_in(hot))
     assert left_out.numbers.setting is None and left_out.numbers.start is None and not left_out.opens
     assert "limits of this motor" in way_words(hot, left_out, sizing.setting)
 
@@ -520,7 +526,7 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     """The mill with 0.75 kW started with 15 % only, and was said to start with none."""
     tried = []
 
-    def gentlest(trials, study, goal, limit):
+    def gentlest(trials, study, chosen, goal, limit):
         rigs = list(trials)
         tried.append(({rig.drive.parameters.inverter.boost for rig, *_ in rigs}, len(rigs)))
         rig, _, numbers, _ = rigs[0]
@@ -529,14 +535,14 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
     monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))
     rig = Rig(on_line.config.operation, on_line.drive, None)
-    found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting)
+    found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting, chosen_in(on_line))
     assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
     tables = on_line.config.drive
     tables = dataclasses.replace(tables, given=tables.given | {"starter.inverter.boost"})
     given = dataclasses.replace(on_line.config, drive=tables)
     tried.clear()
     none = coupling_alternatives._inverter(
-        dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting
+        dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting, chosen_in(on_line)
     )
     assert tried == [({0.05}, 5)] and none.numbers.start is None
 
@@ -668,7 +674,7 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
     assert trials.failure is None
     opened = {n for n, a in trials.answers.items() if a.coupling_trip_time is not None}
     assert opened == {*peaks, "dip"} and sizing_of(on_line).setting.disturbances["dip"] > trip
-    (nuisance,) = [warning for warning in trials.warnings if warning.kind == "nuisance trip"]
+    (nuisance,) = [warning for warning in trials.warnings if warning.code == "nuisance-trip"]
     assert "nuisance trip that protects nothing: the voltage dips." in nuisance.text
     assert nuisance.runs == ("dip",)
     assert sizing_of(trials).setting is None and set(as_dict(trials)["sizing"]["protection"]) == {
@@ -679,7 +685,7 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
     for name, peak in on_line.spreads["blocked"].peaks.items():
         # another start leaves another steady turn
         assert trials.spreads["blocked"].peaks[name] == pytest.approx(peak, rel=0.02), name
-    (note,) = [note.text for note in trials.notes if note.kind == "assumption"]
+    (note,) = [note.text for note in trials.notes if note.code == "assumption"]
     assert "These peaks are without the torque limiter" in note
 
 
@@ -799,48 +805,42 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     assert bool(told) == (largest.value > 900.0)
 
 
+RELAY = MotorProtection(InUnit(2.45, "A", title="thermal relay, setting"), None, None, "relay")
+
+
+def limited(torque):
+    """The protection by a torque limiter that opens at `torque`, or by none."""
+    names = ("normal_torque", "running_torque", "start_torque", "breakdown_torque")
+    others = dict.fromkeys(names, 1.0) | {name: {} for name in ("effects", "overloads", "disturbances")}
+    return DriveProtection(
+        torque, torque, RELAY, "", obstacle=None, why_none="too hard", alternatives=[], **others
+    )
+
+
 @pytest.mark.parametrize(
     ("protection", "ending"),
     [
         (
-            {"trip_torque": (None, "N.m")},
-            "; flywheel 0.300 kg m² (steel disc 22.1 kg, 0.330 m in diameter); no torque limiter; relay at 2.45 A.",
+            limited(None),
+            "; flywheel on the motor shaft 0.300 kg m² (steel disc of 22.1 kg, 0.330 m in diameter); "
+            "no torque limiter (too hard); relay at 2.45 A.",
         ),
-        ({"trip_torque": (400.0, "N.m")}, "; trip torque 400 N m; relay at 2.45 A."),
-        ({}, "; thermal relay, setting 2.45 A."),
+        (limited(400.0), "; torque limiter, trip torque at the crank 400 N m; relay at 2.45 A."),
+        (RELAY, "; thermal relay, setting 2.45 A."),
+        (None, "0.330 m in diameter)."),
     ],
 )
 def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
     """Where the file gives a coupling, there is no empty trip torque, and the relay stands once."""
-    relay = {"relay_current": entry(2.45, "A") | {"title": "thermal relay, setting"}}
-    source = blocks.Source(
-        {
-            "verdict": {"model": None},
-            "sizing": {
-                "candidates": [
-                    {
-                        "motor": "M",
-                        "ratio": entry(50.0, "1"),
-                        "gear": "worm gear",
-                        "series": "",
-                        "verdict": "chosen",
-                        "reason": "it fits",
-                    }
-                ],
-                "flywheel": {
-                    "J": entry(0.3, "kg.m2") | {"title": "flywheel"},
-                    "mass": entry(22.1, "kg"),
-                    "diameter": entry(0.33, "m"),
-                },
-                "protection": {
-                    **{name: entry(*size) | {"title": "trip torque"} for name, size in protection.items()},
-                    **relay,
-                },
-            },
-        }
+    best = SimpleNamespace(
+        designation="M",
+        ratio=50.0,
+        gear_words="worm gear",
+        disc=True,
+        flywheel_words="0.300 kg m² (steel disc of 22.1 kg, 0.330 m in diameter)",
     )
-    sentence = next(each for each in _best(source, "sizing.candidates.0", "Motor") if each.form == "short")
-    assert terminal.plain_line(sentence.line).endswith(ending)
+    drive = SizedDrive(best, False, "crank", None, protection=protection)
+    assert drive.sentence.startswith("Motor: M, ratio 50 (worm gear); ") and drive.sentence.endswith(ending)
 
 
 def test_a_relay_of_a_star_delta_starter_has_its_place():
@@ -852,9 +852,13 @@ def test_a_relay_of_a_star_delta_starter_has_its_place():
     assert relay["relay_current"]["value"] == pytest.approx(4.642, abs=1e-3)
     assert "in the phases of the delta" in relay["relay_current"]["title"]
     assert relay["line_current"]["value"] == 8.04 and "in the supply line" in relay["line_current"]["title"]
-    source = blocks.Source({"sizing": {"protection": {"trip_torque": entry(None, "N.m")} | relay}})
-    (words,) = map(terminal.plain_line, _relay(source))
-    assert words == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
+    of_delta = _relay_of(started, 8.04)
+    words = terminal.plain_line(_relay(of_delta, cited(of_delta)))
+    assert (
+        of_delta.setting_words
+        == words
+        == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
+    )
     started.drive.star_delta = None
     assert "line_current" not in as_data(_relay_of(started, 8.04), titled=True)
 
@@ -867,19 +871,13 @@ def test_the_order_names_the_starter():
         "soft_start.time": entry(1.0, "s"),
         "star_delta.time": entry(3.0, "s"),
     }
-    numbers = {
-        "inverter_current": entry(45.4, "A"),
-        "frequency": entry(50.3, "Hz"),
-        "speed": entry(156.8, "rad/s", "speed"),
-    }
-    result = {
-        "run": {"ramp": entry(2.0, "s")},
-        "starter": starter,
-        "sizing": {"candidates": [{"numbers": numbers}], "inverter": {"rated_current": entry(49.1, "A")}},
-    }
+    numbers = {"inverter_current": 45.4, "frequency": 50.3, "speed": 156.8}
+    result = {"run": {"ramp": entry(2.0, "s")}, "starter": starter}
+    order = SizedDrive(None, False, "crank", None, inverter=OrderedInverter(InUnit(49.1, "A"), "a start"))
 
     def said(start):
-        lines = _starter(blocks.Source(result | {"start": start}), "sizing.candidates.0")
+        of_drive = DriveNumbers(**dict.fromkeys(Layout(DriveNumbers).names) | numbers)
+        lines = _starter(blocks.Source(result | {"start": start}), cited(order), cited(of_drive))
         return "; ".join(map(terminal.plain_line, lines))
 
     assert said("soft") == "soft starter, 50 % voltage, 1 s"
@@ -894,7 +892,7 @@ def test_the_order_names_the_starter():
         "inverter of at least 49.1 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
     )
     assert said("inverter") == inverter
-    numbers["inverter_current"] = entry(None, "A")
+    numbers["inverter_current"] = None
     assert said("inverter") == "inverter, boost 5 %, ramp 2 s"
     del result["starter"]
     assert said("direct") == ""
@@ -904,7 +902,7 @@ def test_the_order_names_the_starter():
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
     assert study.insufficient and sizing_of(study).setting is None
-    assert as_dict(study)["sizing"]["protection"] == {}
+    assert "protection" not in as_dict(study)["sizing"]
     text = said_of(study)
     assert "Insufficient motor:" in text and "relay at" not in text
 
@@ -916,15 +914,15 @@ def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
         return event_line("jam_left", turns=1, force=force) + "[run]\nstep = 0.002\n"
 
     study = run_study(config.parse(light(2000) + "[coupling]\ntrip_torque = 5000\n"), tmp_path)
-    (remark,) = [warning.text for warning in study.warnings if warning.kind == "coupling never opens"]
+    (remark,) = [warning.text for warning in study.warnings if warning.code == "coupling-never-opens"]
     assert f"opens in no overload of this study ({study.title_of('jam_left')})" in remark
     # what the jam asks, and the motor's current limit times its torque constant through the gear
     assert f"{study.answers['jam_left'].crank_torque_peak:.0f} N m on it at most" in remark
     assert f"motor gives {4.4 * 1.27 * 50:.0f} N m at most" in remark
     study = run_study(config.parse(light(9000) + "[coupling]\ntrip_torque = 320\n"), tmp_path)
     assert study.answers["jam_left"].coupling_trip_time is not None
-    assert any(w.kind == "coupling above motor" and "may stall the motor" in w.text for w in study.warnings)
-    assert not any(warning.kind == "coupling never opens" for warning in study.warnings)
+    assert any(w.code == "coupling-above-motor" and "may stall the motor" in w.text for w in study.warnings)
+    assert not any(warning.code == "coupling-never-opens" for warning in study.warnings)
 
 
 def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
@@ -1015,10 +1013,10 @@ def test_a_start_under_load_opens_a_given_coupling(tmp_path):
     assert study.failure is None
     opened = {n for n, a in study.answers.items() if a.coupling_trip_time is not None}
     assert opened == {"start_loaded_right"} and largest(study, "start_up") < 46.0
-    (warning,) = [warning for warning in study.warnings if warning.kind == "coupling opens in start"]
+    (warning,) = [warning for warning in study.warnings if warning.code == "coupling-opens-in-start"]
     assert "start with all feed on the right" in warning.text
     study = run_study(config.parse(starts + run + "[coupling]\ntrip_torque = 60\n"), tmp_path / "higher")
-    assert not [warning for warning in study.warnings if warning.kind == "coupling opens in start"]
+    assert not [warning for warning in study.warnings if warning.code == "coupling-opens-in-start"]
 
 
 @pytest.mark.slow

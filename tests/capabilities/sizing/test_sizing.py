@@ -31,6 +31,7 @@ from chainunit.drives.induction_steady import breakdown, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
@@ -426,7 +427,7 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
     assert message.exit_code == 1, message.output
     assert "No motor of the catalogue fits (2 of 2 were tried)" in message.output
     assert "the motor is insufficient" in message.output and "Order: " not in message.output
-    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    numbers = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
     assert set(numbers["answers"]) == {"steady", "feed_right"} and numbers["status"] == "complete"
     nearest = numbers["sizing"]["candidates"][numbers["sizing"]["nearest"]]
     assert numbers["sizing"]["chosen"] is None and nearest["verdict"] == "insufficient"

@@ -39,6 +39,7 @@ from chainunit.core.errors import InputError as Refusal
 from chainunit.core.files import FileList
 from chainunit.core.native.compilers import compiler
 from chainunit.core.quantities import Quantity, Variable
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.report.figure import Hatch, hatch_lines
 from chainunit.study.block_runs import Cause
@@ -433,10 +434,10 @@ def test_the_largest_loads_come_first_and_the_limit_of_the_current_is_told():
     limit = Study.from_text("").config.motor.parameters.limit.i
     hard, soft = (Study.from_text(ONE_JAM.format(force)).sweep(workers=1) for force in (3889, 300))
     assert hard.table["current_peak"].max() == pytest.approx(limit, rel=1e-3)
-    assert json.loads(hard.to_json())["current_limit"]["value"] == limit
+    assert ResultEntries(json.loads(hard.to_json()))["current_limit"]["value"] == limit
     assert "The current is at its limit, 4.4 A," in " ".join(hard.notes)
     assert soft.table["current_peak"].max() < 0.9 * limit
-    assert json.loads(soft.to_json())["current_limit"]["value"] is None
+    assert ResultEntries(json.loads(soft.to_json()))["current_limit"]["value"] is None
 
 
 @NATIVE
@@ -544,7 +545,7 @@ def test_the_best_may_be_the_largest():
     text = "[sweep]\nmethod = 'grid'\nangles = 36\nquantities = ['min(margin)']\nbest_is = 'largest'\n"
     text += "[[sweep.parameter]]\nname = 'machine.r'\nfrom = 0.1\nto = 0.9\npoints = 30\n"
     result = Study.from_text(text).sweep(workers=1)
-    numbers = json.loads(result.to_json())
+    numbers = ResultEntries(json.loads(result.to_json()))
     wanted = result.table["min(margin)"].sort_values(ascending=False).head(10)
     assert [each["point"]["value"] for each in numbers["best"]] == list(wanted.index)
     assert "Points with the largest" in repr(result)
@@ -578,7 +579,7 @@ def test_sweeps_that_cannot_be_are_refused(text, words):
 
 def test_the_summary_is_that_of_the_table(grid, spread):
     for result in (grid, spread):
-        table, numbers = result.table, json.loads(result.to_json())
+        table, numbers = result.table, ResultEntries(json.loads(result.to_json()))
         good = table[table["reason"] == ""]
         assert numbers["feasible"]["value"] == len(good)
         assert {each["reason"]: each["points"]["value"] for each in numbers["reasons"]} == dict(
@@ -608,7 +609,7 @@ def test_points_beyond_the_limits_of_two_bars_are_counted():
     slack = machine.slack_speed(feed.left, feed.right)
     topics = [each.topic for w in speeds for each in two_bars(w, mode, slack, {}, {}).reasons]
     result = study.sweep(workers=1)
-    organs = {each["topic"]: each for each in json.loads(result.to_json())["organs"]}
+    organs = {each["topic"]: each for each in ResultEntries(json.loads(result.to_json()))["organs"]}
     points = {topic: each["points"]["value"] for topic, each in organs.items()}
     both = topics.count("rocker torque") + topics.count("crank torque")
     assert points == {topic: topics.count(topic) for topic in topics} | {"rocker torque": both}
@@ -617,15 +618,15 @@ def test_points_beyond_the_limits_of_two_bars_are_counted():
     said = " ".join(result.warnings)
     assert "goes slack: 14.3 % of the points. The limit of the study's machine and feed is 6.73" in said
     still = text.format("peak(tau)", "machine.r", [0.14, 0.15])
-    (organ,) = json.loads(Study.from_text(still).sweep(workers=1).to_json())["organs"]
+    (organ,) = ResultEntries(json.loads(Study.from_text(still).sweep(workers=1).to_json()))["organs"]
     assert organ["topic"] == "rocker torque" and organ["share"]["value"] == 1.0
     motion = Study.from_text(text.format("min(margin)", "run.crank_speed", speeds)).sweep(workers=1)
-    assert json.loads(motion.to_json())["organs"] == []
+    assert ResultEntries(json.loads(motion.to_json()))["organs"] == []
 
 
 def test_shares_are_left_out_where_they_are_not_defined(grid, spread):
     """In the grid most cranks cannot turn: those that do are no independent parameters."""
-    numbers = json.loads(grid.to_json())
+    numbers = ResultEntries(json.loads(grid.to_json()))
     table = grid.table
     gap = 1.0 - np.count_nonzero(table["reason"] == "") / len(table)
     assert gap > 0.05
@@ -641,10 +642,10 @@ def test_shares_are_left_out_where_they_are_not_defined(grid, spread):
 
 
 def test_the_spread_names_the_ranges_that_are_no_tolerances(spread):
-    assert json.loads(spread.to_json())["evenly"] == ["machine.r"]
+    assert ResultEntries(json.loads(spread.to_json()))["evenly"] == ["machine.r"]
     assert "machine.r has no tolerance: the spread counts each of their values" in " ".join(spread.notes)
     text = SPREAD.replace('from = "130 mm"\nto = "170 mm"', 'tolerance = "2 mm"')
-    numbers = json.loads(Study.from_text(text.replace("200", "16")).sweep(workers=1).to_json())
+    numbers = ResultEntries(json.loads(Study.from_text(text.replace("200", "16")).sweep(workers=1).to_json()))
     assert numbers["evenly"] == [] and numbers["spread"]
 
 
@@ -662,7 +663,9 @@ def test_energy_is_shown_in_kilowatt_hours():
     text = "[sweep]\nangles = 16\nmethod = 'grid'\nquantities = ['energy_per_year']\n"
     text += "[[sweep.parameter]]\nname = 'machine.r'\nvalues = [0.14, 0.15]\n"
     result = Study.from_text(text).sweep(workers=1)
-    least = json.loads(result.to_json())["extremes"]["energy_per_year"]["least"]["energy_per_year"]
+    least = ResultEntries(json.loads(result.to_json()))["extremes"]["energy_per_year"]["least"][
+        "energy_per_year"
+    ]
     assert least["unit"] == "J" and least["value"] == result.table["energy_per_year"].min()
     assert re.search(rf"\b{least['value'] / 3.6e6:.4g}\d* kWh", repr(result))
 
@@ -809,7 +812,7 @@ distribution = "normal"
 
 
 def test_the_spread_has_quantiles_and_the_values_of_the_study(spread):
-    numbers, table = json.loads(spread.to_json()), spread.table
+    numbers, table = ResultEntries(json.loads(spread.to_json())), spread.table
     torque = numbers["spread"]["peak(crank_torque)"]
     for key, q in (("q5", 0.05), ("q50", 0.5), ("q95", 0.95)):
         assert torque[key]["value"] == pytest.approx(np.quantile(table["peak(crank_torque)"], q), rel=1e-12)
@@ -855,7 +858,7 @@ def test_the_command(tmp_path):
     assert about["study"]["sha256"] == hashlib.sha256((tmp_path / "map.toml").read_bytes()).hexdigest()
     assert about["seeds"]["sweep.seed"] == 1 and about["libraries"]["numpy"] == np.__version__
     assert about["chainunit"] and about["platform"] and set(about["commit"] or "a") <= set("0123456789abcdef")
-    numbers = json.loads((tmp_path / "map" / "result.json").read_text("utf-8"))
+    numbers = ResultEntries(json.loads((tmp_path / "map" / "result.json").read_text("utf-8")))
     page = (tmp_path / "map" / "report.html").read_text("utf-8")
     assert "A. Nonymous" in page and "Map of min(margin)" in page and numbers["store"] in page
     # another report of the same sweep finds all points
@@ -869,7 +872,7 @@ def test_the_command(tmp_path):
     assert chainunit("sweep", "map.toml", "-o", "map", cwd=tmp_path).returncode == 0
     assert before == store.stat().st_mtime_ns
     assert not (tmp_path / "map" / "sweep_of_old.png").exists()
-    again = json.loads((tmp_path / "map" / "result.json").read_text("utf-8"))
+    again = ResultEntries(json.loads((tmp_path / "map" / "result.json").read_text("utf-8")))
     assert again["title"] == "Again" and again["best"] == numbers["best"]
     other = chainunit("study", "-o", "map", cwd=tmp_path)
     assert other.returncode == 2 and "map: has the result of a sweep, which would be lost" in other.stderr
@@ -906,7 +909,10 @@ def test_the_command_refuses(tmp_path):
 def test_a_damaged_batch_is_told(tmp_path):
     study = Study.from_text(SPREAD)
     store = study.sweep(tmp_path, workers=1).file
-    assert json.loads((tmp_path / "result.json").read_text("utf-8"))["damaged_batches"]["value"] == 0
+    assert (
+        ResultEntries(json.loads((tmp_path / "result.json").read_text("utf-8")))["damaged_batches"]["value"]
+        == 0
+    )
     batches.damage(store, "machine_r", 0)
     words = f"1 batch of points in {store.name} was damaged, and was computed anew"
     assert words in plain(study.sweep(tmp_path, workers=1)._report)

@@ -30,6 +30,7 @@ from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
 from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints, with_damping_ratio
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number
 from chainunit.report import blocks, figure
@@ -517,7 +518,7 @@ def test_lower_gains_are_no_advice_against_a_control_near_the_line():
     """Of the packaged driveline lower gains raise the peaks: the control damps the torsion."""
     study = study_of(parts.example("driveline"))
     shaft_runs.remark(study)
-    (warning,) = (each.text for each in study.warnings if each.kind == "control near line")
+    (warning,) = (each.text for each in study.warnings if each.code == "control-near-line")
     assert "lower the gains" not in warning and "the control also damps the torsion" in warning
 
 
@@ -650,7 +651,7 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
             study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None)
         )
         assert (found is not None) == (made or bool(more))
-        assert [remark.kind for remark in study.remarks] == [] if found else ["torsion left out"]
+        assert [remark.code for remark in study.remarks] == [] if found else ["torsion-left-out"]
 
 
 @pytest.mark.second
@@ -695,11 +696,12 @@ def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
     status, out, _ = run(monkeypatch, capsys, file, "-o", folder)
     assert not status
     assert (
-        "A [bold] line" in out and "Warning: The joints turn unevenly: shaft 3 turns 0.99449 to 1.0055" in out
+        "A [bold] line" in out
+        and "Warning: The joints turn unevenly, as shaft 3 turns 0.99449 to 1.0055" in out
     )
     for name in PICTURES:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
-    numbers = json.loads((folder / "result.json").read_text())
+    numbers = ResultEntries(json.loads((folder / "result.json").read_text()))
     torsion = numbers["torsion"]
     assert torsion["natural_frequency"]["even"] == {
         "value": pytest.approx(260.98, abs=0.01),
@@ -709,8 +711,8 @@ def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
     assert len(torsion["resonance"]["peak_torque2"]["value"]) >= 30
     assert torsion["line"]["J4"] == {"value": pytest.approx(60.0), "unit": "kg.m2"}
     assert numbers["status"] == "complete" and numbers["answers"]["overload"] and numbers["shaft"]["steady"]
-    kinds = {remark["kind"] for remark in (*numbers["warnings"], *numbers["notes"])}
-    assert {"order near line", "peak of a shaft", "natural frequency", "uneven joints"} <= kinds
+    kinds = {remark["code"] for remark in (*numbers["warnings"], *numbers["notes"])}
+    assert {"order-near-line", "peak-of-a-shaft", "natural-frequency", "uneven-joints"} <= kinds
     text = (folder / "result.md").read_text()
     assert (
         "| torsion.bend_high | 35 deg | largest bend of the map | mine.toml, line 21 |" in text

@@ -76,7 +76,7 @@ def test_normal_running_has_no_alarm_and_the_estimates_are_the_loads(study):
     assert np.all(np.abs(study.runs["start_up"]["observer.alarm"].values) < 0.5)
     assert found.alarm_in_start is None and not found.alarms_in_steady
     assert abs(found.steady.imbalance) < 0.3 and 5.0 < found.steady.threshold < 15.0
-    assert not [remark for remark in study.remarks if "observer" in remark.kind]
+    assert not [remark for remark in study.remarks if "observer" in remark.code]
 
 
 @native
@@ -295,7 +295,7 @@ def test_chains_are_warned_of(tmp_path):
     """Bars in the observer, chains as the plant: at 3 rad/s within the limit that was measured."""
     text = f"organ = 'chain'\n[chain]\nrods = 4\nsweep_points = 0\n[observer]\n{RUN}{EVENTS}"
     study = run_study(config.parse(text), tmp_path)
-    (remark,) = (each for each in study.remarks if each.kind == "observer of two bars")
+    (remark,) = (each for each in study.remarks if each.code == "observer-of-two-bars")
     assert remark.severity == "note" and 0.5 < remark.quantities["share"][0] < 0.72
     assert study.findings["observer"].steady.error < 0.2 * 30.0
     assert study.findings["observer"].named["feed_left"] == "left"

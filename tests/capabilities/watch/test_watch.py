@@ -19,6 +19,7 @@ from chainunit.capabilities.watch import watch as watching
 from chainunit.capabilities.watch.crank_motion import crank_motion
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.reading.result_entries import ResultEntries
 from chainunit.recordings.recording import Recording, read_recording
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
@@ -79,7 +80,7 @@ def watched(tmp_path_factory):
 def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
     """With the right side, on the ground of the feed, and no alarm before; the page and the pictures are there."""
     folder, printed = watched
-    result = json.loads((folder / "result.json").read_text("utf-8"))
+    result = ResultEntries(json.loads((folder / "result.json").read_text("utf-8")))
     assert {each["side"] for each in result["alarms"]} == {"left"}
     assert result["is_described"] and "does not describe" not in printed
     first = result["alarms"][0]
@@ -139,7 +140,7 @@ def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     found = Study.from_file(tmp_path / "mine.toml").watch()
     assert not found.record.is_described and watch_page.TASK.shortfall(found.record) == ""
     assert "does not describe the begin of the recording" in " ".join(repr(found).split())
-    doubts = json.loads(found.to_json())["doubts"]
+    doubts = ResultEntries(json.loads(found.to_json()))["doubts"]
     assert any("remains in motor.i" in each for each in doubts)
     assert any(each.startswith("feed.left.material_mass") for each in doubts)
 
@@ -157,7 +158,7 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
     for more in ({}, {"identification": "result.json"}):
         (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], end=60, **more), "utf-8")
         found = Study.from_file(tmp_path / "mine.toml").watch()
-        results.append(json.loads(found.to_json()))
+        results.append(ResultEntries(json.loads(found.to_json())))
         thresholds.append(np.median(found.record.outputs["imbalance.feed_threshold"]))
     assert results[0]["widening"]["value"] == 1.0
     # a web that is heavier by 1 kg is as good as feed
@@ -204,7 +205,9 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     assert "No rows from 49.99 s to 51.1" in words
     assert "The identification of this machine failed: its model does not describe its recordings." in words
     assert "The identification sought no number of the machine that the observer knows." in words
-    noise = {name: each["value"] for name, each in json.loads(found.to_json())["noise"].items()}
+    noise = {
+        name: each["value"] for name, each in ResultEntries(json.loads(found.to_json()))["noise"].items()
+    }
     assert list(noise.values()) == pytest.approx([5.0, 5.0], rel=0.1)
     assert (
         f"The noise of the measured speed at the begin is {noise['speed']:.2g} times the stated one" in words

@@ -20,6 +20,7 @@ from ...study.cycle import Cycle, cycle
 from ...study.drive import Drive
 from ...study.operation import OperatingConditions
 from ...study.record import StudyRecord
+from ...study.remark import fault, note, warning
 from ...study.turn import EVERY, POINTS
 
 
@@ -78,40 +79,41 @@ class BladeFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn where the blade does not pass through the whole stack; note the assumptions behind the work of
         a cut."""
-        n, warn = self.numbers, study.warn
+        n = self.numbers
         top, table = (float(x) for x in (self.stack.top, self.stack.table))
+        low, high = _height(n.blade_bottom), _height(n.blade_top)
         if n.blade_bottom > top:
-            warn(
-                "no cut",
-                "no cut takes place: the blade comes down to y = {low}, the stack's top is at {high}.",
-                low=_height(n.blade_bottom),
-                high=_height(top),
-                blade_bottom=(n.blade_bottom, "m", "millimetres"),
-            )
+            study.say(_NO_CUT, low=low, high=_height(top), blade_bottom=n.blade_bottom)
         elif n.blade_bottom > table:
-            warn(
-                "table not reached",
-                "the blade does not reach the table: it comes down to y = {low}, the table is at {high}.",
-                low=_height(n.blade_bottom),
-                high=_height(table),
-                blade_bottom=(n.blade_bottom, "m", "millimetres"),
-            )
+            study.say(_TABLE_NOT_REACHED, low=low, high=_height(table), blade_bottom=n.blade_bottom)
         if n.blade_top < top:
-            warn(
-                "stack not left",
-                "the blade does not leave the stack: it rises to y = {high}, the stack's top is at {low}.",
-                high=_height(n.blade_top),
-                low=_height(top),
-                blade_top=(n.blade_top, "m", "millimetres"),
-            )
+            study.say(_STACK_NOT_LEFT, high=high, low=_height(top), blade_top=n.blade_top)
         if n.cut_path > 0.0:
-            study.note(
-                "work of a cut",
-                "Work of a cut {cut_work}; force times path through the stack {cut_work_by_path}. The resistance "
-                "rises and falls over stack.edge, and fades below stack.v_smooth.",
-                cut_work=(n.cut_work, "J"),
-                cut_work_by_path=(n.cut_work_by_path, "J"),
-            )
+            study.say(_WORK_OF_A_CUT, cut_work=n.cut_work, cut_work_by_path=n.cut_work_by_path)
+
+
+_BOTTOM = ("m", "millimetres")
+_NO_CUT = fault(
+    "no-cut",
+    "No cut takes place, as the blade comes down to y = {low} and the stack's top is at {high}.",
+    sizes={_BOTTOM: "blade_bottom"},
+)
+_TABLE_NOT_REACHED = warning(
+    "table-not-reached",
+    "The blade does not reach the table, as it comes down to y = {low} and the table is at {high}.",
+    sizes={_BOTTOM: "blade_bottom"},
+)
+_STACK_NOT_LEFT = warning(
+    "stack-not-left",
+    "The blade does not leave the stack, as it rises to y = {high} and the stack's top is at {low}.",
+    sizes={_BOTTOM: "blade_top"},
+)
+_WORK_OF_A_CUT = note(
+    "work-of-a-cut",
+    "The work of a cut is {cut_work}, and force times path through the stack is {cut_work_by_path}. The resistance "
+    "rises and falls over stack.edge, and fades below stack.v_smooth.",
+    sizes={"J": "cut_work cut_work_by_path"},
+)
 
 
 def _height(y: float) -> str:

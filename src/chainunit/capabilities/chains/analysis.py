@@ -35,6 +35,7 @@ from ...study.drive import Drive
 from ...study.drive_fmus import export_machine
 from ...study.quantiles import HIGH, independent_count, mean_share, quantile
 from ...study.record import StudyRecord
+from ...study.remark import note
 from ...system.instance import Fmu, Instance
 from ...work.interrupts import stoppable
 from ...work.progress import Progress, TaskProgress
@@ -65,6 +66,13 @@ class Turns:
     """by side, mean axial pull in each rod [N], shape (starts, turns, points, rods)"""
 
 
+_LEFT_OUT = note(
+    "chains-left-out",
+    "Chains at constant speed are left out, as they need a C compiler.",
+    remedy=f"Install one ({COMPILERS}).",
+)
+
+
 class ChainAnalysis(Analysis):
     """The chains of a study at constant speed."""
 
@@ -81,10 +89,7 @@ class ChainAnalysis(Analysis):
         """The numbers at the speed of the study and over the speeds. None without native code, as an FMU in Python
         would take hours."""
         if study.fmus["machine"].backend != "native":
-            study.note(
-                "chains left out",
-                f"chains at constant speed are left out: they need a C compiler ({COMPILERS}).",
-            )
+            study.say(_LEFT_OUT)
             return None
         assert work.rig.files is not None
         config, file = study.config, work.rig.files["machine"]

@@ -13,6 +13,7 @@ from ...study.events import Jam
 from ...study.measures import Answers
 from ...study.quantiles import HIGH, runs_needed
 from ...study.record import StudyRecord
+from ...study.remark import fault, note, warning
 from ...study.verdict import RESIDUAL, SETTLING, START, STEADY, TOPICS, Reason, Topic, Verdict, balance_faults
 from .analysis import rods_of
 from .result import ChainResult
@@ -24,24 +25,57 @@ _TOPICS: Mapping[str, Topic] = {
     **TOPICS,
     "folded through": Topic(
         "rods fold through their stop",
-        "Rods that fold through their stop",
+        fault("model-folded-through", "Rods that fold through their stop: {where}."),
         "raise chain.fold_stiffness, or assume that the machine breaks",
     ),
     "folded": Topic(
         "rods meet the stop between them, whose stiffness is assumed",
-        "Rods that fold and meet the stop between them",
+        warning("model-folded", "Rods that fold and meet the stop between them: {where}."),
     ),
     "slack": Topic(
         "rods go slack and snatch: a single peak is no prediction",
-        "Share of the time with a slack rod; no single peak of a snatching chain is a prediction",
+        warning(
+            "model-slack",
+            "Share of the time with a slack rod (no single peak of a snatching chain is a prediction): {where}.",
+        ),
     ),
     "starts": Topic(
         "the starts differ so much that they do not determine the quantile of peaks",
-        "Turns that count as independent, too few for the quantile, as the starts differ",
+        warning("model-starts", "Turns that count as independent, too few for the quantile: {where}."),
         "raise chain.starts",
     ),
 }
 """By kind of fault, its words."""
+
+
+_CHAINS = note(
+    "chains",
+    "The organs are chains of {walls} + {webs} rods. Their damping (eta {eta} N m2 s, ends {ends} N m s) and their "
+    "folding are assumed.",
+)
+_FEW_RODS = note(
+    "few-rods", "Chains: {rods} rods have {frequencies} natural frequencies. 8 rods show a chain well."
+)
+_SPEED_TO_AVOID = warning(
+    "speed-to-avoid",
+    "Chains: the crank speed lies in a range to avoid, {band} ({why}).",
+    sizes={("rad/s", "speed"): "speed"},
+)
+_SPEED_MISSING = warning(
+    "speed-missing", "Chains: the speed {speed} is missing ({why}).", sizes={("rad/s", "speed"): "speed"}
+)
+_ENERGY = fault(
+    "energy-of-chains",
+    "Chains: the energy residual reaches {residual} of the energy moved.",
+    remedy="Lower chain.fold_stiffness.",
+    sizes={"1": "residual"},
+)
+_NOT_FELT = warning(
+    "lump-not-felt",
+    "{run}: the drive hardly feels the lump, as the web folds before it on this stroke. On the other stroke the web "
+    "is pulled.",
+    remedy="Try crank_angle = {angle}.",
+)
 
 
 def verdict_on(study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]) -> Verdict:
@@ -105,32 +139,21 @@ def remark_on(study: StudyRecord) -> None:
     chain: ChainOrgans = study.config.table("chain")
     result = ChainResult.found_in(study)
     walls, webs = rods_of(study.drive)
-    warn, note = study.warn, study.note
-    note(
-        "chains",
-        f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
-        f"{chain.end_damping:g} N m s) and their folding are assumed.",
-    )
+    study.say(_CHAINS, walls=f"{walls}", webs=f"{webs}", eta=f"{chain.eta:g}", ends=f"{chain.end_damping:g}")
     if walls + webs < 4:
-        few = f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show a chain well."
-        note("few rods", f"chains: {few}")
+        study.say(_FEW_RODS, rods=f"{walls + webs}", frequencies=f"{walls + webs - 2}")
     _on_folding(study)
     if result is None:
         return
     speed = result.own.speed
     for band in result.avoid:
         if band.low <= speed <= band.high:
-            text = "chains: the crank speed lies in a range to avoid, {band}: {why}."
-            warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s", "speed"))
+            study.say(_SPEED_TO_AVOID, band=str(band), why=band.why, speed=speed)
     for missing, why in result.failures.items():
-        text = "chains: the speed {speed} is missing: {why}"
-        warn("speed missing", text, why=str(why), speed=(missing, "rad/s", "speed"))
+        study.say(_SPEED_MISSING, why=str(why), speed=missing)
     residual = max(n.energy_residual for n in result.speeds)
     if not residual < RESIDUAL:
-        text = (
-            "chains: the energy residual reaches {residual} of the energy moved; lower chain.fold_stiffness."
-        )
-        warn("energy of chains", text, residual=(residual, "1"))
+        study.say(_ENERGY, residual=residual)
 
 
 FELT = 1.1
@@ -145,11 +168,5 @@ def _on_folding(study: StudyRecord) -> None:
         if not isinstance(event, Jam) or steady is None or answers is None:
             continue
         if answers.crank_torque_peak < FELT * steady.crank_torque_peak:
-            study.warn(
-                "lump not felt",
-                "{run}: the drive hardly feels the lump, as the web folds before it on this stroke; on the other "
-                "stroke the web is pulled: try crank_angle = {angle}.",
-                run,
-                run=study.title_of(run),
-                angle=f'"{math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi)):.4g} deg"',
-            )
+            angle = math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi))
+            study.say(_NOT_FELT, run, run=study.title_of(run), angle=f'"{angle:.4g} deg"')

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import cited, number
 from ...report.lines import Line, join, line
 from ...report.pictures import Pictures
 from ...report.style import WIDE
@@ -56,7 +57,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if not chain["avoid"] and len(chain["sweep"]) > 1:
         ends = f"{{chain.sweep.0.speed}} to {{chain.sweep.{len(chain['sweep']) - 1}.speed}}"
         yield b.Text(s.line(f"No speed to avoid from {ends}."), "fine")
-    yield _own_speed(s, chain)
+    x = cited(ChainResult.of_study(study), "findings.chain")
+    yield _own_speed(s, x)
     slack = {
         side: join(
             s.line(f"{{chain.slack_by_rod.{side}.{k}.rod}}: {{chain.slack_by_rod.{side}.{k}}}")
@@ -69,7 +71,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         rows = tuple(b.TableRow((side, words or "none")) for side, words in slack.items())
         yield b.Table(rows, title="Rods that go slack, share of the time", numeric=False)
     if len(chain["sweep"]) > 1:
-        yield _sweep(s, chain)
+        yield _sweep(s, x)
     if chain["critical_speeds"]:
         yield from _critical(s, chain, study)
     yield from PICTURES.figures(s, study)
@@ -87,21 +89,16 @@ def speeds_to_avoid(s: b.Source) -> Iterator[b.Judgement]:
         yield b.Judgement("warning", s.line(f"Avoid {{{path}.from}}{end}{ends}: {{{path}.why}}."))
 
 
-def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
+def _own_speed(s: b.Source, x: ChainResult) -> b.Table:
     def cell(name: str) -> Line:
         return s.estimate(f"chain.own_speed.{name}", certain=CERTAIN) if name else ""
 
     rows = [b.TableRow((title, *map(cell, names))) for title, names in _OWN]
-    if chain["resonance"]["value"] is not None:
+    if number(x.resonance).value is not None:
         rows += [
-            b.TableRow(("resonance of an organ, crank speed", s.number("chain.resonance"), "", "")),
+            b.TableRow(("resonance of an organ, crank speed", number(x.resonance), "", "")),
             b.TableRow(
-                (
-                    "relative distance of the speed from it (negative: below)",
-                    s.number("chain.distance_to_resonance"),
-                    "",
-                    "",
-                )
+                ("relative distance of the speed from it (negative: below)", number(x.distance), "", "")
             ),
         ]
     title = (
@@ -113,7 +110,7 @@ def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     return b.Table(tuple(rows), heads, title=s.line(title))
 
 
-def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
+def _sweep(s: b.Source, x: ChainResult) -> b.Table:
     columns = {
         "crank_torque_median": "crank torque: median",
         "crank_torque_high": "crank torque: {=chain.quantile} quantile",
@@ -130,8 +127,8 @@ def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
         return s.estimate(f"chain.sweep.{i}.{name}", unknown="-", certain=CERTAIN)
 
     rows = (
-        b.TableRow((s.number(f"chain.sweep.{i}.speed"), *(cell(i, name) for name in columns)))
-        for i in range(len(chain["sweep"]))
+        b.TableRow((number(each.speed), *(cell(i, name) for name in columns)))
+        for i, each in enumerate(x.speeds)
     )
     title = (
         "Chains and two bars over the crank speed; in brackets, where the starts differ: the interval of "

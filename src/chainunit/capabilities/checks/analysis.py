@@ -13,6 +13,7 @@ from ...study.bearings import largest_load, pin_force
 from ...study.permitted_starts import PermittedStarts
 from ...study.readings import has_turn, less_than_a_turn, machine_series, turns_made
 from ...study.record import StudyRecord
+from ...study.remark import warning
 from . import coupling, gear, plain, relay, rigid, rolling, section, starting
 from .coupling import CouplingCheck, remark_on_coupling
 from .gear import GearCheck, ShaftLoad
@@ -54,18 +55,25 @@ class CheckFindings(Findings):
         for row in self.rows:
             if not row.holds:
                 share = number(row.utilisation, "1", "used")
-                study.warn(
-                    "check",
-                    "{of}: {title} {value}, and {bound} {limit} {allowed}{used} ({clause}).",
+                study.say(
+                    _NEEDED if row.at_least else _PERMITTED,
                     of=row.of,
                     title=row.title,
                     value="never" if row.value == math.inf else (row.value, row.unit, row.kind),
-                    bound="at least" if row.at_least else "at most",
                     limit=(row.limit, row.unit, row.kind),
-                    allowed="are needed" if row.at_least else "are permitted",
-                    used="" if row.utilisation == math.inf else f": {share} of the limit is used",
+                    used=None if row.utilisation == math.inf else share,
                     clause=row.clause,
                 )
+
+
+_NEEDED = warning(
+    "check-needed",
+    "{of}: {title} {value}, and at least {limit} are needed ({clause}). {used} of the limit is used.",
+)
+_PERMITTED = warning(
+    "check",
+    "{of}: {title} {value}, and at most {limit} are permitted ({clause}). {used} of the limit is used.",
+)
 
 
 class CheckAnalysis(Analysis):

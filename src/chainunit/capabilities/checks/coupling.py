@@ -19,6 +19,7 @@ from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.results import part, result
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
+from ...study.remark import note, warning
 from ...study.torques import gear_torque
 from ...study.window import mean
 from .coupling_choice import CHOSEN, CouplingCandidate, tried, with_row
@@ -246,17 +247,19 @@ def remark_on_coupling(study: StudyRecord, of: CouplingCheck) -> None:
         return
     best = of.candidates[0]
     if best.verdict != CHOSEN:
-        study.warn(
-            "flexible coupling too weak",
-            "The flexible coupling {name} of the catalogues does not keep each limit: {reason}.",
-            name=best.designation,
-            reason=best.reason,
-        )
-    study.note(
-        "flexible coupling",
-        "The flexible coupling is checked by the torque of a shaft without it, part by part of the frequencies with "
-        "its own amplification (DIN 740-2). Its inertia counts in its natural frequency; it is not in the runs.",
-    )
+        study.say(_TOO_WEAK, name=best.designation, reason=best.reason)
+    study.say(_CHECKED)
+
+
+_TOO_WEAK = warning(
+    "flexible-coupling-too-weak",
+    "The flexible coupling {name} of the catalogues does not keep each limit: {reason}.",
+)
+_CHECKED = note(
+    "flexible-coupling",
+    "The flexible coupling is checked by the torque of a shaft without it, part by part of the frequencies with its "
+    "own amplification (DIN 740-2). Its inertia counts in its natural frequency. It is not in the runs.",
+)
 
 
 def speed_row(of: CouplingCheck, table: FlexibleCouplingTable) -> CheckRow | NotChecked:

@@ -11,12 +11,13 @@ from ... import __version__
 from ...core.descriptions import USUAL_DRIVER
 from ...core.errors import printable
 from ...core.quantities import variables
+from ...reading.result_entries import as_mapping
 from ...reading.text import entry
 from ...study.line.shaft import ShaftAnswers
 from ...study.measures import Answers
 from ...study.registry import registered
 from ...study.sections import all_choices, all_sections
-from ...study.stored_result import StoredResult, as_mapping
+from ...study.stored_result import StoredResult
 
 SIDES = ("a", "b")
 _ROUNDING = 1e-12
@@ -86,18 +87,18 @@ def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
 
 
 def _warnings_alone(mine: StoredResult, theirs: StoredResult) -> list[str]:
-    """The warnings that one result has and the other has not. A kind may have had another name in an earlier version,
-    so that a warning in the same words is the same, too."""
-    others = {subject_or_text for warning in _warnings(theirs) for subject_or_text in warning}
-    return [text for subject, text in _warnings(mine) if subject not in others and text not in others]
+    """The warnings that one result has and the other has not."""
+    others = dict(_warnings(theirs))
+    return [text for subject, text in _warnings(mine) if subject not in others]
 
 
 def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
-    """The warnings of a result, each with its subject: its kind and its runs."""
+    """The warnings of a result, each with its code and its runs. An earlier version has a kind in place of a code."""
     warnings = result.data.get("warnings")
     for warning in map(as_mapping, warnings if isinstance(warnings, list) else []):
         if isinstance(text := warning.get("text"), str):
-            yield (str(warning.get("kind")), str(warning.get("runs"))), printable(text, 2000)
+            code = str(warning.get("code") or warning.get("kind")).replace(" ", "-")
+            yield (code, str(warning.get("runs"))), printable(text, 2000)
 
 
 # -- the numbers of a result by their names

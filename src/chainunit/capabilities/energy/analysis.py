@@ -13,6 +13,7 @@ from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.drive import Drive
 from ...study.record import StudyRecord
+from ...study.remark import fault, note, warning
 from ...study.verdict import STEADY
 from .duty import LoadDuty, duty_of
 from .inverter import apparent_power, typical_losses
@@ -104,51 +105,60 @@ class EnergyFindings(Findings):
         mean = self.own.mean
         for motor in filter(None, (self.own, self.other)):
             if motor.too_hot:
-                study.warn(
-                    "energy of a winding too hot",
-                    "with the loads of [usage] the winding of {motor} would get hotter than the permitted {limit}; "
-                    "its energy is that at this temperature, and too low. Take a larger motor, or lower "
-                    "usage.load.factor.",
-                    motor=motor.motor,
-                    limit=(motor.temperature, "K", "temperature"),
-                )
+                study.say(_TOO_HOT, motor=motor.motor, limit=motor.temperature)
         if abs(mean.missing) > LARGEST_GAP * abs(mean.electric):
-            study.warn(
-                "energy balance",
-                "{missing} of the electric power of {electric} are missing in the sum of the losses by place: raise "
-                "run.settle_turns, or take a shorter run.step.",
-                STEADY,
-                missing=(mean.missing, "W"),
-                electric=(mean.electric, "W"),
-            )
-        study.note(
-            "losses in iron",
-            "The model of the motor has no separate losses in iron and no stray losses: the windings of a motor of "
-            "the catalogue are fitted so that their losses include them at rated load. At light load a real motor "
-            "loses more.",
-        )
+            study.say(_BALANCE, STEADY, missing=mean.missing, electric=mean.electric)
+        study.say(_IRON)
         if mean.gear and any(load.factor != 1.0 for load in self.loads.values()):
-            study.note(
-                "gear at other loads",
-                "At each load the loss of the {gear} is the one with the feed of the study: with less feed it is "
-                "less than the table says, with more feed it is more.",
-                gear=study.drive.transmission,
-            )
+            study.say(_GEAR, gear=study.drive.transmission)
         if self.inverter:
-            study.note("losses of the inverter", f"The losses of the inverter are {self.inverter}.")
+            study.say(_INVERTER, losses=self.inverter)
         elif study.drive.follows:
-            study.note(
-                "losses of the inverter",
-                "The losses of the converter are not known, as the motor has no nameplate; they come on top.",
-            )
+            study.say(_CONVERTER)
         if study.drive.follows and self.given_back > _GIVEN_BACK * mean.electric:
-            study.note(
-                "power that comes back",
-                "In parts of the turn the motor gives back {back} in the mean. Here this power counts as saved; an "
-                "inverter with a diode bridge stores it in its intermediate circuit, as far as that is large enough, "
-                "and turns the rest into heat in a braking resistor.",
-                back=(self.given_back, "W"),
-            )
+            study.say(_COMES_BACK, back=self.given_back)
+
+
+_TOO_HOT = warning(
+    "energy-of-a-winding-too-hot",
+    "With the loads of [usage] the winding of {motor} would get hotter than the permitted {limit}. Its energy is "
+    "the one at this temperature, and too low.",
+    remedy="Take a larger motor, or lower usage.load.factor.",
+    sizes={("K", "temperature"): "limit"},
+)
+_BALANCE = fault(
+    "energy-balance",
+    "{missing} of the electric power of {electric} are missing in the sum of the losses by place.",
+    remedy="Raise run.settle_turns, or take a shorter run.step.",
+    sizes={"W": "missing electric"},
+)
+_IRON = note(
+    "losses-in-iron",
+    "The model of the motor has no separate losses in iron and no stray losses. The windings of a motor of the "
+    "catalogue are fitted so that their losses include them at rated load. At light load a real motor loses more.",
+)
+_GEAR = note(
+    "gear-at-other-loads",
+    "At each load the loss of the {gear} is the one with the feed of the study. With less feed it is less than the "
+    "table says, with more feed it is more.",
+)
+_INVERTER = note("losses-of-the-inverter", "The losses of the inverter are {losses}.")
+_CONVERTER = note(
+    "losses-of-the-converter",
+    "The losses of the converter are not known, as the motor has no nameplate. They come on top.",
+)
+_COMES_BACK = note(
+    "power-that-comes-back",
+    "In parts of the turn the motor gives back {back} in the mean. Here this power counts as saved. An inverter "
+    "with a diode bridge stores it as far as its intermediate circuit is large enough, and turns the rest into heat "
+    "in a braking resistor.",
+    sizes={"W": "back"},
+)
+_NOT_KNOWN = fault(
+    "energy-not-known",
+    "The drive does not run steadily with {loads}, so that no mean power stands for a year.",
+    remedy="Raise run.settle_turns, or see the other warnings.",
+)
 
 
 class EnergyAnalysis(Analysis):
@@ -185,12 +195,7 @@ class _Task:
         inverter = self._inverter(drive, motor)
         duty = self._duty(drive, inverter, "")
         if duty.unsteady:
-            self.study.warn(
-                "energy not known",
-                "the drive does not run steadily with {loads}, so that no mean power stands for a year; raise "
-                "run.settle_turns, or see the other warnings.",
-                loads=", ".join(duty.unsteady),
-            )
+            self.study.say(_NOT_KNOWN, loads=", ".join(duty.unsteady))
             return None
         price = _price(self.plan.table.motor_price, motor)
         own = self._energy(duty, motor.designation if motor else "the motor of the study", price)

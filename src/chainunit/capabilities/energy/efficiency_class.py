@@ -57,9 +57,9 @@ _ROUNDING = 5e-4
 """Nameplates print the efficiency to 0.1 %."""
 
 EXEMPTIONS = (
-    "EU 2019/1781 leaves out, among others, motors that are built into a machine and cannot be tested apart from it, "
-    "totally enclosed motors without a fan, and motors rated for other than continuous duty; IE4 is not asked of "
-    "brake motors and explosion-proof motors, and of Ex eb motors only IE2"
+    "The regulation leaves out motors that are built into a machine and cannot be tested apart from it.",
+    "It leaves out totally enclosed motors without a fan, and motors rated for other than continuous duty.",
+    "IE4 is not asked of brake motors and explosion-proof motors, and of Ex eb motors only IE2.",
 )
 """The exemptions that a drive of this kind meets, in words."""
 

@@ -6,6 +6,7 @@ from ...core.quantities import quantity
 from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.record import StudyRecord
+from ...study.remark import note, warning
 from .efficiency_class import EXEMPTIONS, class_of, falls_short, no_class, required
 
 
@@ -25,19 +26,30 @@ class MotorClass(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of a motor that may not be sold any more, and tell where that is not known."""
         if self.no_class and self.required:
-            study.note("efficiency class", words_of(self))
+            study.say(_NOT_CHECKED, why=self.no_class, asked=self.required)
         if self.falls_short:
-            study.warn(
-                "efficiency class",
-                "the motor {motor} is {own} by its efficiency of {efficiency}, and EU 2019/1781 asks {asked} of a "
-                "motor of its size and number of poles that has come to the market since July 2023 ({exemptions}); "
-                "take a motor of class {asked}.",
+            study.say(
+                _TOO_LOW,
                 motor=self.designation,
                 own=self.efficiency_class,
-                efficiency=(self.efficiency, "1", "percent"),
+                efficiency=self.efficiency,
                 asked=self.required,
-                exemptions=EXEMPTIONS,
             )
+
+
+_NOT_CHECKED = note(
+    "efficiency-class-not-checked",
+    "The class of the motor by IEC 60034-30-1 is not checked: {why}. EU 2019/1781 asks {asked}.",
+    remedy="Compare its nameplate.",
+)
+_TOO_LOW = warning(
+    "efficiency-class",
+    "The motor {motor} is {own} by its efficiency of {efficiency}. EU 2019/1781 asks {asked} of a motor of its size "
+    "and poles that has come to the market since July 2023.",
+    *EXEMPTIONS,
+    remedy="Take a motor of class {asked}.",
+    sizes={("1", "percent"): "efficiency"},
+)
 
 
 class MotorClassAnalysis(Analysis):

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import cited, number
 from ...report.lines import Line, line
 from ...study.record import StudyRecord
 from .analysis import EnergyFindings, MotorComparison, Year
@@ -73,20 +74,21 @@ def _places(s: b.Source, findings: EnergyFindings, titles: Mapping[str, str]) ->
 
 
 def _year(s: b.Source, findings: EnergyFindings) -> b.Table:
-    motors = {"own": findings.own} | ({} if findings.other is None else {"other": findings.other})
+    x = cited(findings, "findings.energy")
+    motors = list(filter(None, (findings.own, findings.other)))
+    shown = list(filter(None, (x.own, x.other)))
     rows = [
-        b.TableRow((v.template, *(s.number(f"energy.{name}.{v.name}", none="-") for name in motors)))
+        b.TableRow((v.template, *(number(getattr(each.year, v.name)) for each in shown)))
         for v in Layout(Year).variables
-        if any(getattr(motor.year, v.name) is not None for motor in motors.values())
+        if any(getattr(motor.year, v.name) is not None for motor in motors)
     ]
-    rows += [
-        b.TableRow((words, *(s.number(f"energy.{name}.{key}", none="-") for name in motors)))
-        for key, words in (("speed", "speed of the motor, mean"), ("price", "price of the motor"))
-        if any(getattr(motor, key) is not None for motor in motors.values())
-    ]
-    heads = (s.words(f"energy.{name}.motor") for name in motors)
+    for words, sizes in (
+        ("speed of the motor, mean", [number(each.speed) for each in shown]),
+        ("price of the motor", [number(each.price) for each in shown]),
+    ):
+        rows += [b.TableRow((words, *sizes))] if any(size.value is not None for size in sizes) else []
     title = s.line("A year, and a life of {=usage.years} years")
-    return b.Table(tuple(rows), b.heads("", *(line(head) for head in heads)), title=title)
+    return b.Table(tuple(rows), b.heads("", *(each.motor for each in shown)), title=title)
 
 
 def verdict_words(comparison: MotorComparison) -> str:

@@ -21,7 +21,8 @@ from ...study.drive import Drive
 from ...study.limits import given_motor
 from ...study.line.shaft import driveline_of, remedies
 from ...study.measures import Answers, read_answers
-from ...study.record import Amount, StudyRecord
+from ...study.record import StudyRecord
+from ...study.remark import RemarkCode, fault, note, warning
 from ...study.rig import Rig, worst_residual
 from ...study.start_up import start_up
 from ...study.turn import TurnFindings
@@ -102,10 +103,7 @@ class FlywheelFindings(Findings):
         _on_wheels(self, study)
         _on_fluctuation(self, study)
         if not study.drive.follows:
-            study.note(
-                "cold windings",
-                "The windings begin cold and have no time to warm up in these runs; warm, the motor slips more.",
-            )
+            study.say(_COLD)
 
 
 class FlywheelAnalysis(Analysis):
@@ -270,13 +268,12 @@ class Trouble:
     """A kind of trouble with flywheels: the test for it, the answer that shows it, and the limit of the motor
     that is exceeded, if it is one; of such a limit the study itself warns for its own flywheel."""
 
-    kind: str
+    code: RemarkCode
     has: Callable[[Wheel], bool]
-    text: str
     number: str = ""
     limit: str = ""
 
-    def amount(self, wheel: Wheel) -> Amount:
+    def amount(self, wheel: Wheel) -> tuple[float | None, str, str]:
         """The answer with its unit and kind."""
         v = variable_of(FlywheelAnswers, self.number)
         return getattr(wheel.answers, v.name), v.unit, v.kind
@@ -286,54 +283,107 @@ class Trouble:
         size = number(wheel.flywheel, "kg.m2")
         if not self.number:
             return size
-        value, *unit = self.amount(wheel)
+        value, unit, kind = self.amount(wheel)
         # a winding whose loss grows faster than its cooling reaches no final temperature
-        return f"{size} ({'without end' if value == math.inf else number(value, *unit)})"
+        return f"{size} ({'without end' if value == math.inf else number(value, unit, kind)})"
 
 
+_COLD = note(
+    "cold-windings",
+    "The windings begin cold and have no time to warm up in these runs. A warm motor slips more.",
+)
 _TROUBLES = (
     Trouble(
-        "flywheel stalls",
+        fault(
+            "flywheel-stalls",
+            "The motor stalls with a flywheel of {where}.",
+            remedy="Take {motor}, or less load.",
+        ),
         lambda wheel: wheel.stalls,
-        "the motor stalls with a flywheel of {where}: {remedy}, or less load.",
     ),
     Trouble(
-        "flywheel does not start",
+        fault("flywheel-does-not-start", "The motor does not come up to speed with a flywheel of {where}."),
         lambda wheel: wheel.answers.start_time is None,
-        "the motor does not come up to speed with a flywheel of {where}.",
     ),
     Trouble(
-        "rated current",
+        warning(
+            "rated-current",
+            "The RMS current passes the rated {limit} with a flywheel of {where}. The motor becomes too hot.",
+        ),
         lambda wheel: wheel.passes("current"),
-        "the RMS current passes the rated {limit}, so that the motor becomes too hot, with a flywheel of {where}.",
         "current_rms",
         "current",
     ),
     Trouble(
-        "hot winding",
+        warning(
+            "hot-winding", "The winding becomes hotter than the permitted {limit} with a flywheel of {where}."
+        ),
         lambda wheel: wheel.passes("temperature"),
-        "the winding becomes hotter than the permitted {limit} with a flywheel of {where}.",
         "winding_temperature",
         "temperature",
     ),
     Trouble(
-        "long start",
+        warning(
+            "long-start",
+            "The start takes longer than the {limit} for which the rotor may be locked with a flywheel of {where}.",
+        ),
         lambda wheel: wheel.passes("start"),
-        "the start takes longer than the {limit} for which the rotor may be locked with a flywheel of {where}.",
         "start_time",
         "start",
     ),
     Trouble(
-        "energy with flywheel",
+        fault(
+            "energy-with-flywheel",
+            "Energy is missing with a flywheel of {where}.",
+            remedy="Take a shorter run.step.",
+        ),
         lambda wheel: not wheel.answers.residual < RESIDUAL,
-        "energy is missing with a flywheel of {where}: a shorter run.step is needed.",
         "residual",
     ),
     Trouble(
-        "flywheel not settled",
+        fault(
+            "flywheel-not-settled",
+            "The turns do not close with a flywheel of {where}.",
+            remedy="Raise run.settle_turns.",
+        ),
         lambda wheel: not wheel.is_settled,
-        "the turns do not close with a flywheel of {where}: raise run.settle_turns.",
     ),
+)
+_TOO_SMALL = warning(
+    "motor-too-small",
+    "The load takes a torque of {mean} on average, rated is {rated}.",
+    remedy="Take a larger motor, as no flywheel helps.",
+    sizes={"N.m": "mean rated"},
+)
+_FLUCTUATION = warning(
+    "fluctuation",
+    "The speed fluctuates by {speed_ripple} with the study's flywheel, {flywheel}. Permitted is {permitted}.",
+    sizes={("1", "percent"): "speed_ripple permitted", "kg.m2": "flywheel"},
+)
+_NONE_KEEPS = warning(
+    "no-flywheel-keeps-it",
+    "No flywheel of the list keeps the speed within {limit}. A larger one that was tried does not{larger}.",
+)
+_BEHIND = warning(
+    "ripple-behind-flywheel",
+    "With a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the {driver}'s by "
+    "{speed_ripple}. The shaft line makes the rest, which no flywheel on the motor's shaft evens.",
+    remedy="{way}.",
+    sizes={"kg.m2": "flywheel", ("1", "percent"): "motor_ripple speed_ripple"},
+)
+_HEAVIER_WORSE = warning(
+    "heavier-flywheel-worse",
+    "The speed fluctuates more, not less, with the heavier flywheel of {where}. The drive swings with it.",
+    sizes={("1", "percent"): "speed_ripple"},
+)
+_LEAST = note(
+    "least-flywheel",
+    "A fluctuation of {permitted} takes a flywheel of {flywheel} at least (the search ends within {close} of that "
+    "fluctuation). For a fluctuation of {permitted} no flywheel is needed{bare}. The hand formula asks for "
+    "{by_hand}{left_out}. By the hand formula none is needed{none_by_hand}. {beside} lend {stored} of a cut's work. "
+    "The RMS current is {current} of the rated. The start takes {start}. It is not recommended{heavy}. Over the "
+    "limit: {excesses}. {fit} keeps all. No flywheel that was run keeps all{no_fit}.",
+    sizes={("1", "percent"): "permitted stored current", "kg.m2": "flywheel by_hand", "s": "start"},
 )
 
 
@@ -344,13 +394,7 @@ def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
     too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
     if plate is not None and too_small:
-        study.warn(
-            "motor too small",
-            "the load takes a torque of {mean} on average, rated is {rated}: a larger motor helps, no flywheel "
-            "does.",
-            mean=(findings.mean_torque, "N.m"),
-            rated=(plate.nameplate.torque, "N.m"),
-        )
+        study.say(_TOO_SMALL, mean=findings.mean_torque, rated=plate.nameplate.torque)
     for trouble in _TROUBLES:
         wheels = [wheel for wheel in findings.wheels if trouble.has(wheel)]
         if trouble.limit and all(wheel.flywheel == findings.own for wheel in wheels):
@@ -363,7 +407,7 @@ def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
             }
             where = ", ".join(map(trouble.words, wheels))
             limit = _limit(wheels[0], trouble.limit, study)
-            study.warn(trouble.kind, trouble.text, where=where, remedy=remedy, limit=limit, **amounts)
+            study.say(trouble.code, where=where, motor=remedy, limit=limit, **amounts)
 
 
 def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
@@ -383,20 +427,18 @@ def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
         and own.answers.speed_ripple is not None
         and own.answers.speed_ripple > findings.permitted_fluctuation
     ):
-        study.warn(
-            "fluctuation",
-            "the speed fluctuates by {speed_ripple} with the study's flywheel, {flywheel}; permitted is {permitted}.",
+        study.say(
+            _FLUCTUATION,
             STEADY,
-            speed_ripple=(own.answers.speed_ripple, "1", "percent"),
-            flywheel=(own.flywheel, "kg.m2"),
-            permitted=(findings.permitted_fluctuation, "1", "percent"),
+            speed_ripple=own.answers.speed_ripple,
+            flywheel=own.flywheel,
+            permitted=findings.permitted_fluctuation,
         )
     # flywheels without a run are not judged
     if findings.is_searched and not any(
         wheel.keeps(findings.permitted_fluctuation) for wheel in findings.wheels
     ):
-        more = "." if findings.least is not None else ", nor does a larger one that was tried."
-        study.warn("no flywheel keeps it", f"no flywheel of the list keeps the speed within {limit}{more}")
+        study.say(_NONE_KEEPS, limit=limit, larger="" if findings.least is None else None)
         _on_line(findings, study)
     _on_heavier(findings, study)
     if findings.least is not None:
@@ -414,14 +456,13 @@ def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
         return
     best = min(even, key=lambda wheel: float(wheel.answers.speed_ripple))
     causes = remedies(driveline_of(study.drive))
-    study.warn(
-        "ripple behind flywheel",
-        "with a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the {driver}'s by "
-        "{speed_ripple}: the shaft line makes the rest, which no flywheel on the motor's shaft evens; {remedy}.",
-        flywheel=(best.flywheel, "kg.m2"),
-        motor_ripple=(best.answers.motor_ripple, "1", "percent"),
-        speed_ripple=(best.answers.speed_ripple, "1", "percent"),
-        remedy=", and ".join([*causes, "stiffen the shafts"] if causes else ["stiffer shafts help"]),
+    way = ", and ".join([*causes, "stiffen the shafts"] if causes else ["take stiffer shafts"])
+    study.say(
+        _BEHIND,
+        flywheel=best.flywheel,
+        motor_ripple=best.answers.motor_ripple,
+        speed_ripple=best.answers.speed_ripple,
+        way=way,
     )
 
 
@@ -438,56 +479,37 @@ def _on_heavier(findings: FlywheelFindings, study: StudyRecord) -> None:
         where = ", ".join(
             f"{number(size, 'kg.m2')} ({number(ripple, '1', 'percent')})" for size, ripple in worse
         )
-        amounts: dict[str, Amount] = {
-            f"{size:g}.speed_ripple": (ripple, "1", "percent") for size, ripple in worse
-        }
-        text = "the speed fluctuates more, not less, with the heavier flywheel of {where}: the drive swings with it."
-        study.warn("heavier flywheel worse", text, where=where, **amounts)
+        study.say(_HEAVIER_WORSE, where=where, **{f"{size:g}.speed_ripple": ripple for size, ripple in worse})
 
 
 def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
     """Note the least flywheel that keeps the fluctuation; it is not recommended if another limit is still
     exceeded."""
-    a, by_hand, close = least.answers, findings.flywheel_by_hand, number(CLOSE, "1", "percent", full=False)
-    text = (
-        "A fluctuation of {permitted} takes a flywheel of {flywheel} at least (the search ends within "
-        f"{close} of that fluctuation); "
-        if least.flywheel
-        else "For a fluctuation of {permitted} no flywheel is needed; "
-    )
-    none = "by the hand formula none is needed" if least.flywheel else "nor is one by the hand formula"
-    text += "the hand formula asks for {by_hand}" if by_hand else none
+    a, by_hand, has_one = least.answers, findings.flywheel_by_hand, bool(least.flywheel)
+    left_out = ""
     if by_hand > least.flywheel:
-        text += ", as it leaves out that the motor's torque rises where the speed falls"
+        left_out = ", as it leaves out that the motor's torque rises where the speed falls"
     elif a.motor_ripple is not None and by_hand < least.flywheel:
-        text += ", as it leaves out the shaft line"
-    beside, masses = (
-        ("With it", "flywheel and moving masses") if least.flywheel else ("Without one,", "the moving masses")
-    )
-    parts: Mapping[str, tuple[str, Amount]] = {
-        "stored": (
-            f"{masses} lend {{stored}} of a cut's work",
-            (a.stored_share_most, "1", "percent"),
-        ),
-        "current": ("the RMS current is {current} of the rated", (a.current_share, "1", "percent")),
-        "start": ("the start takes {start}", (a.start_time, "s")),
-    }
-    items = {name: part for name, part in parts.items() if part[1][0] is not None}
-    text += f". {beside} {', '.join(words for words, _ in items.values())}."
+        left_out = ", as it leaves out the shaft line"
     plate = study.config.plate
     too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
-    if excesses := [*least.excesses, *(["mean torque"] if too_small else [])]:
-        fit = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)
-        text += " It is not recommended; still" if least.flywheel else " Still"
-        text += f" over the limit: {', '.join(excesses)}."
-        text += (
-            f" {number(fit.flywheel, 'kg.m2')} keeps all." if fit else " No flywheel that was run keeps all."
-        )
-    study.note(
-        "least flywheel",
-        text,
-        permitted=(findings.permitted_fluctuation, "1", "percent"),
-        flywheel=(least.flywheel, "kg.m2"),
-        by_hand=(by_hand, "kg.m2"),
-        **{name: amount for name, (_, amount) in items.items()},
+    excesses = [*least.excesses, *(["mean torque"] if too_small else [])]
+    fit = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)
+    study.say(
+        _LEAST,
+        permitted=findings.permitted_fluctuation,
+        flywheel=least.flywheel,
+        close=number(CLOSE, "1", "percent", full=False) if has_one else None,
+        bare=None if has_one else "",
+        by_hand=by_hand or None,
+        left_out=left_out,
+        none_by_hand=None if by_hand else left_out,
+        beside="With it flywheel and moving masses" if has_one else "Without one the moving masses",
+        stored=a.stored_share_most,
+        current=a.current_share,
+        start=a.start_time,
+        heavy="" if has_one and excesses else None,
+        excesses=", ".join(excesses) or None,
+        fit=number(fit.flywheel, "kg.m2") if fit and excesses else None,
+        no_fit="" if excesses and fit is None else None,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...study.stored_result import as_mapping
+from ...reading.result_entries import as_mapping
 from .rows import as_rows, number_of, text_of
 
 CANDIDATES = "candidates.csv"

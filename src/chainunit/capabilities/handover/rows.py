@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ...study.stored_result import as_mapping
+from ...reading.result_entries import as_mapping
 
 _FORMULA = re.compile(r"\s*[=+\-@\uff0b\uff0d\uff1d\uff20]")
 """Begin of a cell that a program for tables may take for a formula."""

@@ -145,15 +145,17 @@ def _motor(study: StudiedDrive) -> Part:
         **_catalogue_part(study.text("motor", "title"), study.ordered("motor")),
         "torque_rms": entry(steady("motor_torque_rms"), "N.m"),
         "torque_peak": entry(study.check("peak_torque", "value") or steady("motor_torque_peak"), "N.m"),
-        "torque_used": _percent(study.check("peak_torque", "utilisation")),
+        "torque_utilisation": _percent(study.check("peak_torque", "utilisation")),
         "current_peak": entry(steady("current_peak"), "A"),
-        "current_used": _percent(_ratio(steady("current_peak"), study.number("motor", "rated_current"))),
+        "current_utilisation": _percent(
+            _ratio(steady("current_peak"), study.number("motor", "rated_current"))
+        ),
         "winding_temperature": _degrees(hottest),
-        "temperature_used": _percent(heated),
+        "temperature_utilisation": _percent(heated),
         "speed_peak": entry(_RPM * fastest, "rpm"),
         "frequency_at_speed_peak": entry(fastest / (2.0 * np.pi), "Hz"),
         "power_rms": entry(float(np.sqrt(_mean(cycle.time, (cycle.torque * cycle.speed) ** 2))), "W"),
-        "power_used": _percent(_ratio(steady("power_mean"), study.number("motor", "rated_power"))),
+        "power_utilisation": _percent(_ratio(steady("power_mean"), study.number("motor", "rated_power"))),
         "electric_power_taken": entry(taken, "W"),
         "electric_power_returned": entry(returned, "W"),
     }
@@ -183,7 +185,7 @@ def _gear(study: StudiedDrive) -> Part:
         "ratio": entry(ratio, "1"),
         **({} if rated is None else {"least_rated_torque": entry(rated, "N.m")}),
         "torque_peak": entry(peak, "N.m"),
-        "torque_used": _percent(study.check("gear", "utilisation")),
+        "torque_utilisation": _percent(study.check("gear", "utilisation")),
     }
 
 
@@ -217,8 +219,8 @@ def _relay(study: StudiedDrive) -> Part:
         return {}
     trip_class = study.text("sizing", "protection", "relay_class", "value")
     return {
-        "device": study.text("sizing", "protection", "device"),
-        "current": entry(current, "A"),
+        "type": study.text("sizing", "protection", "device"),
+        "setting": entry(current, "A"),
         **({"trip_class": trip_class} if trip_class else {}),
     }
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from ...core.errors import InputError, printable
 from ...core.inputs import dataset, file_bytes
+from ...reading.result_entries import as_mapping
 from ...report.series import SERIES, STEADY_BEGIN
 from ...study.record import LOAD_CYCLE
-from ...study.stored_result import StoredResult, as_mapping, read_result
+from ...study.stored_result import StoredResult, read_result
 from .cycle import ShaftCycle, load_cycle
 
 if TYPE_CHECKING:

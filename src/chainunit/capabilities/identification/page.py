@@ -11,6 +11,7 @@ from ...reading.text import shown_in
 from ...recordings.measurands import MEASURANDS
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import as_name, cited, number, table
 from ...report.lines import Line, Name, line
 from ...report.task import Task, Writer
 from ...study.config import Config
@@ -24,7 +25,8 @@ FILE = "identified.toml"
 
 def identification_report(machine: IdentifiedMachine) -> b.Report:
     """The report on an identification."""
-    result = as_data(summary_of(machine))
+    summary = summary_of(machine)
+    result, x = as_data(summary), cited(summary)
     s = b.Source(result)
     config = machine.config
     with shown_in(config.units):
@@ -35,10 +37,10 @@ def identification_report(machine: IdentifiedMachine) -> b.Report:
             result,
             tuple(_opening(s, machine)),
             (
-                b.Section("numbers", "Identified numbers", tuple(_numbers(s))),
-                b.Section("limits", "Limits of these recordings", tuple(_limits(s))),
+                b.Section("numbers", "Identified numbers", tuple(_numbers(s, x))),
+                b.Section("limits", "Limits of these recordings", tuple(_limits(s, x))),
                 b.Section("courses", "Measured and simulated", (*_residuals(s), *figures)),
-                b.Section("runs", "Recordings and sensors", tuple(_runs(s))),
+                b.Section("runs", "Recordings and sensors", tuple(_runs(s, x))),
             ),
             source=s.line("Study file: {source} · chainunit {chainunit}"),
             failure=str(machine.failure or ""),
@@ -92,67 +94,50 @@ def _opening(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
         yield b.Judgement("remark", line(each, "."))
 
 
-def _suspects(s: b.Source) -> Iterator[b.Block]:
-    rows = []
-    for i, each in enumerate(s.result["suspects"]):
-        for k, suspect in enumerate(each["suspects"]):
-            path = f"suspects.{i}.suspects.{k}"
-            rows.append(
-                b.TableRow(
-                    (
-                        str(i + 1),
-                        Name(suspect["name"]),
-                        s.number(f"{path}.known", digits=4),
-                        s.number(f"{path}.preferred", digits=4),
-                        "yes" if suspect["stated"] else "no",
-                        {True: "yes", False: "no", None: ""}[each["describes"]],
-                    )
-                )
-            )
-    if not rows:
-        return
-    columns = (
-        b.Column("set"),
-        b.Column("number"),
-        b.Column("known"),
-        b.Column("would be"),
-        b.Column("stated in the study", "stated", form="long"),
-        b.Column("the model describes the recordings with it", "describes"),
+def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
+    rows = [(i, each.describes, suspect) for i, each in enumerate(x.suspects, 1) for suspect in each.suspects]
+    yield from table(
+        rows,
+        ("set", lambda row: str(row[0])),
+        ("number", lambda row: as_name(row[2].name)),
+        ("known", lambda row: number(row[2].known, 4)),
+        ("would be", lambda row: number(row[2].preferred, 4)),
+        (b.Column("stated in the study", "stated", "long"), lambda row: "yes" if row[2].stated else "no"),
+        (
+            b.Column("the model describes the recordings with it", "describes"),
+            lambda row: {True: "yes", False: "no", None: ""}[row[1]],
+        ),
+        title="Suspects: known numbers that may be wrong, the best set first",
     )
-    yield b.Table(tuple(rows), columns, title="Suspects: known numbers that may be wrong, the best set first")
-    yield b.Text(
-        "Measure these numbers, or seek them: a set with the values of the table explains the recordings."
-        if any(suspects["describes"] for suspects in s.result["suspects"])
-        else "No set explains the recordings; the nearest one stands first.",
-        "note",
-    )
-
-
-def _numbers(s: b.Source) -> Iterator[b.Block]:
-    if not s.result["is_described"]:
-        yield from _suspects(s)
-    rows = []
-    for name, each in s.result["numbers"].items():
-        path = f"numbers.{name}"
-        estimate: tuple[Line, ...] = ("not determined", "")
-        if each["told"]:
-            estimate = s.number(f"{path}.fitted", digits=4), s.number(f"{path}.deviation", digits=2)
-        ends = (s.number(f"{path}.{end}", digits=4) for end in ("from", "to"))
-        rows.append(
-            b.TableRow(
-                (Name(name), *estimate, *ends, s.number(f"{path}.expected", digits=2), _given(s, path))
-            )
+    if rows:
+        yield b.Text(
+            "Measure these numbers, or seek them: a set with the values of the table explains the recordings."
+            if any(each.describes for each in x.suspects)
+            else "No set explains the recordings; the nearest one stands first.",
+            "note",
         )
-    columns = (
-        b.Column("number"),
-        b.Column("value"),
-        b.Column("standard deviation", "deviation"),
-        b.Column("95 %: from", "from"),
-        b.Column("to"),
-        b.Column("deviation expected before the fit", form="long"),
-        b.Column("known before", form="long"),
+
+
+def _numbers(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
+    if not x.is_described:
+        yield from _suspects(x)
+
+    yield from table(
+        x.numbers.items(),
+        ("number", lambda row: Name(row[0])),
+        ("value", lambda row: number(row[1].fitted, 4) if row[1].told else "not determined"),
+        (
+            b.Column("standard deviation", "deviation"),
+            lambda row: number(row[1].deviation, 2) if row[1].told else "",
+        ),
+        (b.Column("95 %: from", "from"), lambda row: number(row[1].low, 4)),
+        ("to", lambda row: number(row[1].high, 4)),
+        (b.Column("deviation expected before the fit", form="long"), lambda row: number(row[1].expected, 2)),
+        (
+            b.Column("known before", form="long"),
+            lambda row: line(number(row[1].given, 4), " ± ", number(row[1].given_deviation, 2)),
+        ),
     )
-    yield b.Table(tuple(rows), columns)
     yield b.Text(
         f"A value is that of the best fit, as {FILE} has it. Its interval is that of the distribution which the "
         "recordings leave. A number is determined where the recordings alone give it with less than half the "
@@ -162,74 +147,39 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
         "may differ from the reached one.",
         "note",
     )
-    rows = [
-        b.TableRow(
-            (
-                line(Name(pair["first"]), ", ", Name(pair["second"])),
-                s.number(f"correlations.{k}.correlation", digits=2),
-            )
-        )
-        for k, pair in enumerate(s.result["correlations"])
-    ]
-    if rows:
-        yield b.Table(
-            tuple(rows),
-            b.heads("pair", "correlation"),
-            title="Numbers whose errors go together",
-            form="long",
-        )
+    yield from table(
+        x.correlations,
+        ("pair", lambda pair: line(as_name(pair.first), ", ", as_name(pair.second))),
+        ("correlation", lambda pair: number(pair.correlation, 2)),
+        title="Numbers whose errors go together",
+        form="long",
+    )
 
 
-def _given(s: b.Source, path: str) -> Line:
-    given, deviation = s.value(f"{path}.given"), s.value(f"{path}.given_deviation")
-    assert given is not None and deviation is not None
-    return line(s.number(f"{path}.given", digits=4), " ± ", s.number(f"{path}.given_deviation", digits=2))
-
-
-def _limits(s: b.Source) -> Iterator[b.Block]:
+def _limits(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
     for each in s.lines("blind"):
         yield b.Judgement("partly", line("No trace in any column: ", each, "."))
-    rows = [
-        b.TableRow(
-            (
-                s.words(f"combinations.{k}.text"),
-                s.number(f"combinations.{k}.value", digits=4),
-                s.number(f"combinations.{k}.deviation", digits=2),
-            )
-        )
-        for k in range(len(s.result["combinations"]))
-    ]
-    if rows:
-        yield b.Table(
-            tuple(rows),
-            b.heads("sum", "value", "standard deviation"),
-            title="Sums that are determined, of numbers that are not",
-        )
-    rows = [
-        b.TableRow(
-            (
-                s.words(f"proposals.{k}.text"),
-                s.number(f"proposals.{k}.factor", digits=3),
-                s.number(f"proposals.{k}.told", as_given=True),
-            )
-        )
-        for k in range(len(s.result["proposals"]))
-    ]
-    if rows:
-        before = s.result["told_at_start"]["value"]
-        is_whole = s.result["told"]["value"] == s.result["sought"]["value"]
-        words = "Further runs, the best first; without one {=told_at_start} numbers can be determined"
-        yield b.Table(
-            tuple(rows),
-            b.heads("further run", "deviations fall by the factor", "numbers determined"),
-            title="Further runs that would make the numbers sharper, the best first"
-            if is_whole
-            else s.line(words),
-        )
-        if not is_whole and all(each["told"]["value"] <= before for each in s.result["proposals"]):
-            yield b.Text(
-                "None of these runs determines one more number: weigh a part, or know a gain.", "note"
-            )
+    yield from table(
+        x.combinations,
+        ("sum", lambda each: each.text),
+        ("value", lambda each: number(each.value, 4)),
+        ("standard deviation", lambda each: number(each.deviation, 2)),
+        title="Sums that are determined, of numbers that are not",
+    )
+    before, is_whole = number(x.told_at_start), number(x.told).value == number(x.sought).value
+    words = "Further runs, the best first; without one {=told_at_start} numbers can be determined"
+    yield from table(
+        x.proposals,
+        ("further run", lambda each: each.words),
+        ("deviations fall by the factor", lambda each: number(each.factor, 3)),
+        ("numbers determined", lambda each: number(each.determined, as_given=True)),
+        title="Further runs that would make the numbers sharper, the best first"
+        if is_whole
+        else s.line(words),
+    )
+    more = (number(each.determined).value for each in x.proposals)
+    if x.proposals and not is_whole and all((size or 0) <= (before.value or 0) for size in more):
+        yield b.Text("None of these runs determines one more number: weigh a part, or know a gain.", "note")
 
 
 def _residuals(s: b.Source) -> Iterator[b.Block]:
@@ -304,48 +254,36 @@ def _listed(names: Sequence[str]) -> list[Line]:
     return [part for k, name in enumerate(names) for part in (", " if k else "", Name(name))]
 
 
-def _runs(s: b.Source) -> Iterator[b.Block]:
-    rows = [
-        b.TableRow(
-            (
-                Name(name),
-                s.words(f"runs.{name}.file"),
-                s.number(f"runs.{name}.duration", digits=4),
-                s.number(f"runs.{name}.rate", digits=4),
-                s.number(f"runs.{name}.crank_speed", as_given=True),
-                s.words(f"runs.{name}.feed"),
-                line(*_listed(s.result["runs"][name]["columns"])),
-            )
-        )
-        for name in s.result["runs"]
-    ]
-    yield b.Table(
-        tuple(rows),
-        b.heads("run", "file", "duration", "rows a second", "crank speed", "feed", "columns"),
+def _runs(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
+    yield from table(
+        x.runs.items(),
+        ("run", lambda row: Name(row[0])),
+        ("file", lambda row: row[1].file),
+        ("duration", lambda row: number(row[1].duration, 4)),
+        ("rows a second", lambda row: number(row[1].rate, 4)),
+        ("crank speed", lambda row: number(row[1].crank_speed, as_given=True)),
+        ("feed", lambda row: row[1].feed),
+        ("columns", lambda row: line(*_listed(s.result["runs"][row[0]]["columns"]))),
         title="Recordings",
         numeric=False,
         form="long",
     )
-    rows = [
-        b.TableRow(
-            (
-                Name(name),
-                s.number(f"sensors.{name}.value", digits=4),
-                s.number(f"sensors.{name}.deviation", digits=2),
-            )
-        )
-        for name in s.result["sensors"]
-    ]
-    yield b.Table(
-        tuple(rows),
-        b.heads("quantity", "value", "standard deviation"),
+    yield from table(
+        x.sensors.items(),
+        ("quantity", lambda row: Name(row[0])),
+        ("value", lambda row: number(row[1].value, 4)),
+        ("standard deviation", lambda row: number(row[1].deviation, 2)),
         title="Start, clock and sensors, as fitted",
         form="long",
     )
     yield b.Text(
         s.line(
             "The fit took {=fit.rounds} rounds"
-            + ("." if s.value("fit.starts") == 1.0 else "; {=fit.agreeing} of {=fit.starts} starts agree.")
+            + (
+                "."
+                if number(x.fit.starts).value == 1.0
+                else "; {=fit.agreeing} of {=fit.starts} starts agree."
+            )
         ),
         "fine",
         "long",

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import as_name, cited, number, table
 from ...report.lines import Name, join, line
 from ...report.task import Task, Writer
+from ...system.linear import LinearModel
 from .result import NPZ, FrequencyResponse, LinearQuestion, LinearResult, data, find, write_npz
 
 PICTURES = "bode_*.png"
@@ -21,7 +24,7 @@ def linear_report(found: LinearResult) -> b.Report:
     """The report on a linear model."""
     result = data(found)
     s = b.Source(result)
-    sections = [b.Section("point", "The point", tuple(_point(s)))]
+    sections = [b.Section("point", "The point", tuple(_point(cited(found.linear))))]
     if found.responses:
         sections.insert(0, b.Section("bode", "Frequency responses", tuple(_responses(found))))
     return b.Report(
@@ -48,59 +51,48 @@ def _opening(s: b.Source, found: LinearResult) -> Iterator[b.Block]:
             "warning", "A slope of the states is not defined at this point: there are no poles."
         )
     else:
-        yield _poles(s)
-    yield from _bends(s, found)
+        yield from _poles(cited(linear))
+    yield from _bends(linear)
 
 
-def _poles(s: b.Source) -> b.Table:
-    columns = {
-        "real": b.Column("real part"),
-        "imaginary": b.Column("imaginary part, +-", form="long"),
-        "natural_frequency": b.Column("natural frequency", "frequency"),
-        "damping_ratio": b.Column("damping ratio", "damping"),
-        "time_constant": b.Column("time constant"),
-    }
-    rows = (
-        b.TableRow((Name(pole["state"]), *(s.number(f"poles.{k}.{key}", digits=4) for key in columns)))
-        for k, pole in enumerate(s.result["poles"])
+def _poles(x: LinearModel) -> Iterator[b.Table]:
+    return table(
+        x.poles,
+        ("largest part in it", lambda pole: as_name(pole.state)),
+        ("real part", lambda pole: number(pole.real, 4)),
+        (b.Column("imaginary part, +-", form="long"), lambda pole: number(pole.imaginary, 4)),
+        (b.Column("natural frequency", "frequency"), lambda pole: number(pole.natural_frequency, 4)),
+        (b.Column("damping ratio", "damping"), lambda pole: number(pole.damping_ratio, 4)),
+        ("time constant", lambda pole: number(pole.time_constant, 4)),
+        title="Poles, the slowest first",
     )
-    heads = (b.Column("largest part in it"), *columns.values())
-    return b.Table(tuple(rows), heads, title="Poles, the slowest first")
 
 
-def _bends(s: b.Source, found: LinearResult) -> Iterator[b.Block]:
-    for k, bend in enumerate(found.linear.bends):
+def _bends(linear: LinearModel) -> Iterator[b.Block]:
+    for bend, x in zip(linear.bends, cited(linear).bends, strict=True):
         names, more = bend.rows[:_MOST_ROWS], len(bend.rows) - _MOST_ROWS
         rows = line(join(map(Name, names)), f" and {more} more" if more > 0 else "")
         said = (
             line("the slopes by it jump at this point; the matrices have those of one side: ")
             if bend.kink
-            else line("the slopes by it bend within ", s.number(f"bends.{k}.within"), " of this point: ")
+            else line("the slopes by it bend within ", number(x.within), " of this point: ")
         )
         yield b.Judgement("warning", line(Name(bend.by), ": ", said, rows, "."))
 
 
-def _point(s: b.Source) -> Iterator[b.Block]:
-    count = len(s.result["states"])
-    for kind, title in (("states", "States"), ("inputs", "Inputs"), ("outputs", "Outputs beside the states")):
-        # the states are the first outputs
-        own = list(enumerate(s.result[kind]))[count if kind == "outputs" else 0 :]
-        columns = ("value", "rate") if kind == "states" else ("value",)
-        rows = (
-            b.TableRow(
-                (
-                    Name(each["name"]),
-                    s.words(f"{kind}.{k}.description"),
-                    *(s.number(f"{kind}.{k}.{column}", digits=6) for column in columns),
-                )
-            )
-            for k, each in own
-        )
-        description = b.Column("description", of_text=True)
-        rate = b.heads("time derivative") if kind == "states" else ()
-        heads = (*b.heads("name"), description, *b.heads("value"), *rate)
-        if own:
-            yield b.Table(tuple(rows), heads, title=f"{title}, at the point", form="long")
+def _point(x: LinearModel) -> Iterator[b.Block]:
+    value = ("value", lambda each: number(each.value, 6))
+    head: tuple[Any, ...] = (
+        ("name", lambda each: as_name(each.name)),
+        (b.Column("description", of_text=True), lambda each: each.description),
+        value,
+    )
+    rate = ("time derivative", lambda each: number(each.rate, 6))
+    yield from table(x.states, *head, rate, title="States, at the point", form="long")
+    yield from table(x.inputs, *head, title="Inputs, at the point", form="long")
+    # the states are the first outputs
+    outputs = x.outputs[len(x.states) :]
+    yield from table(outputs, *head, title="Outputs beside the states, at the point", form="long")
 
 
 def _responses(found: LinearResult) -> Iterator[b.Block]:

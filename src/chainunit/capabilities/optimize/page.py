@@ -13,6 +13,7 @@ from ...reading.results import as_data
 from ...reading.text import Units, shown_in
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import cited, number, table
 from ...report.lines import Aside, Line, Name, join, line
 from ...report.live.page import live_of_config
 from ...report.live_block import Live, LiveMachine
@@ -22,7 +23,7 @@ from ...study.heading import Heading
 from ...study.study_file import changed_tables, toml_text
 from ...work.progress import TaskProgress
 from .best import Best, find_best
-from .result import BestMachine, best_machine, units_of
+from .result import BestMachine, TodayAndBest, WebPull, best_machine, units_of
 from .table import wishes_of
 from .words import conflict_sentences
 
@@ -38,21 +39,22 @@ def optimum_report(
     machine."""
     units = units_of(best, file.tables, units)
     with shown_in(units):
-        result = as_data(best_machine(best, Heading.of(title, file)))
+        found = best_machine(best, Heading.of(title, file))
+        result, x = as_data(found), cited(found)
     s = b.Source(result)
-    sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best)))]
+    sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best, x)))]
     if live:
         sections.append(b.Section("live", "Try it", live))
     if best.met:
         sections.append(b.Section("binding", "What binds", tuple(_binding(s))))
     if best.front:
-        sections.append(b.Section("front", "Two objectives", tuple(_front(s, best))))
-    sections.append(b.Section("checks", "Starts and checks", tuple(_checks(s, best))))
+        sections.append(b.Section("front", "Two objectives", tuple(_front(s, best, x))))
+    sections.append(b.Section("checks", "Starts and checks", tuple(_checks(s, best, x))))
     return b.Report(
         _title(best, title),
         "Search for the best machine",
         result,
-        tuple(_opening(s, best)),
+        tuple(_opening(s, best, x)),
         tuple(sections),
         source=s.line("Study file: {source} · chainunit {chainunit}"),
         units=units,
@@ -135,22 +137,24 @@ TASK: Task[Config, OptimizedStudy] = Task(
 )
 
 
-def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:
+def _opening(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     if not best.met:
         sentences = s.lines("conflict.sentences")
         yield b.Judgement("bad", sentences[0], items=())
         for each in sentences[1:]:
             yield b.Text(each)
         return
-    for k, name in enumerate(s.result["objectives"]):
-        path = f"quantities.{name}"
+    for k, objective in enumerate(best.wishes.objectives):
+        sought = x.quantities[objective.name]
         words = line(
-            f"{name}: ", s.number(f"{path}.best"), ", today ", s.number(f"{path}.today"), _share(s, path), "."
+            f"{objective.name}: ", number(sought.best), ", today ", number(sought.today), _share(sought), "."
         )
         yield b.Judgement("good", words) if k == 0 else b.Text(words)
-    yield b.Text(
-        line("The best machine has ", join(_best_of(s, name) for name in s.result["parameters"]), ".")
+    parts = (
+        line(Name(free), " ", number(each.best, 5), Aside(line("today ", number(each.today, 5))))
+        for free, each in x.parameters.items()
     )
+    yield b.Text(line("The best machine has ", join(parts), "."))
     for i in range(len(s.result["organs"])):
         path = f"organs.{i}"
         words = s.line(f"{{{path}.text}}: the crank turns at {{speed}}")
@@ -160,14 +164,8 @@ def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:
     yield _turns(best)
 
 
-def _best_of(s: b.Source, name: str) -> Line:
-    path = f"parameters.{name}"
-    best, today = (s.number(f"{path}.{key}", digits=5) for key in ("best", "today"))
-    return line(Name(name), " ", best, Aside(line("today ", today)))
-
-
-def _share(s: b.Source, path: str) -> Line:
-    today, value = s.value(f"{path}.today"), s.value(f"{path}.best")
+def _share(x: TodayAndBest) -> Line:
+    today, value = number(x.today).value, number(x.best).value
     if not today or value is None:
         return ()
     change = 100.0 * (value - today) / abs(today)
@@ -190,35 +188,35 @@ def _turns(best: Best) -> fig.Figure:
     )
 
 
-def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
+def _machine(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     head = "best" if best.met else "nearest"
-    rows = [
-        b.TableRow((Name(name), *(s.number(f"parameters.{name}.{key}", digits=5) for key in ("today", "best")),
-                    *(s.number(f"parameters.{name}.{key}", as_given=True) for key in ("min", "max"))))
-        for name in s.result["parameters"]
-    ]  # fmt: skip
-    yield b.Table(
-        tuple(rows), b.heads("parameter", "today", head, "least", "largest"), title="Free parameters"
+    yield from table(
+        x.parameters.items(),
+        ("parameter", lambda row: Name(row[0])),
+        ("today", lambda row: number(row[1].today, 5)),
+        (head, lambda row: number(row[1].best, 5)),
+        ("least", lambda row: number(row[1].low, as_given=True)),
+        ("largest", lambda row: number(row[1].high, as_given=True)),
+        title="Free parameters",
     )
     if best.idle:
         yield b.Text(s.words("without_effect_words"))
-    limited: list[tuple[Line, str]] = [(Name(name), f"quantities.{name}") for name in s.result["quantities"]]
-    if s.result["least_pull"] is not None:
-        limited.append(("web mean pull, least", "least_pull"))
-    # where no machine meets all limits, a column marks the limits that the nearest machine misses
-    marks = () if best.met else ("limit",)
-    rows = [
-        b.TableRow((words, *(s.number(f"{path}.{key}", digits=4) for key in ("today", "best")),
-                    *(s.number(f"{path}.{key}", as_given=True) for key in ("min", "max")),
-                    *("missed" if b.at(s.result, path)["missed"] else "" for _ in marks)))
-        for words, path in limited
-    ]  # fmt: skip
-    yield b.Table(
-        tuple(rows),
-        b.heads("quantity", "today", head, "least", "largest", *marks),
+    limited: list[tuple[Line, WebPull]] = [(Name(sought), each) for sought, each in x.quantities.items()]
+    if x.least_pull is not None:
+        limited.append(("web mean pull, least", x.least_pull))
+    # if no machine meets all limits, a column marks the limits that the nearest machine misses
+    missed: Any = ("limit", lambda row: "missed" if row[1].missed else "")
+    yield from table(
+        limited,
+        ("quantity", lambda row: row[0]),
+        ("today", lambda row: number(row[1].today, 4)),
+        (head, lambda row: number(row[1].best, 4)),
+        ("least", lambda row: number(row[1].low, as_given=True)),
+        ("largest", lambda row: number(row[1].high, as_given=True)),
+        *(() if best.met else (missed,)),
         title=s.line("Objectives and limits, of a turn at {=speed:4}"),
     )
-    if s.result["least_pull"] is not None:
+    if x.least_pull is not None:
         yield b.Text(s.line("The web mean pull is the least at crank speeds up to {=slack_free_speed:4}."))
 
 
@@ -233,30 +231,20 @@ def _binding(s: b.Source) -> Iterator[b.Block]:
         )
 
 
-def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
+def _front(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     first, second = best.wishes.objectives
     names = best.wishes.names
-    rows = [
-        b.TableRow(
-            (
-                s.number(f"front.{k}.values.{first.name}", digits=4),
-                s.number(f"front.{k}.values.{second.name}", digits=4),
-                *(s.number(f"front.{k}.parameters.{name}", digits=4) for name in names),
-                FILE if s.result["front"][k]["chosen"] else "",
-            )
-        )
-        for k in range(len(best.front))
-    ]
     yield b.Text(
         "No machine is better than one of the front in one objective without being worse in the other. The best "
         "machine of this report is the one nearest to the least values of both.",
         "lead",
     )
-    yield b.Table(
-        tuple(rows),
-        b.heads(*map(Name, (first.name, second.name, *names)), "file"),
-        title="Front of the two objectives",
-    )
+    columns: list[Any] = [
+        (Name(of.name), lambda point, key=of.name: number(point.values[key], 4)) for of in (first, second)
+    ]
+    columns += [(Name(key), lambda point, key=key: number(point.parameters[key], 4)) for key in names]
+    chosen_file: Any = ("file", lambda point: FILE if point.chosen else "")
+    yield from table(x.front, *columns, chosen_file, title="Front of the two objectives")
     values = np.array([point.values for point in best.front])
     chosen = [[best.found[q.name]] for q in (first, second)]
     items: tuple[Any, ...] = (
@@ -272,7 +260,7 @@ def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
     )
 
 
-def _checks(s: b.Source, best: Best) -> Iterator[b.Block]:
+def _checks(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     yield b.Text(s.words("starts.text"))
     yield b.Text(
         s.line(

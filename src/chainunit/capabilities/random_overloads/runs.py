@@ -34,6 +34,7 @@ from ...study.operation import OperatingConditions
 from ...study.quantiles import CONFIDENCE, quantile, runs_needed, share
 from ...study.readings import crank_angle
 from ...study.record import StudyRecord
+from ...study.remark import fault, note, warning
 from ...study.rig import Rig
 from ...study.window import Phase, Window
 from ...work.job import Job, ResultVariable, made_anew
@@ -271,6 +272,29 @@ def _result_of(task: RandomTask, chance: Draw, run: EventRun) -> dict[str, Any]:
     }
 
 
+_SHARE = ("1", "percent")
+_OUTCOMES = {
+    "trips": warning(
+        "random-overload-trips",
+        f"Overloads at random: in {{share}} of them {OUTCOMES['trips']}.",
+        sizes={_SHARE: "share"},
+    ),
+    "stalls": fault(
+        "random-overload-stalls",
+        f"Overloads at random: in {{share}} of them {OUTCOMES['stalls']}.",
+        sizes={_SHARE: "share"},
+    ),
+}
+_TOO_FEW = note("too-few-runs", "Overloads at random: {text}")
+_AT_LIMIT = note(
+    "random-overloads-at-current-limit",
+    "Overloads at random: the largest currents are at their limit of {limit}. A harder overload does not raise "
+    "them.",
+    sizes={"A": "limit"},
+)
+_MADE_ANEW = note("runs-made-anew", "Overloads at random: {text}.")
+
+
 @result
 class MonteCarloResult(Findings):
     """The results of the runs, by the names of `result_variables`, over the dimension ``run``; and their store."""
@@ -329,32 +353,19 @@ class MonteCarloResult(Findings):
 
     def remark(self, study: StudyRecord) -> None:
         """Warn of runs that end badly, and note what limits the numbers."""
-        note, shares = study.note, self.quantiles
-        for name, words in OUTCOMES.items():
+        shares = self.quantiles
+        for name, code in _OUTCOMES.items():
             share = shares.get(name, {}).get("share")
             if share is not None and share.value > 0.0:
-                study.warn(
-                    f"random overload {name}",
-                    f"overloads at random: in {{share}} of them {words}.",
-                    share=(share.value, "1", "percent"),
-                )
+                study.say(code, share=share.value)
         if self.shortage:
-            note("too few runs", "overloads at random: {text}", text=self.shortage)
+            study.say(_TOO_FEW, text=self.shortage)
         currents = [each.value for each in shares.get("current_peak", {}).values()]
         limit = limit_reached(study.drive, currents)
         if limit is not None:
-            note(
-                "random overloads at current limit",
-                "overloads at random: the largest currents are at their limit of {limit}; a harder overload does not "
-                "raise them.",
-                limit=(limit, "A"),
-            )
+            study.say(_AT_LIMIT, limit=limit)
         if self.damaged_batches:
-            note(
-                "runs made anew",
-                "overloads at random: {text}.",
-                text=made_anew(self.damaged_batches, "runs", self.file_name),
-            )
+            study.say(_MADE_ANEW, text=made_anew(self.damaged_batches, "runs", self.file_name))
 
     @property
     def shortage(self) -> str:

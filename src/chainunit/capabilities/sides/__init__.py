@@ -35,7 +35,7 @@ class SidesCapability(Capability):
         """The limits of two bars in place of chains."""
         from . import page
 
-        return page.up_to_speed(s)
+        return page.up_to_speed(s, study)
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """The organs in motion."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...core.quantities import Layout
+from ...core.quantities import Layout, finite
 from ...machines.chain_unit import SIDES
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import cited, number
 from ...report.lines import Line, capital
 from ...report.pictures import Pictures
 from ...study.load_cases import OverloadFactors
@@ -26,51 +27,46 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _factors(s: b.Source, study: StudyRecord) -> b.Table:
-    sides = s.result["organs"]["overload_factors"]
-    descriptions = {v.name: v.description for v in Layout(OverloadFactors).variables}
-    first = next(iter(sides))
-    rows = (
-        b.TableRow(
-            (
-                descriptions[name],
-                *(s.number(f"organs.overload_factors.{side}.{name}") for side in sides),
-                s.words(f"organs.overload_factors.{first}.{name}.for"),
-            )
-        )
-        for name in sides[first]
-    )
+    sides = cited(OrganFindings.of_study(study), "findings.organs").overload_factors
     by = f", of {words}" if (words := study.drive.machine.in_place) else ""
     title = s.line("Overload factor, one side against both, at {=run.crank_speed:4}" + by)
+    first = next(iter(sides.values()))
+    rows = (
+        b.TableRow(
+            (v.description, *(number(factors[v.name].value) for factors in sides.values()), first[v.name].use)
+        )
+        for v in Layout(OverloadFactors).variables
+    )
     return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
 
 def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    limits = OrganFindings.of_study(study).limits
     swing = "Rocker swings from {organs.limits.rocker_extreme_left} to {organs.limits.rocker_extreme_right}; margin "
     yield b.Text(s.line(swing + "{organs.limits.margin}."), form="short")
     web = "with two bars a web" if study.drive.machine.in_place else "a web"
     cases = [
         f"{case}, {web} "
-        + (
-            f"first goes slack at {{organs.limits.{name}}} of the crank"
-            if s.value(f"organs.limits.{name}")
-            else "is slack at rest"
+        + (f"first goes slack at {{organs.limits.{name}}} of the crank" if speed else "is slack at rest")
+        for case, name, speed in (
+            ("with this feed", "slack_speed", limits.slack_speed),
+            ("empty", "slack_speed_empty", limits.slack_speed_empty),
         )
-        for case, name in (("with this feed", "slack_speed"), ("empty", "slack_speed_empty"))
-        if s.value(f"organs.limits.{name}") is not None
+        if finite(speed) is not None
     ]
-    if s.value("organs.limits.chain_resonance") is not None:
+    if finite(limits.chain_resonance) is not None:
         cases.append("the lowest mode of a chain lies near {organs.limits.chain_resonance}")
     if cases:
         yield b.Text(s.line(capital("; ".join(cases)) + "."))
     yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Limits of the model", form="long")
 
 
-def up_to_speed(s: b.Source) -> Iterator[Line]:
+def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[Line]:
     """The crank speeds up to which two bars stand for chains; nothing where no run has two bars."""
-    verdict = s.result["verdict"]["model"]
-    if "organs" not in s.result or verdict is None:
+    findings, verdict = OrganFindings.found_in(study), study.verdict
+    if findings is None or verdict is None:
         return
-    if verdict["model"] != "two bars":
+    if verdict.model != "two bars":
         yield "No highest speed was computed up to which the numbers hold; the limits of two bars do not apply."
         return
     limits = {
@@ -81,7 +77,7 @@ def up_to_speed(s: b.Source) -> Iterator[Line]:
     parts = [
         words.format(f"{{organs.limits.{name}}}")
         for name, words in limits.items()
-        if s.value(f"organs.limits.{name}") is not None
+        if finite(getattr(findings.limits, name)) is not None
     ]
     if parts:
         yield s.line(f"Speed of the crank, for two bars in place of chains: {'; '.join(parts)}.")
@@ -110,7 +106,7 @@ def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
         if mode is not None and _GOOD[of] * mode < sides.speed[-1]:
             yield fig.Shade(_GOOD[of] * mode, float(sides.speed[-1]), "two bars may be off by more than 10 %")
 
-    mode = s.value("organs.limits.chain_resonance")
+    mode = finite(OrganFindings.of_study(study).limits.chain_resonance)
     x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
     axes = {of: fig.Axis(f"{of} torque, peak", "N.m", low=0.0) for of in ("crank", "rocker")}
     caption = (

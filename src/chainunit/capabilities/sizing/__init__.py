@@ -151,7 +151,7 @@ class SizingCapability(Capability):
         """The drive, and the share that it takes of its limits."""
         from . import page
 
-        return page.answer(s)
+        return page.answer(s, study)
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The choice of a drive, with order numbers, of a study whose file gives its motor."""
@@ -165,7 +165,7 @@ class SizingCapability(Capability):
         """The alarm where no motor fits."""
         from . import page
 
-        return page.judgements(s)
+        return page.judgements(study)
 
 
 CAPABILITY = SizingCapability()

@@ -6,7 +6,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,9 +38,12 @@ from ...study.verdict import STEADY
 from ...system import ModelComponent, monolithic
 from ...system.graph import in_line
 from ...work.progress import TaskProgress
+from .candidate import Candidate
 from .coupling import effects
+from .duty import Duty
 from .inverter import boosts
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
+from .table import SizingPlan
 from .task import SizingTask
 from .trial import try_motor
 
@@ -63,10 +67,10 @@ clutch counts as stuck: there it passes 98 % of its setting."""
 
 
 def alternatives(
-    study: StudyRecord, setting: Setting, rig: Rig, progress: TaskProgress
+    study: StudyRecord, setting: Setting, rig: Rig, chosen: ChosenMotor, progress: TaskProgress
 ) -> tuple[Alternative, ...]:
     """The ways to a coupling that saves what the least setting does not, and to one that a start does not open."""
-    return *_in_time(study, setting), *_for_starts(study, setting, rig, progress)
+    return *_in_time(study, setting), *_for_starts(study, setting, rig, chosen, progress)
 
 
 def _in_time(study: StudyRecord, setting: Setting) -> Iterator[Alternative]:
@@ -88,7 +92,7 @@ def _in_time(study: StudyRecord, setting: Setting) -> Iterator[Alternative]:
 
 
 def _for_starts(
-    study: StudyRecord, setting: Setting, rig: Rig, progress: TaskProgress
+    study: StudyRecord, setting: Setting, rig: Rig, chosen: ChosenMotor, progress: TaskProgress
 ) -> tuple[Alternative, ...]:
     """The ways for a sized drive that starts direct on line, if the start decides its setting and an overload would
     open a coupling that running alone allows. A way whose run fails is left out."""
@@ -97,9 +101,9 @@ def _for_starts(
     if not setting.opened_by(setting.least_in_running) or StartAnalysis.name not in study.findings:
         return ()
     makers: tuple[Callable[[StudyRecord, Rig, Setting], Alternative | None], ...] = (
-        _soft_starter,
-        _inverter,
-        _slip_clutch,
+        partial(_soft_starter, chosen=chosen),
+        partial(_inverter, chosen=chosen),
+        partial(_slip_clutch, chosen=chosen),
         _higher,
         _before_flywheel,
     )
@@ -130,19 +134,28 @@ _Trial = tuple[Rig, float, dict[str, float], DriveTables]
 """A rig with a starter, the time after which its start-up counts as failed [s], its numbers, and its tables."""
 
 
-def _permits(study: StudyRecord, rig: Rig, tables: DriveTables, starts: Sequence[StartNumbers]) -> bool:
-    """Whether a relay and the chosen motor, by each limit of its choice with the margin, permit these `starts`."""
-    sizing: Any = study.findings["sizing"]  # by its name, as its module reads this one
-    config = study.config
-    task = SizingTask(sizing.plan, tables, config.machine, rig.operation, config.events)
-    trial = try_motor(task, sizing.best.motor, rig.drive, sizing.duty, rig.files)
-    tried = dataclasses.replace(trial, starts=starts).result()
-    has_relay = tried.start_class is None or tried.start_class <= HEAVIEST
-    return has_relay and dataclasses.replace(sizing.best, drive=rig.drive, trial=tried).keeps_margin
+@dataclasses.dataclass(frozen=True)
+class ChosenMotor:
+    """The candidate that was chosen, with the plan and the duty of the choice."""
+
+    plan: SizingPlan
+    duty: Duty
+    candidate: Candidate
+
+    def permits(
+        self, study: StudyRecord, rig: Rig, tables: DriveTables, starts: Sequence[StartNumbers]
+    ) -> bool:
+        """Whether a relay and the motor, by each limit of its choice with the margin, permit these `starts`."""
+        config = study.config
+        task = SizingTask(self.plan, tables, config.machine, rig.operation, config.events)
+        trial = try_motor(task, self.candidate.motor, rig.drive, self.duty, rig.files)
+        tried = dataclasses.replace(trial, starts=starts).result()
+        has_relay = tried.start_class is None or tried.start_class <= HEAVIEST
+        return has_relay and dataclasses.replace(self.candidate, drive=rig.drive, trial=tried).keeps_margin
 
 
 def _gentlest(
-    trials: Iterator[_Trial], study: StudyRecord, goal: float, limit: float
+    trials: Iterator[_Trial], study: StudyRecord, chosen: ChosenMotor, goal: float, limit: float
 ) -> tuple[Rig, list[StartNumbers], dict[str, float]] | None:
     """The first of the `trials` whose starts take at most the time `limit` [s], are permitted, and put at most `goal`
     [N m] on the coupling, or else the one with the gentlest starts. None if none is permitted."""
@@ -157,7 +170,7 @@ def _gentlest(
             probes.append((probe.coupling_torque, trial))
             continue
         starts = starts_from_all(trial[0], trial[1], events)
-        if _permits(study, trial[0], trial[3], starts):
+        if chosen.permits(study, trial[0], trial[3], starts):
             full.append((trial[0], starts, trial[2]))
             if hardest(starts) <= goal:
                 return full[-1]
@@ -165,7 +178,7 @@ def _gentlest(
             angle = max(starts, key=lambda start: start.coupling_torque).angle
     for _, trial in sorted(probes, key=lambda probe: probe[0]):
         starts = starts_from_all(trial[0], trial[1], events)
-        if _permits(study, trial[0], trial[3], starts):
+        if chosen.permits(study, trial[0], trial[3], starts):
             full.append((trial[0], starts, trial[2]))
             break
     return min(full, key=lambda trial: hardest(trial[1]), default=None)
@@ -184,7 +197,7 @@ def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **
     )
 
 
-def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
+def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMotor) -> Alternative:
     """The same motor with a soft starter; at its full voltage the drive is that of the study."""
     tables = study.config.drive
     assert study.plate is not None and study.start is not None
@@ -203,7 +216,7 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative
             )
             yield soft, usual + time, {"voltage": voltage, "ramp": time}, own
 
-    best = _gentlest(rigs(), study, setting.running, starting(None, plate).limit)
+    best = _gentlest(rigs(), study, chosen, setting.running, starting(None, plate).limit)
     if best is None:
         return Alternative(Way.SOFT_STARTER, WayNumbers.of(), {})
     _, starts, numbers = best
@@ -232,7 +245,7 @@ def _opened(overloads: Mapping[str, float], numbers: WayNumbers) -> dict[str, fl
     return {name: torque for name, torque in overloads.items() if torque > numbers.setting}
 
 
-def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
+def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMotor) -> Alternative:
     """The same motor and gear with an inverter, which keeps the speed better: its running and its overloads are those
     of runs of its own."""
     tables = study.config.drive
@@ -254,7 +267,7 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
             yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, own
 
     for boost in boosts(tables.starter.inverter.boost, "starter.inverter.boost" in tables.given):
-        best = _gentlest(rigs(boost), study, setting.running, math.inf)
+        best = _gentlest(rigs(boost), study, chosen, setting.running, math.inf)
         if best is not None:
             break
     else:
@@ -334,7 +347,7 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     return join(pieces).assign_attrs(slip_time=slip_time)
 
 
-def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
+def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMotor) -> Alternative | None:
     """A slip clutch with the setting that running alone allows, in a start from the angle from which the direct start
     takes longest: there the load is largest. It slips in the overloads as well."""
     capacity = setting.least_in_running
@@ -348,7 +361,7 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative 
     time = run["time"].values
     heat, end = float(np.trapezoid(run["motor.heat"].values, time)), float(time[-1])
     slipping = dataclasses.replace(slowest, start_time=end, heat=heat, followed=end)
-    if not _permits(study, rig, study.config.drive, [slipping]):
+    if not chosen.permits(study, rig, study.config.drive, [slipping]):
         return left_out
     numbers = WayNumbers.of(
         setting=capacity,

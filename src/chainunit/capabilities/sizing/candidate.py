@@ -280,6 +280,11 @@ class Candidate:
         """Ratio of the gear."""
         return self.drive.ratio
 
+    @property
+    def gear_words(self) -> str:
+        """The gear, and the series of its ratio."""
+        return f"{self.gear}, {self.series}" if self.series else self.gear
+
     @derived()
     def gear(self) -> str:
         """The gear."""

@@ -6,22 +6,13 @@ from collections.abc import Mapping, Sequence
 
 from ...core.descriptions import of_driver
 from ...core.quantities import variables
-from ...reading.text import number
+from ...reading.text import aside, number
 from ...study.coupling import TRIPS_IN_TRANSIENT, at_motor_shaft, hardest_start, transient_of_starts
 from ...study.event_torques import running_peak, running_words
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
 from ...study.starts import transient_words
-from .protection import (
-    MARGIN,
-    Alternative,
-    CouplingEffect,
-    Obstacle,
-    Setting,
-    Way,
-    WayNumbers,
-    spares,
-)
+from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
 
 
 def _torque(value: float) -> str:
@@ -77,7 +68,7 @@ def why_none(setting: Setting) -> str:
 def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative] = ()) -> str:
     """A sentence on the recommended torque limiter of a sized drive and its effect in the overloads, or on
     the reason why no coupling protects the drive."""
-    caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
+    caveat = aside(study.verdict.caveat if study.verdict else None)
     hardest, running = hardest_start(study), running_peak(study)
     start = hardest.named(study)
     by = " by load and acceleration" if setting.is_of_start else ""

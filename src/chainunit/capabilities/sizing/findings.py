@@ -19,7 +19,8 @@ from ...study.drive import Drive
 from ...study.drive_tables import DriveTables
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
-from .alternatives import alternatives
+from ...study.remark import fault, note, warning
+from .alternatives import ChosenMotor, alternatives
 from .candidate import Candidate, Flywheel, Standing
 from .coupling import coupling_of, recommended_setting
 from .duty import Duty
@@ -29,7 +30,7 @@ from .gear_tables import with_gear
 from .parts import OrderedPart, PartsList, parts_list
 from .preference import order_words, poles_rank
 from .protection import Alternative, Obstacle, Setting
-from .result import drive_protection, ordered_belt, ordered_gear, ordered_inverter
+from .result import SizedDrive, drive_protection, ordered_belt, ordered_gear, ordered_inverter
 from .table import Sizing, SizingPlan
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
@@ -145,6 +146,7 @@ class SizingFindings(Findings):
             as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
             self.answer,
+            lambda study: self.sized(study).sentence,
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,
@@ -184,34 +186,36 @@ class SizingFindings(Findings):
         return listed
 
     def data(self, study: StudyRecord) -> dict[str, Any]:
-        """Its declared parts, with the gear to order and the protection."""
-        setting, rated = self.coupling(study), self.best.motor.nameplate.rated_current
-        ordered: dict[str, Any] = {
-            "gear": ordered_gear(study, setting, self.plan, self.best.trial.inertia_factor),
-            "protection": drive_protection(study, setting, self.alternatives, rated),
-        }
-        others = {
-            "belt": ordered_belt(study, self.plan, self.best.trial),
-            "inverter": ordered_inverter(study),
-            "parts": self.parts(study, setting),
-        }
-        ordered |= {name: each for name, each in others.items() if each is not None}
-        return super().data(study) | {
-            name: {} if each is None else as_data(each, titled=True, driver=study.driver_noun)
-            for name, each in ordered.items()
-        }
+        """Its declared parts, with the parts to order and the protection."""
+        return super().data(study) | as_data(self.sized(study), driver=study.driver_noun)
+
+    def sized(self, study: StudyRecord) -> SizedDrive:
+        """The drive with its protection by the runs of the study."""
+        setting, trial = self.coupling(study), self.best.trial
+        return SizedDrive(
+            self.best,
+            bool(study.insufficient),
+            study.driver_noun,
+            study.verdict.caveat if study.verdict else None,
+            gear=ordered_gear(study, setting, self.plan, trial.inertia_factor),
+            protection=drive_protection(
+                study, setting, self.alternatives, self.best.motor.nameplate.rated_current
+            ),
+            belt=ordered_belt(study, self.plan, trial),
+            inverter=ordered_inverter(study),
+            parts=self.parts(study, setting),
+        )
 
     def remark(self, study: StudyRecord) -> None:
         """Add the notes on the choice, and one on each ram of a linkage at the recommended coupling."""
         for text in self.notes:
-            study.note("sizing", "{text}", text=text)
+            study.say(_CHOICE, text=text)
         if study.insufficient:
-            study.warn("insufficient motor", "{answer}. All runs are with it.", answer=self.answer)
+            study.say(_INSUFFICIENT, answer=self.answer)
         setting = self.coupling(study)
         self._remark_on_gear(study, setting)
         if study.statics.modes is not None:
-            rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
-            study.note("sized without line", rigid)
+            study.say(_WITHOUT_LINE)
         if setting is not None and setting.obstacle in (None, Obstacle.RELEASE):
             # this is the setting that the answer names, recommended or not
             remark_on_rams(study, setting.least)
@@ -239,18 +243,30 @@ class SizingFindings(Findings):
         if sold is None or needed is None:
             return
         order, remedy = needed
-        study.warn(
-            "gear too weak",
-            "The gear {gear} permits {limit} in running and {start} in a start or an overload; {case} puts {torque} "
-            "on it. A gear that permits {rated} in running carries it: {remedy}.",
+        study.say(
+            _GEAR_TOO_WEAK,
             gear=sold.designation,
-            limit=(sold.transmission.torque_limit, "N.m"),
-            start=(sold.transmission.start_limit, "N.m"),
+            limit=sold.transmission.torque_limit,
+            start=sold.transmission.start_limit,
             case=order.decides.words,
-            torque=(order.decides.torque, "N.m"),
-            rated=(order.rated, "N.m"),
-            remedy=remedy,
+            torque=order.decides.torque,
+            rated=order.rated,
+            way=remedy,
         )
+
+
+_CHOICE = note("sizing", "{text}")
+_INSUFFICIENT = fault("insufficient-motor", "{answer}. All runs are with it.")
+_WITHOUT_LINE = note(
+    "sized-without-line",
+    "Sizing took the shafts as rigid and the driveline as massless. The runs include the line.",
+)
+_GEAR_TOO_WEAK = warning(
+    "gear-too-weak",
+    "The gear {gear} permits {limit} in running and {start} in a start or an overload. {case} puts {torque} on it.",
+    remedy="A gear that permits {rated} in running carries it ({way}).",
+    sizes={"N.m": "limit start torque rated"},
+)
 
 
 class ProtectionAnalysis(Analysis):
@@ -270,4 +286,5 @@ class ProtectionAnalysis(Analysis):
         sizing = SizingFindings.of_study(study)
         sizing.setting = recommended_setting(study, sizing.couplings)
         if sizing.setting is not None:
-            sizing.alternatives = alternatives(study, sizing.setting, work.rig, work.progress)
+            chosen = ChosenMotor(sizing.plan, sizing.duty, sizing.best)
+            sizing.alternatives = alternatives(study, sizing.setting, work.rig, chosen, work.progress)

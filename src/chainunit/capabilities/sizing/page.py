@@ -3,133 +3,141 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from ...core.descriptions import of_driver
+from ...core.quantities import finite
 from ...report import blocks as b
-from ...report.lines import Aside, Line, Number, Strong, capital, join, line, spoken
+from ...report.cited import cited, number, table
+from ...report.lines import Aside, Line, Strong, capital, join, line, spoken
+from ...study.limits import Check
 from ...study.record import StudyRecord
-from .candidate import Standing
+from .candidate import Candidate, DriveNumbers, Standing
+from .findings import SizingFindings
+from .result import DriveProtection, MotorProtection, OrderedBelt, SizedDrive
 
 _REASONS = 5  # of the candidates that do not fit; the table has all
 _SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.BARELY: "△"}
-_SEVERITY: dict[str, b.Severity] = {
+_SEVERITY: dict[Standing | None, b.Severity] = {
     Standing.CHOSEN: "good",
     Standing.FITS: "partly",
     Standing.BARELY: "partly",
 }
+_TRIP_TORQUE = "torque limiter, trip torque at the {driver}"
 
 
-def answer(s: b.Source) -> Iterator[b.Block]:
+def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Cards with the motor of all runs, its gear, flywheel and protection, and a table of the share that this drive
     takes of each limit."""
-    path = _best_path(s)
-    if path is None:
+    findings = SizingFindings.found_in(study)
+    if findings is None:
         return
-    motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, as_given=True)
-    also = {"flywheel": _disc, "protection": _protection}
-    gear = (*_gear(s, path), *_belt(s), *_gear_torque(s))
+    drive, x = findings.sized(study), cited(findings, "findings.sizing")
+    sized, best = cited(drive, "findings.sizing"), x.candidates[0]
+    gear = (_gear(findings.best, best), *_belt(sized.belt), *_gear_torque(sized))
+    ratio = number(best.ratio, 4, as_given=True)
     cards = [
-        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), (*_data(s), *_starter(s, path))),
+        b.Card(
+            "Motor",
+            ((best.designation, str(findings.best.verdict)),),
+            (*_data(s), *_starter(s, sized, best.numbers)),
+        ),
         b.Card("Gear ratio", ((ratio, f"motor turns per {s.driver} turn"),), gear),
-        *(
-            b.Card(capital(name), ((size or "none", title),), tuple(also[name](s)))
-            for name, title, size in _sizes(s)
+        b.Card(
+            "Flywheel",
+            ((number(x.flywheel.J) if findings.best.disc else "none", "flywheel on the motor shaft"),),
+            tuple(_disc(findings.best, best)),
         ),
     ]
+    protection: Any = sized.protection
+    if isinstance(drive.protection, MotorProtection):
+        setting = number(protection.relay_current), drive.protection.relay_current.title
+        cards.append(b.Card("Protection", (setting,)))
+    elif isinstance(drive.protection, DriveProtection):
+        torque: Line = number(protection.trip_torque) if drive.protection.trip_torque else "none"
+        limiter = torque, of_driver(_TRIP_TORQUE, s.driver)
+        cards.append(b.Card("Protection", (limiter,), tuple(_protection(drive.protection, protection))))
     yield b.Cards(tuple(cards))
-    yield from _parts(s)
-    checks = b.at(s.result, f"{path}.checks")
-    rows = tuple(
-        b.TableRow((capital(check.get("title", spoken(name))), s.check(f"{path}.checks.{name}")))
-        for name, check in checks.items()
+    yield from _parts(drive, sized)
+    one_sided = " and the feed on one side at times" if findings.duty.larger else ""
+    checks = findings.best.checks
+    yield from table(
+        checks,
+        ("check", lambda key: capital(checks[key].title)),
+        ("share", lambda key: _share(checks[key], best.checks[key])),
+        title=f"Share of each limit (the line in the bar) in the duty of sizing, with the worst start{one_sided}",
+        numeric=False,
+        form="long",
     )
-    if rows:
-        one_sided = " and the feed on one side at times" if s.result["sizing"].get("one_sided") else ""
-        title = f"Share of each limit (the line in the bar) in the duty of sizing, with the worst start{one_sided}"
-        yield b.Table(rows, b.heads("check", "share"), title=title, numeric=False, form="long")
 
 
-def _parts(s: b.Source) -> Iterator[b.Block]:
+def _share(check: Check, x: Check) -> b.Share:
+    """The cell of a check, cited as `x`. It stands out if it is over its limit."""
+    if check.reason is not None:
+        return b.Share(number(x.utilisation, none="none permitted", over=True), x.reason or "")
+    over = (finite(check.utilisation) or 0.0) > 1.0
+    of = line(number(x.value), " of ", number(x.limit))
+    return b.Share(number(x.utilisation, none="no value", over=over), of)
+
+
+def _parts(drive: SizedDrive, x: SizedDrive) -> Iterator[b.Block]:
     """The parts to order from catalogues, with what these leave open."""
-    listed = s.result["sizing"].get("parts")
-    if not listed:
+    if drive.parts is None or x.parts is None:
         words = (
             "Order numbers: none, as motor and gear are typical data that nobody sells; order by these values, or "
             "give catalogues of makers (catalogue = [...])."
         )
         yield b.Text(words, "note", "long")
         return
-    rows = []
-    for k, each in enumerate(listed["parts"]):
-        path = f"sizing.parts.parts.{k}"
-        number = s.words(f"{path}.order_number") if each["order_number"] else "-"
-        price = s.number(f"{path}.price", as_given=True, none="-")
-        rows.append(b.TableRow((capital(each["part"]), s.words(f"{path}.designation"), number, price)))
-    if len(rows) > 1 and listed["total"]["value"] is not None:
-        rows.append(
-            b.TableRow(("These parts together", "", "", s.number("sizing.parts.total", as_given=True)))
+    rows = [
+        b.TableRow(
+            (
+                capital(item.kind),
+                each.designation,
+                each.order_number if item.order_number else "-",
+                number(each.price, as_given=True, none="-"),
+            )
         )
+        for item, each in zip(drive.parts.items, x.parts.items, strict=True)
+    ]
+    if len(rows) > 1 and drive.parts.total is not None:
+        rows.append(b.TableRow(("These parts together", "", "", number(x.parts.total, as_given=True))))
     columns = b.heads("part", "designation", "order number", "price")
     yield b.Table(tuple(rows), columns, title="Parts to order", numeric=False, form="long")
-    sources = {each["source"]: f"sizing.parts.parts.{k}.source" for k, each in enumerate(listed["parts"])}
-    named = join(s.words(path) for path in sources.values())
-    yield b.Text(line("Source of their values: ", *named, "."), "note", "long")
-    yield from (b.Text(each, form="long") for each in s.lines("sizing.parts.open"))
+    sources = {item.source: each.source for item, each in zip(drive.parts.items, x.parts.items, strict=True)}
+    yield b.Text(line("Source of their values: ", *join(sources.values()), "."), "note", "long")
+    yield from (b.Text(each, form="long") for each in x.parts.open)
 
 
-def _how_to_order(s: b.Source, k: int) -> Iterator[Line]:
+def _how_to_order(drive: SizedDrive, x: SizedDrive, k: int) -> Iterator[Line]:
     """Order number and price of a part of a catalogue, as far as it has them."""
-    parts, path = s.result["sizing"].get("parts", {}).get("parts", ()), f"sizing.parts.parts.{k}"
-    if k < len(parts):
-        if parts[k]["order_number"]:
-            yield line(", order number ", s.words(f"{path}.order_number"))
-        if parts[k]["price"]["value"] is not None:
-            yield line(", price ", s.number(f"{path}.price", as_given=True))
+    if drive.parts is not None and x.parts is not None and k < len(drive.parts.items):
+        if drive.parts.items[k].order_number:
+            yield line(", order number ", x.parts.items[k].order_number)
+        if drive.parts.items[k].price is not None:
+            yield line(", price ", number(x.parts.items[k].price, as_given=True))
 
 
-def judgements(s: b.Source) -> Iterator[b.Block]:
+def judgements(study: StudyRecord) -> Iterator[b.Block]:
     """The alarm where no motor fits."""
-    nearest = s.result.get("sizing", {}).get("nearest")
-    if nearest is not None:
-        best = f"sizing.candidates.{nearest}"
-        rest = f" All runs are with {{{best}.motor}}, which is insufficient: {{{best}.reason}}."
-        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), s.line(rest)), form="long")
+    findings = SizingFindings.found_in(study)
+    if findings is not None and findings.nearest is not None:
+        best = cited(findings, "findings.sizing").candidates[0]
+        rest = line(" All runs are with ", best.designation, ", which is insufficient: ", best.reason, ".")
+        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), rest), form="long")
 
 
-def _best_path(s: b.Source) -> str | None:
-    """The path of the candidate whose motor all runs use: the chosen one, else the nearest one; None without any."""
-    section = s.result.get("sizing", {})
-    best = section.get("nearest") if section.get("chosen") is None else section["chosen"]
-    return None if best is None else f"sizing.candidates.{best}"
-
-
-def _sizes(s: b.Source) -> Iterator[tuple[str, str, Number | None]]:
-    """The leading numbers of the flywheel and of the protection: section, title, number; None where there is no
-    flywheel or no coupling."""
-    for section in ("flywheel", "protection"):
-        leading = _leading(s.result["sizing"].get(section))
-        if leading:
-            size = s.number(f"sizing.{section}.{leading}")
-            yield (
-                section,
-                s.result["sizing"][section][leading].get("title", spoken(leading)),
-                size if size.value else None,
-            )
-
-
-def _gear(s: b.Source, candidate: str) -> Iterator[Line]:
+def _gear(candidate: Candidate, x: Candidate) -> Line:
     """The gear unit of a candidate, and the series of its ratio."""
-    if b.at(s.result, f"{candidate}.gear"):
-        series = b.at(s.result, f"{candidate}.series")
-        yield line(s.words(f"{candidate}.gear"), *((", ", s.words(f"{candidate}.series")) if series else ()))
+    return line(x.gear, *((", ", x.series) if candidate.series else ()))
 
 
-def _disc(s: b.Source, flywheel: str = "sizing.flywheel") -> Iterator[Line]:
-    """The steel disc of a flywheel."""
-    mass = b.at(s.result, f"{flywheel}.mass")
-    if mass and mass["value"] is not None:
-        yield s.line(f"steel disc {{{flywheel}.mass}}, {{{flywheel}.diameter}} in diameter")
+def _disc(candidate: Candidate, x: Candidate) -> Iterator[Line]:
+    """The steel disc of the flywheel of a candidate."""
+    if candidate.disc is not None:
+        wheel = x.flywheel_numbers
+        yield line("steel disc ", number(wheel.mass), ", ", number(wheel.diameter), " in diameter")
 
 
 def _data(s: b.Source) -> Iterator[Line]:
@@ -137,28 +145,28 @@ def _data(s: b.Source) -> Iterator[Line]:
     if "rated_power" in s.result.get("motor", {}):
         names = ("rated_speed", "rated_torque", "rated_current")
         parts = "{=motor.rated_power}, {=motor.poles} poles, {=motor.rated_voltage}, {=motor.rated_frequency}"
-        yield join((s.line(parts), *(s.number(f"motor.{name}") for name in names)), ", ")
+        yield join((s.line(parts), *(s.line(f"{{motor.{name}}}") for name in names)), ", ")
 
 
-def _gear_torque(s: b.Source) -> Iterator[Line]:
+def _gear_torque(x: SizedDrive) -> Iterator[Line]:
     """The rated torque of the gear to be ordered."""
-    if s.result["sizing"].get("gear"):
-        order = s.line("gear with a rated output torque >= {sizing.gear.rated_torque}")
-        yield line(order, ", decided by ", s.words("sizing.gear.decided_by"))
+    if x.gear is not None:
+        order = line("gear with a rated output torque >= ", number(x.gear.rated_torque))
+        yield line(order, ", decided by ", x.gear.decided_by)
 
 
-def _belt(s: b.Source) -> Iterator[Line]:
+def _belt(x: OrderedBelt | None) -> Iterator[Line]:
     """The belt to be ordered."""
-    if "belt" in s.result["sizing"]:
-        yield s.line(
-            "V-belt with a design power of {sizing.belt.design_power} (rated power of the motor times the belt "
-            "service factor {sizing.belt.service_factor}), belt speed {sizing.belt.speed}, "
-            "ratio {sizing.belt.ratio}, pulleys of {sizing.belt.small_pulley} and {sizing.belt.large_pulley} "
-            "(pitch diameters)"
+    if x is not None:
+        yield line(
+            *("V-belt with a design power of ", number(x.design_power)),
+            *(" (rated power of the motor times the belt service factor ", number(x.service_factor)),
+            *("), belt speed ", number(x.speed), ", ratio ", number(x.ratio)),
+            *(", pulleys of ", number(x.small_pulley), " and ", number(x.large_pulley), " (pitch diameters)"),
         )
 
 
-def _starter(s: b.Source, path: str) -> Iterator[Line]:
+def _starter(s: b.Source, x: SizedDrive, numbers: DriveNumbers) -> Iterator[Line]:
     """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
     start = s.result["start"] if "starter" in s.result else "direct"
     if start == "soft":
@@ -167,16 +175,16 @@ def _starter(s: b.Source, path: str) -> Iterator[Line]:
         yield s.line("star-delta starter, {=starter.star_delta.time} in star")
         yield _winding(s)
     elif start == "inverter":
-        is_ordered = "inverter" in s.result["sizing"] and _starts(s, path)
-        current = s.line(" of at least {sizing.inverter.rated_current}") if is_ordered else ()
+        starts = number(numbers.inverter_current).value is not None
+        current = line(" of at least ", number(x.inverter.rated_current)) if x.inverter and starts else ()
         yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))
-        if _starts(s, path):
-            yield s.line(f"in running {{{path}.numbers.frequency}}, {{{path}.numbers.speed}}")
+        if starts:
+            yield line("in running ", number(numbers.frequency), ", ", number(numbers.speed))
 
 
 def _winding(s: b.Source) -> str:
     """The winding that a start in star and delta needs: one for the voltage of the supply in delta."""
-    supply = s.value("motor.rated_voltage") or 0.0
+    supply = float(b.at(s.result, "motor.rated_voltage")["value"] or 0.0)
     in_star, other = (
         10.0 * round(supply * factor / 10.0) for factor in (math.sqrt(3.0), 1.0 / math.sqrt(3.0))
     )
@@ -186,140 +194,92 @@ def _winding(s: b.Source) -> str:
     )
 
 
-def _starts(s: b.Source, path: str) -> bool:
-    return s.value(f"{path}.numbers.inverter_current") is not None
-
-
-def _protection(s: b.Source) -> Iterator[Line]:
+def _protection(protection: DriveProtection, x: Any) -> Iterator[Line]:
     """The reason where there is no coupling, or its setting at the motor's shaft; and the relay."""
-    protection = s.result["sizing"]["protection"]
-    if protection.get("why_none"):
-        yield line("no torque limiter: ", s.words("sizing.protection.why_none"))
-    elif "trip_torque_at_motor" in protection:
-        yield s.line("{sizing.protection.trip_torque_at_motor} at the motor's shaft")
-    yield from _relay(s)
+    if protection.why_none:
+        yield line("no torque limiter: ", x.why_none)
+    else:
+        yield line(number(x.trip_torque_at_motor), " at the motor's shaft")
+    yield _relay(protection.relay, x.relay)
 
 
-def _relay(s: b.Source) -> Iterator[Line]:
-    """The setting and the class of the relay, where it is not the leading number of the protection."""
-    protection = s.result["sizing"].get("protection", {})
-    if "relay_current" in protection and _leading(protection) != "relay_current":
-        setting = s.line(f"{protection.get('device', 'relay')} at {{sizing.protection.relay_current}}")
-        if "line_current" in protection:
-            setting = line(setting, s.line(" (in the supply line {sizing.protection.line_current})"))
-        yield line(setting, _class(s))
-
-
-def _class(s: b.Source) -> Line:
-    """The trip class of the relay, to follow its setting; empty for the motor protection of an inverter."""
-    protection = s.result["sizing"].get("protection", {})
-    if "relay_class" not in protection:
-        return ()
-    tolerance = Aside(s.words("sizing.protection.tolerance")) if protection.get("tolerance") else ()
-    return line(", ", s.words("sizing.protection.relay_class.value"), tolerance)
+def _relay(relay: MotorProtection, x: MotorProtection) -> Line:
+    """The setting and the class of the relay."""
+    setting = line(f"{relay.device} at ", number(x.relay_current))
+    if x.line_current is not None:
+        setting = line(setting, " (in the supply line ", number(x.line_current), ")")
+    return line(setting, relay.class_words)
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The choice, the candidates with the share that each takes of the limits, and the demands on the drive."""
-    section = s.result["sizing"]
-    choice, candidates = section.get("chosen"), section.get("candidates")
-    best = _best_path(s)
-    if choice is None and candidates:
-        reasons = (
-            line(
-                Strong(s.words(f"sizing.candidates.{i}.motor")),
-                ": ",
-                s.words(f"sizing.candidates.{i}.reason"),
-            )
-            for i in range(min(_REASONS, len(candidates)))
-        )
+    findings = SizingFindings.of_study(study)
+    drive, x = findings.sized(study), cited(findings, "findings.sizing")
+    sized = cited(drive, "findings.sizing")
+    if findings.chosen is None:
+        reasons = (line(Strong(each.designation), ": ", each.reason) for each in x.candidates[:_REASONS])
         words = Strong("No candidate fits. The reasons:")
         yield b.Judgement("alarm", words, items=tuple(reasons), form="long")
-    if best is not None:
-        yield from _best(s, best, "Motor" if choice is not None else "Insufficient motor")
-    if "coupling" in section.get("protection", {}):
-        yield b.Text(s.words("sizing.protection.coupling"))
-        ways = section["protection"]["alternatives"]
-        yield from (b.Text(s.words(f"sizing.protection.alternatives.{k}.words")) for k in range(len(ways)))
-        if ways:
-            yield _ways(s, study)
-    if candidates:
-        if "tried" in section:
-            weak = "; too weak by the nameplate: {=sizing.weak}" if s.value("sizing.weak") else ""
-            trials = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
-            yield b.Text(s.line(f"{trials}{weak}."))
-        plan = study.config.plans["sizing"]
-        row_count = len(candidates) if plan is None else int(plan.demands.candidates)
-        yield from _trade(s)
-        yield _candidates(s, row_count)
-        yield from _gears(s)
-        if len(candidates) > row_count:
-            yield b.Text(
-                f"{len(candidates) - row_count} more were tried; report.html lists them.", form="short"
-            )
-    if "order" in section:
-        order = "; ".join(f"{i}. {words}" for i, words in enumerate(section["order"], 1))
-        yield b.Text(f"Order of preference among drives that fit: {order}.", form="long")
-    tables = []
+    yield from _best(s, drive, sized, x.candidates[0])
+    if isinstance(drive.protection, DriveProtection):
+        protection: Any = sized.protection
+        yield b.Text(protection.coupling)
+        yield from (b.Text(way.words) for way in protection.alternatives)
+        yield from _ways(study, drive.protection, protection)
+    weak = line("; too weak by the nameplate: ", number(x.weak, as_given=True)) if findings.weak else ()
+    tried, motors = (number(count, as_given=True) for count in (x.tried, x.motors))
+    yield b.Text(line("Tried: ", tried, " of ", motors, " motors of the catalogue", weak, "."))
+    row_count = int(findings.plan.demands.candidates)
+    yield from _trade(findings, x)
+    yield _candidates(findings, x, row_count)
+    yield from _gears(findings, x)
+    if len(findings.candidates) > row_count:
+        yield b.Text(
+            f"{len(findings.candidates) - row_count} more were tried; report.html lists them.", form="short"
+        )
+    order = "; ".join(f"{i}. {words}" for i, words in enumerate(findings.order, 1))
+    yield b.Text(f"Order of preference among drives that fit: {order}.", form="long")
+    yield b.Tables(tuple(_numbers(s, study, findings)))
+
+
+def _numbers(s: b.Source, study: StudyRecord, findings: SizingFindings) -> Iterator[b.Table]:
+    """A table of the numbers of each part of the result."""
     # a machine without sides has no one-sided feed
-    side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
-    if all(_sold(candidate) is None for candidate in candidates or ()):
+    left_out = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
+    if all(candidate.sold is None for candidate in findings.candidates):
         # it is a demand on gears of a catalogue
-        side_keys = (*side_keys, "gear_torque")
+        left_out = (*left_out, "gear_torque")
+    section = s.result["sizing"]
     for name in ("asked", "cycle", "flywheel", "belt", "gear", "inverter", "protection"):
         # the sentences on the coupling are too long for a cell of a narrow table, and stand above with the ways to it
         leaves = [
             leaf
             for key, below in (section.get(name) or {}).items()
-            if (not isinstance(below, str) or key == "section") and key not in (*side_keys, "alternatives")
+            if (not isinstance(below, str) or key == "section") and key not in (*left_out, "alternatives")
             for leaf in _leaves(below, f"sizing.{name}.{key}", spoken(key))
         ]
         rows = tuple(b.TableRow((title, _leaf(s, path))) for title, path in leaves)
         if rows:
-            tables.append(b.Table(rows, title=capital(spoken(name))))
-    yield b.Tables(tuple(tables))
+            yield b.Table(rows, title=capital(spoken(name)))
 
 
-def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
-    """The sentences on the motor of all runs and on the reason for it."""
-    ratio = s.number(f"{path}.ratio", digits=4, as_given=True)
-    sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio, _aside(_gear(s, path)))
-    why = s.result["sizing"]["protection"].get("why_none")
-    for name, title, size in _sizes(s):
-        if size is None and name == "flywheel":
-            sentence += line("; no flywheel")
-        elif size is None:
-            sentence += line(
-                "; no torque limiter", Aside(s.words("sizing.protection.why_none")) if why else ()
-            )
-        else:
-            is_relay = name == "protection" and _leading(s.result["sizing"][name]) == "relay_current"
-            more = _aside(_disc(s)) if name == "flywheel" else _class(s) if is_relay else ()
-            sentence += line(f"; {title} ", size, more)
-    sentence = line(sentence, *(line("; ", relay) for relay in _relay(s)))
-    model = s.result["verdict"]["model"]
-    doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
-    begin = "Chosen: " if word == "Motor" else "Insufficient: "
-    yield b.Text(line(sentence, doubt, "."), form="short", central=True)
+def _best(s: b.Source, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Iterator[b.Block]:
+    """The sentences on what is ordered, and on the reason for the choice."""
+    doubt = line(" (", s.words("verdict.model.caveat"), ")") if drive.caveat else ()
     # a motor that does not suffice is not ordered
-    parts = s.result["sizing"].get("parts", {}).get("parts", ())
-    motor = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)]
-    order: list[Line] = [line(each, *_how_to_order(s, 0)) for each in motor]
-    if not any(each["part"] == "gear" for each in parts):
-        order += (*_belt(s), *_gear_torque(s))
-    for k in range(1, len(parts)):
-        named = s.words(f"sizing.parts.parts.{k}.designation")
-        order.append(line(f"{parts[k]['part']} ", named, *_how_to_order(s, k)))
-    order += _starter(s, path)
-    if order and word == "Motor":
+    parts = () if drive.parts is None else drive.parts.items
+    motor = [line("motor ", best.designation, " of ", each) for each in _data(s)]
+    order: list[Line] = [line(each, *_how_to_order(drive, x, 0)) for each in motor]
+    if not any(each.kind == "gear" for each in parts):
+        order += (*_belt(x.belt), *_gear_torque(x))
+    for k, each in enumerate(x.parts.items if x.parts is not None else ()):
+        if k:
+            order.append(line(f"{parts[k].kind} ", each.designation, *_how_to_order(drive, x, k)))
+    order += _starter(s, x, best.numbers)
+    if order and not drive.insufficient:
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
-    yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."), central=True)
-
-
-def _leading(section: Mapping[str, Any] | None) -> str | None:
-    """The name of the leading number of a section: the trip torque, else the first number."""
-    names = [name for name, entry in (section or {}).items() if isinstance(entry, dict) and "value" in entry]
-    return "trip_torque" if "trip_torque" in names else next(iter(names), None)
+    begin = "Insufficient: " if drive.insufficient else "Chosen: "
+    yield b.Text(line(begin, best.reason, doubt, "."), central=True)
 
 
 def _leaves(node: Any, path: str, title: str = "") -> Iterator[tuple[str, str]]:
@@ -343,125 +303,119 @@ def _leaf(s: b.Source, path: str) -> Line:
     return s.number(path, as_given=path.startswith("sizing.asked."), none="none")
 
 
-def _candidates(s: b.Source, row_count: int) -> b.Table:
+def _candidates(findings: SizingFindings, x: SizingFindings, row_count: int) -> b.Table:
     """The table of candidates, best first; the terminal shows the first `row_count` rows."""
-    candidates = s.result["sizing"]["candidates"]
-    checks = _titles(candidates)
-    if any(_sold(candidate) is not None for candidate in candidates):
+    titles = _titles(findings.candidates)
+    if any(candidate.sold is not None for candidate in findings.candidates):
         # the gears have a table of their own
-        checks = {name: title for name, title in checks.items() if not name.startswith("gear")}
-    rows = []
-    for i, candidate in enumerate(candidates):
-        path = f"sizing.candidates.{i}"
-        verdict = candidate["verdict"]
-        motor = line(s.words(f"{path}.motor"), Aside(_behind(s, path)))
-        cells = (s.check(f"{path}.checks.{name}") if name in candidate["checks"] else "" for name in checks)
-        parts = (_flywheel(s, path), _mass(s, path)) if "flywheel" in candidate else ()
-        rows.append(
-            b.TableRow(
-                (motor, s.words(f"{path}.verdict"), *parts, *cells),
-                line(f"{_SIGN.get(verdict, '✗')} ", s.words(f"{path}.reason")),
-                _SEVERITY.get(verdict, "bad"),
-                "both" if i < row_count else "long",
-            )
+        titles = {name: title for name, title in titles.items() if not name.startswith("gear")}
+    rows = [
+        b.TableRow(
+            (
+                line(each.designation, Aside(_behind(candidate, each))),
+                each.verdict or "",
+                _flywheel(candidate, each),
+                number(each.numbers.mass),
+                *(
+                    _share(candidate.checks[name], each.checks[name]) if name in candidate.checks else ""
+                    for name in titles
+                ),
+            ),
+            line(f"{_SIGN.get(candidate.verdict or Standing.REJECTED, '✗')} ", each.reason),
+            _SEVERITY.get(candidate.verdict, "bad"),
+            "both" if i < row_count else "long",
         )
-    title = "Candidates, best first. Cell: the share of its limit that a check takes."
-    more = ("flywheel", "mass") if "flywheel" in candidates[0] else ()
-    long = (b.Column(title, form="long") for title in (*more, *checks.values()))
-    columns = (*b.heads("motor", "verdict"), *long)
-    return b.Table(tuple(rows), columns, title=title, note_title="because", numeric=False)
+        for i, (candidate, each) in enumerate(zip(findings.candidates, x.candidates, strict=True))
+    ]
+    long = (b.Column(title, form="long") for title in ("flywheel", "mass", *titles.values()))
+    return b.Table(
+        tuple(rows),
+        (*b.heads("motor", "verdict"), *long),
+        title="Candidates, best first. Cell: the share of its limit that a check takes.",
+        note_title="because",
+        numeric=False,
+    )
 
 
-def _titles(candidates: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _titles(candidates: Iterable[Candidate]) -> dict[str, str]:
     """The title of each check of the candidates, by name."""
     titles: dict[str, str] = {}
     for candidate in candidates:
-        for name, check in candidate["checks"].items():
-            titles.setdefault(name, check.get("title", spoken(name)))
+        for name, check in candidate.checks.items():
+            titles.setdefault(name, check.title)
     return titles
 
 
-def _gears(s: b.Source) -> Iterator[b.Table]:
+def _gears(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Table]:
     """The gears of the catalogue that were tried with the motors, with the share of each of its limits."""
-    candidates = s.result["sizing"]["candidates"]
-    titles = {name: title for name, title in _titles(candidates).items() if name.startswith("gear")}
+    titles = {n: title for n, title in _titles(findings.candidates).items() if n.startswith("gear")}
     rows = []
-    for i, candidate in enumerate(candidates):
-        path = f"sizing.candidates.{i}"
-        if (k := _sold(candidate)) is None:
+    for candidate, each in zip(findings.candidates, x.candidates, strict=True):
+        if candidate.sold is None:
             continue
-        price = s.number(f"{path}.parts.{k}.price", as_given=True, none="-")
-        checks = candidate["checks"]
-        cells = (s.check(f"{path}.checks.{name}") if name in checks else "not known" for name in titles)
-        gear = s.words(f"{path}.parts.{k}.designation")
-        note = (
-            line("ruled out by the runs with ", s.words(f"{path}.runs_with"))
-            if "runs_with" in candidate
-            else ()
+        gear = each.parts[-1]
+        cells = (
+            _share(candidate.checks[name], each.checks[name]) if name in candidate.checks else "not known"
+            for name in titles
         )
-        rows.append(b.TableRow((gear, s.words(f"{path}.motor"), price, *cells), note))
+        note = line("ruled out by the runs with ", each.runs_with) if each.runs_with is not None else ()
+        price = number(gear.price, as_given=True, none="-")
+        rows.append(b.TableRow((gear.designation, each.designation, price, *cells), note))
     if rows:
-        title = "Gears of the candidates, in their order"
         columns = b.heads("gear", "motor", "price", *titles.values())
-        yield b.Table(tuple(rows), columns, title=title, numeric=False, note_title="because", form="long")
-
-
-def _ways(s: b.Source, study: StudyRecord) -> b.Table:
-    """A row for each way to a coupling that a start does not open."""
-    rows = []
-    for k, way in enumerate(s.result["sizing"]["protection"]["alternatives"]):
-        path = f"sizing.protection.alternatives.{k}"
-        numbers = (
-            s.number(f"{path}.{name}", none="-") for name in ("setting", "running", "start", "start_time")
-        )
-        opens = "; ".join(study.title_of(run) for run in way["opens"]) or "nothing"
-        rows.append(b.TableRow((s.words(f"{path}.way"), *numbers, opens)))
-    columns = b.heads("way", "set to", "running", "a start", "start-up", "opens or slips where")
-    title = (
-        f"Ways to a torque limiter: its setting, and the torques of running and of a start, at the {s.driver}"
-    )
-    return b.Table(tuple(rows), columns, title=title, numeric=False, form="long")
-
-
-def _trade(s: b.Source) -> Iterator[b.Block]:
-    """The smallest drive that fits with a flywheel, beside the next larger motor without one."""
-    rows = []
-    for i in s.result["sizing"].get("trade") or ():
-        path = f"sizing.candidates.{i}"
-        start = s.number(f"{path}.checks.start.value")
-        motor = line(s.words(f"{path}.motor"), Aside(s.line(f"ratio {{={path}.ratio:4}}")))
-        rows.append(
-            b.TableRow((motor, _flywheel(s, path), start, _mass(s, path), s.words(f"{path}.verdict")))
-        )
-    if rows:
-        title = "A flywheel, or a larger motor. Mass: of motor and flywheel."
         yield b.Table(
-            tuple(rows), b.heads("motor", "flywheel", "start, worst angle", "mass", "verdict"), title=title
+            tuple(rows),
+            columns,
+            title="Gears of the candidates, in their order",
+            numeric=False,
+            note_title="because",
+            form="long",
         )
 
 
-def _behind(s: b.Source, candidate: str) -> Line:
+def _ways(study: StudyRecord, protection: DriveProtection, x: DriveProtection) -> Iterator[b.Table]:
+    """A row for each way to a coupling that a start does not open."""
+    return table(
+        zip(protection.alternatives, x.alternatives, strict=True),
+        ("way", lambda row: row[1].way),
+        ("set to", lambda row: number(row[1].numbers.setting)),
+        ("running", lambda row: number(row[1].numbers.running)),
+        ("a start", lambda row: number(row[1].numbers.start)),
+        ("start-up", lambda row: number(row[1].numbers.start_time)),
+        ("opens or slips where", lambda row: "; ".join(map(study.title_of, row[0].opens)) or "nothing"),
+        title="Ways to a torque limiter: its setting, and the torques of running and of a start, at the "
+        f"{study.driver_noun}",
+        numeric=False,
+        form="long",
+    )
+
+
+def _trade(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Block]:
+    """The smallest drive that fits with a flywheel, beside the next larger motor without one."""
+    return table(
+        ((findings.candidates[k], x.candidates[k]) for k in findings.traded or ()),
+        (
+            "motor",
+            lambda row: line(
+                row[1].designation, Aside(line("ratio ", number(row[1].ratio, 4, as_given=True)))
+            ),
+        ),
+        ("flywheel", lambda row: _flywheel(*row)),
+        ("start, worst angle", lambda row: number(row[1].checks["start"].value)),
+        ("mass", lambda row: number(row[1].numbers.mass)),
+        ("verdict", lambda row: row[1].verdict or ""),
+        title="A flywheel, or a larger motor. Mass: of motor and flywheel.",
+    )
+
+
+def _behind(candidate: Candidate, x: Candidate) -> Line:
     """The gear of a candidate, if it is one of a catalogue, else its ratio."""
-    gear = _sold(b.at(s.result, candidate))
-    if gear is None:
-        return s.line(f"ratio {{={candidate}.ratio:4}}")
-    return s.words(f"{candidate}.parts.{gear}.designation")
+    if candidate.sold is None:
+        return line("ratio ", number(x.ratio, 4, as_given=True))
+    return x.parts[-1].designation
 
 
-def _sold(candidate: Mapping[str, Any]) -> int | None:
-    """The place of the gear among the parts of a candidate; None for a gear of no catalogue."""
-    parts = candidate.get("parts", ())
-    return next((k for k, each in enumerate(parts) if each["part"] == "gear"), None)
-
-
-def _flywheel(s: b.Source, candidate: str) -> Line:
-    path = f"{candidate}.flywheel"
-    return line(s.number(f"{path}.J"), _aside(_disc(s, path))) if s.value(f"{path}.J") else "none"
-
-
-def _mass(s: b.Source, candidate: str) -> Line:
-    return s.number(f"{candidate}.numbers.mass")
-
-
-def _aside(lines: Iterator[Line]) -> Line:
-    return tuple(Aside(each) for each in lines)
+def _flywheel(candidate: Candidate, x: Candidate) -> Line:
+    if not candidate.drive.added_inertia:
+        return "none"
+    return line(number(x.flywheel_numbers.J), *map(Aside, _disc(candidate, x)))

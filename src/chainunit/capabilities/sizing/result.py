@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from ...core.descriptions import of_driver
 from ...core.quantities import quantity
 from ...drives.belt import belt_drive
 from ...drives.gear_ratios import belt_before_gear
 from ...reading.results import GIVEN, InUnit, part, result
-from ...reading.text import number
+from ...reading.text import aside, number
 from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
 from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words
 from ...study.starts import StartFindings, transient_words
-from .candidate import TrialResult
+from .candidate import Candidate, TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
 from .gear_order import gear_order
+from .parts import PartsList
 from .protection import Alternative, CouplingEffect, Obstacle, Setting, WayNumbers
 from .table import SizingPlan
 
@@ -155,6 +157,23 @@ class MotorProtection:
     device: str = part("the device")
     tolerance: str | None = part("the class for a motor with more current", default=None, optional=True)
 
+    @property
+    def class_words(self) -> str:
+        """The trip class, to follow the setting; empty for the motor protection of an inverter."""
+        if self.relay_class is None:
+            return ""
+        return f", {self.relay_class['value']}{aside(self.tolerance)}"
+
+    @property
+    def setting_words(self) -> str:
+        """The device, its setting and its class."""
+        line = "" if self.line_current is None else f"in the supply line {_in_unit(self.line_current)}"
+        return f"{self.device} at {_in_unit(self.relay_current)}{aside(line)}{self.class_words}"
+
+
+def _in_unit(size: InUnit) -> str:
+    return number(size.value, size.unit, size.kind)
+
 
 @result
 class TriedWay:
@@ -189,6 +208,48 @@ class DriveProtection:
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")
     disturbances: Mapping[str, InUnit] = part("peak of each disturbance on the coupling")
     alternatives: list[TriedWay] = part("ways to a coupling that a start does not open")
+
+
+@result
+class SizedDrive:
+    """The drive of a study by sizing: a motor with its gear and flywheel, their protection, and what is ordered."""
+
+    best: Candidate
+    insufficient: bool
+    """whether no motor fits, so that this is the nearest"""
+    driver: str
+    """the noun of the link that the motor turns"""
+    caveat: str | None
+    """the caveat of the verdict on the model of the machine, if it has one"""
+    gear: OrderedGear | None = part("the gear to order", titled=True, optional=True, default=None)
+    protection: DriveProtection | MotorProtection | None = part(
+        "settings of the protection", titled=True, optional=True, default=None
+    )
+    belt: OrderedBelt | None = part("the belt to order", titled=True, optional=True, default=None)
+    inverter: OrderedInverter | None = part("the inverter to order", titled=True, optional=True, default=None)
+    parts: PartsList | None = part(
+        "the parts to order from catalogues", titled=True, optional=True, default=None
+    )
+
+    @property
+    def sentence(self) -> str:
+        """The drive in a sentence."""
+        best, protection = self.best, self.protection
+        motor = "Insufficient motor" if self.insufficient else "Motor"
+        ratio = number(best.ratio, "1", digits=4, full=False)
+        parts = [
+            f"{motor}: {best.designation}, ratio {ratio}{aside(best.gear_words)}",
+            f"flywheel on the motor shaft {best.flywheel_words}" if best.disc else "no flywheel",
+        ]
+        if isinstance(protection, MotorProtection):
+            setting = protection.relay_current
+            parts.append(f"{setting.title} {_in_unit(setting)}{protection.class_words}")
+        elif protection is not None:
+            torque = protection.trip_torque
+            limiter = of_driver("torque limiter, trip torque at the {driver} ", self.driver)
+            none = f"no torque limiter{aside(protection.why_none)}"
+            parts += [limiter + number(torque, "N.m") if torque else none, protection.relay.setting_words]
+        return f"{'; '.join(parts)}{aside(self.caveat)}."
 
 
 _UNTRIED = "not judged: this study has no overload; add [[event]]"

@@ -11,13 +11,14 @@ from ...core.errors import InputError, shown
 from ...reading.results import as_data
 from ...reading.text import shown_in
 from ...report import blocks as b
+from ...report.cited import cited, number, table
 from ...report.lines import Line, Name, Number, join, line
 from ...report.task import Task
 from ...study.config import Config
 from ...work.progress import TaskProgress
 from . import figures as sweep_figures
 from .points import run_sweep
-from .summary import MOST_GAPS, SweepSummary, SweptStudy
+from .summary import MOST_GAPS, Row, SweepSummary, SweptStudy
 
 _MOST_COLUMNS = 8
 """Columns of a table on the terminal."""
@@ -31,7 +32,7 @@ def report(swept: SweptStudy) -> b.Report:
         sections = (
             b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
             b.Section("best", "Points in order", tuple(_best(s, summary))),
-            b.Section("extremes", "Extremes", tuple(_extremes(s, summary))),
+            b.Section("extremes", "Extremes", tuple(_extremes(summary))),
             b.Section("maps", "Results over the parameters", tuple(sweep_figures.over_parameters(summary))),
             b.Section("spread", _spread_heading(summary), tuple(_spread(s, summary))),
             b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
@@ -110,39 +111,40 @@ def _columns(names: list[str]) -> tuple[b.Column, ...]:
     )
 
 
-def _value(s: b.Source, summary: SweepSummary, path: str, name: str) -> Number:
+def _value(summary: SweepSummary, row: Row, name: str) -> Number:
     """A value of a parameter or result, with so many digits that points differ."""
-    return s.number(f"{path}.{name}", digits=summary.digits(name))
+    return number(row[name], summary.digits(name))
 
 
 def _best(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
-    names = [*s.result["parameters"], *s.result["results"]]
+    names = [*summary.parameters, *summary.results]
     rows = [
         b.TableRow(
-            (
-                s.number(f"best.{i}.point", as_given=True),
-                *(_value(s, summary, f"best.{i}", name) for name in names),
-            ),
+            (number(point["point"], as_given=True), *(_value(summary, point, name) for name in names)),
             form="both" if i < 5 else "long",
         )
-        for i in range(len(s.result["best"]))
+        for i, point in enumerate(cited(summary).best)
     ]
     if rows:
         heads = (b.Column("point"), *_columns(names))
-        some = len(s.result["parameters"])
+        some = len(summary.parameters)
         groups = (tuple(range(1, 1 + some)), tuple(range(1 + some, 1 + len(names))))
         title = s.line("Points with the {best_by} first")
         yield b.Table(tuple(rows), heads, title=title, groups=groups)
 
 
-def _extremes(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
-    parameters = list(s.result["parameters"])
-    rows = []
-    for name in s.result["extremes"]:
-        for end in ("least", "largest"):
-            path = f"extremes.{name}.{end}"
-            cells = (_value(s, summary, path, each) for each in (name, *parameters))
-            rows.append(b.TableRow((line(Name(name), f", {end}"), *cells)))
+def _extremes(summary: SweepSummary) -> Iterator[b.Block]:
+    parameters = list(summary.parameters)
+    rows = [
+        b.TableRow(
+            (
+                line(Name(name), f", {end}"),
+                *(_value(summary, ends[end], each) for each in (name, *parameters)),
+            )
+        )
+        for name, ends in cited(summary).extremes.items()
+        for end in ("least", "largest")
+    ]
     if rows:
         heads = (b.Column("result"), b.Column("value"), *_columns(parameters))
         yield b.Table(
@@ -180,7 +182,7 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     if wide:
         worst = max(wide, key=lambda name: summary.gaps[name])
         words = "No shares of the variance: up to {gap} of the points have no value, and the parameters of the others"
-        yield b.Text(s.line(f"{words} are not independent.", gap=s.number(f"gaps.{worst}")), "note")
+        yield b.Text(s.line(f"{words} are not independent.", gap=number(cited(summary).gaps[worst])), "note")
     if has_shares:
         yield _shares(s, parameters, table)
     yield b.Text(
@@ -215,25 +217,25 @@ def _spread_heading(summary: SweepSummary) -> str:
 
 
 def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
-    spread = s.result["spread"]
+    x = cited(summary)
+    spread = x.spread.spread
     if not spread:
         return
-    quantiles = list(dict.fromkeys(key for of in spread.values() for key in of if key.startswith("q")))
-
-    def cell(name: str, key: str) -> Line:
-        return s.number(f"spread.{name}.{key}", digits=summary.digits(name)) if key in spread[name] else "-"
-
+    quantiles = list(dict.fromkeys(key for of in summary.spread.spread.values() for key in of.quantiles))
     rows = (
         b.TableRow(
             (
                 Name(name),
-                _value(s, summary, "nominal", name) if name in s.result["nominal"] else "-",
-                cell(name, "mean"),
-                s.number(f"spread.{name}.deviation"),
-                *(cell(name, key) for key in quantiles),
+                _value(summary, x.nominal, name) if name in x.nominal else "-",
+                number(of.mean, summary.digits(name)),
+                number(of.deviation),
+                *(
+                    number(of.quantiles[key], summary.digits(name)) if key in of.quantiles else "-"
+                    for key in quantiles
+                ),
             )
         )
-        for name in spread
+        for name, of in spread.items()
     )
     of_study = (
         b.Column("at the study's values", "study"),
@@ -261,22 +263,16 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
 
 
 def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
-    columns = b.heads("parameter", "meaning", "in the study", "from", "to", "tolerance")
-    rows = (
-        b.TableRow(
-            (
-                Name(name),
-                s.words(f"parameters.{name}.description"),
-                *(
-                    s.number(f"parameters.{name}.{key}", as_given=True)
-                    for key in ("study", "from", "to", "tolerance")
-                ),
-            )
-        )
-        for name in s.result["parameters"]
-    )
-    yield b.Table(
-        tuple(rows), columns, title="Swept quantities; all others have their values of the study", form="long"
+    yield from table(
+        cited(summary).parameters.items(),
+        ("parameter", lambda row: Name(row[0])),
+        ("meaning", lambda row: row[1].description),
+        ("in the study", lambda row: number(row[1].centre, as_given=True)),
+        ("from", lambda row: number(row[1].low, as_given=True)),
+        ("to", lambda row: number(row[1].high, as_given=True)),
+        ("tolerance", lambda row: number(row[1].tolerance, as_given=True)),
+        title="Swept quantities; all others have their values of the study",
+        form="long",
     )
     rows = (b.TableRow((Name(name), s.words(f"results.{name}.description"))) for name in s.result["results"])
     yield b.Table(tuple(rows), b.heads("result", "meaning"), title="Results", numeric=False, form="long")
@@ -305,7 +301,7 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
             ),
             "note",
         )
-    if s.value("current_limit") is not None:
+    if summary.current_limit is not None:
         words = "The current is at its limit, {=current_limit}, at the points with the largest current_peak."
         yield b.Text(s.line(words), "note")
     if s.result["made_anew"]:

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...drives.cardan import ORDERS
-from ...reading.text import number
+from ...reading.text import number as number_words
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import cited, number
 from ...report.lines import Line, line
 from ...study.record import StudyRecord
 from .analysis import TorsionFindings
@@ -36,70 +37,62 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         "(order 4). The motor gives a constant torque."
     )
     yield b.Text(lead, "lead", "long")
-    yield b.Table(tuple(b.TableRow(row) for row in _numbers(s, analysis)), title="Torsion of the driveline")
+    yield b.Table(tuple(b.TableRow(row) for row in _numbers(analysis)), title="Torsion of the driveline")
     yield b.Table(
-        tuple(b.TableRow(row) for row in _ranges(s, analysis)),
+        tuple(b.TableRow(row) for row in _ranges(analysis)),
         b.heads("", "from", "to"),
         title="Torsion of the driveline: ranges",
     )
     yield from (_campbell(analysis), _stability(analysis), _resonance(analysis), _ratio(analysis))
 
 
-def _numbers(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line]]:
+def _numbers(analysis: LineAnalysis) -> Iterator[tuple[Line, Line]]:
     """Rows with a title and a number."""
-
-    def value(path: str, *item: int, digits: int = 4) -> Line:
-        return s.number(f"torsion.{path}", *item, digits=digits)
-
-    yield "inertia J1 of the rotor, at the shaft", value("line.J1")
-    yield "inertia J4 on shaft 3, with the machine's mean", value("line.J4")
-    yield "speed of the shaft in normal running", value("running.speed")
-    yield "mean torque on J4", value("running.load")
-    yield "natural frequency at i23 = 1", value("natural_frequency.even", digits=5)
-    yield "damping ratio", s.number("torsion.damping_ratio")
+    x = cited(analysis, "findings.torsion")
+    yield "inertia J1 of the rotor, at the shaft", number(x.line.J1, 4)
+    yield "inertia J4 on shaft 3, with the machine's mean", number(x.line.J4, 4)
+    yield "speed of the shaft in normal running", number(x.rotation.speed, 4)
+    yield "mean torque on J4", number(x.rotation.load, 4)
+    yield "natural frequency at i23 = 1", number(x.natural_frequency.even, 5)
+    yield "damping ratio", number(x.damping_ratio)
     for n in analysis.excitation:
         title = f"amplitude by which order {n} turns shaft 3, {n} times a turn"
-        yield title, s.number(f"torsion.excitation.order {n}")
+        yield title, number(x.orders[f"order {n}"])
     if analysis.operating.exists[0]:
         yield (
             "Floquet multiplier in normal running, per half turn (stable below 1)",
-            value("operating.largest_multiplier", 0),
+            number(x.operation.motion.largest_multiplier[0], 4),
         )
     else:
         yield "steady motion in normal running", "not found"
-    for i in range(len(analysis.resonances())):
-        at = value("resonance.peaks.speed", i)
-        yield line("resonance: largest torque in shaft 2 at ", at), value("resonance.peaks.torque2", i)
+    peaks = x.resonance.peaks
+    for speed, torque in zip(peaks.speed, peaks.torque2, strict=True):
+        yield line("resonance: largest torque in shaft 2 at ", number(speed, 4)), number(torque, 4)
 
 
-def _ranges(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
+def _ranges(analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
     """Rows with a title and the two ends of a range."""
 
-    def ends(path: str, *item: int, digits: int = 4) -> tuple[Line, Line]:
-        low, high = (s.number(f"torsion.{path}", *item, end, digits=digits) for end in (0, 1))
-        return low, high
+    def ends(least: object, largest: object, digits: int = 4) -> tuple[Line, Line]:
+        return number(least, digits), number(largest, digits)
 
-    def extremes(path: str, *item: int, digits: int = 4) -> tuple[Line, Line]:
-        low, high = (
-            s.number(f"torsion.{path.format(end)}", *item, digits=digits) for end in ("least", "largest")
-        )
-        return low, high
-
-    yield "ratio i23, over a turn of the shaft", *extremes("ratio.{}", digits=5)
-    yield "natural frequency, over a turn of the shaft", *extremes("natural_frequency.{}", digits=5)
-    yield f"natural frequency, {_OVER_BOTH}", *ends("natural_frequency.over_both_turns", digits=5)
+    x = cited(analysis, "findings.torsion")
+    frequency, motion = x.natural_frequency, x.operation.motion
+    yield "ratio i23, over a turn of the shaft", *ends(x.ratio_ends.least, x.ratio_ends.largest, 5)
+    yield "natural frequency, over a turn of the shaft", *ends(frequency.least, frequency.largest, 5)
+    low, high = frequency.over_both_turns
+    yield f"natural frequency, {_OVER_BOTH}", *ends(low, high, 5)
     for n in ORDERS:
         if analysis.excitation[n]:
             title = f"speed at which order {n} meets the natural frequency, {_OVER_BOTH}"
-            yield title, *ends(f"crossings.speed = k/{n}")
+            yield title, *ends(*x.crossing_speeds[f"speed = k/{n}"])
     if analysis.operating.exists[0]:
-        for shaft in (2, 3):
-            torques = extremes(f"operating.{{}}_torque{shaft}", 0)
-            yield f"torque of shaft {shaft} in normal running", *torques
-    for i in range(len(analysis.unstable_ranges())):
-        yield "speed at which the line is unstable", *ends("resonance.unstable", i)
-    for i in range(len(analysis.missing_ranges())):
-        yield "speed at which the stability is unknown", *ends("resonance.no_steady_motion", i)
+        for shaft, least, largest in ((2, motion.least2, motion.peak2), (3, motion.least3, motion.peak3)):
+            yield f"torque of shaft {shaft} in normal running", *ends(least[0], largest[0])
+    for low, high in x.resonance.unstable:
+        yield "speed at which the line is unstable", *ends(low, high)
+    for low, high in x.resonance.no_steady_motion:
+        yield "speed at which the stability is unknown", *ends(low, high)
     if not analysis.unstable_ranges():
         yield "speed at which the line is unstable", "nowhere", ""
 
@@ -164,7 +157,7 @@ def _stability(analysis: LineAnalysis) -> fig.Figure:
             items.append(fig.Curve("no steady motion found", *gaps, 1, "x", has_line=False))
         if grid.joint != "both":
             items.append(fig.Mark(getattr(analysis.line, grid.joint), "bend as given", axis="y", look=3))
-        title = f"damping ratio {number(ratio, '1', full=False)}"
+        title = f"damping ratio {number_words(ratio, '1', full=False)}"
         panels.append(fig.Panel(_speed_axis(analysis), y, tuple(items), title))
     return fig.Figure(
         "stability",
@@ -198,7 +191,7 @@ def _resonance(analysis: LineAnalysis) -> fig.Figure:
             items.append(fig.Mark(static, "load alone", axis="y", look=3))
         if shaft == 2:
             peaks = analysis.resonances()
-            items += [fig.Label(at, peak, number(peak, "N.m", digits=4), "above") for at, peak in peaks]
+            items += [fig.Label(at, peak, number_words(peak, "N.m", digits=4), "above") for at, peak in peaks]
         # torques that are all zero get an axis that hides their roundoff
         largest = max(static, *(float(np.nanmax(y, initial=0.0)) for y in (steady, rigid)))
         low, high = (1e-3, 1.0) if largest < 1e-3 else (None, None)
@@ -206,7 +199,7 @@ def _resonance(analysis: LineAnalysis) -> fig.Figure:
         panels.append((fig.Panel(_speed_axis(analysis), y, tuple(items), f"shaft {shaft}"),))
     return fig.Figure(
         "resonance",
-        f"Peak torque of the driveline over speed, damping ratio {number(analysis.damping_ratio, '1')}",
+        f"Peak torque of the driveline over speed, damping ratio {number_words(analysis.damping_ratio, '1')}",
         "Peak torques of shafts 2 and 3 over the speed, elastic and rigid.",
         tuple(panels),
         file="resonance.png",
@@ -218,7 +211,7 @@ def _ratio(analysis: LineAnalysis) -> fig.Figure:
     angle = fig.Axis(
         "angle of shaft 2 from the plane of the joint", "rad", low=0.0, high=2.0 * np.pi, step=45.0
     )
-    bends = (number(bend, "rad") for bend in (analysis.line.alpha1, analysis.line.alpha2))
+    bends = (number_words(bend, "rad") for bend in (analysis.line.alpha1, analysis.line.alpha2))
     panels = (
         ("ratio i23 of shaft 3 to shaft 2", fig.Axis("ratio i23"), analysis.ratio),
         (

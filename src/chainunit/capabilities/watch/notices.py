@@ -17,6 +17,7 @@ from ...study.drive import Drive
 from ...study.event_torques import from_event_on
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
+from ...study.remark import note, warning
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,38 +82,45 @@ class ObserverFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of false alarms and of wrong sides, and of chains in place of the bars that the observer knows."""
         if self.alarms_in_steady:
-            study.warn(
-                "observer alarms in normal running",
-                "The load observer raises an alarm in normal running, where it estimates an imbalance of the feed of "
-                "{imbalance} (threshold {threshold}): its alarms in the events tell nothing.",
-                imbalance=(self.steady.imbalance, "kg"),
-                threshold=(self.steady.threshold, "kg"),
-            )
+            study.say(_ALARMS, imbalance=self.steady.imbalance, threshold=self.steady.threshold)
         elif self.alarm_in_start is not None:
-            study.note(
-                "observer in the start",
-                "The load observer raises an alarm in the start, at t = {time}: hold its alarms back until running "
-                "is steady.",
-                time=(self.alarm_in_start, "s"),
-            )
+            study.say(_IN_START, time=self.alarm_in_start)
         wrong = [run for run, side in self.named.items() if side and self.loaded[run] not in ("", side)]
         if wrong:
-            study.warn(
-                "observer names the wrong side",
-                "The load observer first names the side that is not loaded: {where}.",
-                *wrong,
-                where="; ".join(map(study.title_of, wrong)),
-            )
+            study.say(_WRONG_SIDE, *wrong, where="; ".join(map(study.title_of, wrong)))
         if self.resonance is not None:
-            (study.warn if self.resonance > CHAINS_GOOD else study.note)(
-                "observer of two bars",
-                "The organs are chains, and the load observer knows two bars: in normal running its imbalance of the "
-                "feed is wrong by {error} at most. The crank turns at {share} times the lowest resonance of the "
-                "chains; up to {good} times it tells a fifth of the feed from the motion of the chains.",
-                error=(self.steady.error, "kg"),
-                share=(self.resonance, "1"),
-                good=(CHAINS_GOOD, "1"),
+            study.say(
+                _NEAR_RESONANCE if self.resonance > CHAINS_GOOD else _TWO_BARS,
+                error=self.steady.error,
+                share=self.resonance,
+                good=CHAINS_GOOD,
             )
+
+
+_ALARMS = warning(
+    "observer-alarms-in-normal-running",
+    "The load observer raises an alarm in normal running, where it estimates an imbalance of the feed of "
+    "{imbalance} (threshold {threshold}). Its alarms in the events tell nothing.",
+    sizes={"kg": "imbalance threshold"},
+)
+_IN_START = note(
+    "observer-in-the-start",
+    "The load observer raises an alarm in the start, at t = {time}.",
+    remedy="Hold its alarms back until running is steady.",
+    sizes={"s": "time"},
+)
+_WRONG_SIDE = warning(
+    "observer-names-the-wrong-side", "The load observer first names the side that is not loaded: {where}."
+)
+_BARS = (
+    "The organs are chains, and the load observer knows two bars.",
+    "In normal running its imbalance of the feed is wrong by {error} at most.",
+    "The crank turns at {share} times the lowest resonance of the chains.",
+    "Up to {good} times it tells a fifth of the feed from the motion of the chains.",
+)
+_SIZES = {"kg": "error", "1": "share good"}
+_NEAR_RESONANCE = warning("observer-near-resonance", *_BARS, sizes=_SIZES)
+_TWO_BARS = note("observer-of-two-bars", *_BARS, sizes=_SIZES)
 
 
 class ObserverAnalysis(Analysis):

@@ -12,6 +12,7 @@ from ...reading.text import shown_in
 from ...recordings.residuals import EXCESS_NOISE
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.cited import cited, number, table
 from ...report.lines import Name, join, line
 from ...report.task import Task
 from ...study.config import Config
@@ -35,18 +36,19 @@ _USUAL = {
 
 def watch_report(watched: WatchedRecording) -> b.Report:
     """The report on a watched recording."""
-    result = as_data(summary_of(watched))
+    summary = summary_of(watched)
+    result, x = as_data(summary), cited(summary)
     s = b.Source(result)
     with shown_in(watched.config.units):
         return b.Report(
             watched.config.title or "Watched recording",
             "Watch for one-sided overload",
             result,
-            tuple(_opening(s)),
+            tuple(_opening(s, x)),
             (
-                b.Section("loads", "Loads of both sides", tuple(_loads(s))),
-                b.Section("alarms", "Alarms and their grounds", tuple(_alarms(s))),
-                b.Section("basis", "Basis of the numbers", tuple(_basis(s))),
+                b.Section("loads", "Loads of both sides", tuple(_loads(s, x))),
+                b.Section("alarms", "Alarms and their grounds", tuple(_alarms(x))),
+                b.Section("basis", "Basis of the numbers", tuple(_basis(s, x))),
             ),
             source=s.line("Study file: {source} · chainunit {chainunit}"),
             units=watched.config.units,
@@ -66,7 +68,7 @@ TASK: Task[Config, WatchedRecording] = Task(
 )
 
 
-def _opening(s: b.Source) -> Iterator[b.Block]:
+def _opening(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
     if not s.result["is_described"]:
         yield b.Judgement(
             "bad",
@@ -88,7 +90,7 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             ),
         )
     for name, of in (("signal", "signal"), ("speed", "measured speed")):
-        if (s.value(f"noise.{name}") or 0.0) > EXCESS_NOISE:
+        if (number(x.noise[name]).value or 0.0) > EXCESS_NOISE:
             louder = f"The noise of the {of} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
             yield b.Judgement("warning", s.line(f"{louder}: the thresholds follow from the measured noise."))
     for each in s.lines("constant_parts"):
@@ -124,7 +126,7 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
         )
     )
     named = s.result["identification"] is not None
-    if not s.value("uncertainty") and not s.value("force_uncertainty"):
+    if not (number(x.false_imbalance.uncertainty).value or number(x.false_imbalance.force_uncertainty).value):
         remedy = (
             "The identification sought no number of the machine that the observer knows."
             if named
@@ -146,23 +148,17 @@ def _series(s: b.Source, name: str) -> Any:
     return np.array([np.nan if x is None else x for x in s.result["course"][name]["value"]])
 
 
-def _loads(s: b.Source) -> Iterator[b.Block]:
-    rows = [
-        b.TableRow(
-            (
-                words,
-                *(s.number(f"usual.{name}.{key}", digits=3) for key in ("value", "deviation", "threshold")),
-            )
-        )
-        for name, words in _USUAL.items()
-        if name in s.result["usual"]
-    ]
-    if rows:
-        yield b.Table(
-            tuple(rows),
-            b.heads("quantity", "median", "deviation of the filter", "threshold of an alarm"),
-            title="Estimates after the time of learning and before the first alarm",
-        )
+def _loads(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
+    usual = [(words, x.usual[name]) for name, words in _USUAL.items() if name in x.usual]
+    yield from table(
+        usual,
+        ("quantity", lambda row: row[0]),
+        ("median", lambda row: number(row[1].value, 3)),
+        ("deviation of the filter", lambda row: number(row[1].deviation, 3)),
+        ("threshold of an alarm", lambda row: number(row[1].threshold, 3)),
+        title="Estimates after the time of learning and before the first alarm",
+    )
+    if usual:
         yield b.Text(
             "The deviation of the filter is that of loads that change as fast as it follows (observer.change). "
             "Normal running scatters less; the threshold follows from that smaller deviation.",
@@ -218,59 +214,35 @@ def _marks(s: b.Source) -> Iterator[fig.Shade]:
         named.add(name)
 
 
-def _alarms(s: b.Source) -> Iterator[b.Block]:
-    rows = []
-    for k in range(len(s.result["alarms"])):
-        path, values = f"alarms.{k}", f"alarms.{k}.values"
-        rows.append(
-            b.TableRow(
-                (
-                    s.words(f"{path}.side"),
-                    s.number(f"{path}.begin", digits=5),
-                    "the end" if s.result["alarms"][k]["lasts"] else s.number(f"{path}.end", digits=5),
-                    s.words(f"{path}.ground"),
-                    s.number(f"{path}.at", digits=5),
-                    s.number(f"{values}.imbalance.feed", digits=3),
-                    s.number(f"{values}.imbalance.feed_threshold", digits=3),
-                    s.number(f"{values}.imbalance.force", digits=3),
-                    s.number(f"{values}.imbalance.force_threshold", digits=3),
-                    s.number(f"{values}.rocker.tau", digits=3),
-                )
-            )
-        )
-    if not rows:
+def _alarms(x: WatchSummary) -> Iterator[b.Block]:
+    if not x.alarms:
         yield b.Text("There is none.")
-        return
-    columns = (
-        b.Column("side"),
-        b.Column("from"),
-        b.Column("to"),
-        b.Column("ground"),
-        b.Column("largest at", form="long"),
-        b.Column("imbalance of the feed", "imbalance"),
-        b.Column("threshold"),
-        b.Column("imbalance of the forces", "forces", form="long"),
-        b.Column("threshold", form="long"),
-        b.Column("rocker torque", form="long"),
-    )
-    yield b.Table(
-        tuple(rows),
-        columns,
+    yield from table(
+        x.alarms,
+        ("side", lambda alarm: alarm.side),
+        ("from", lambda alarm: number(alarm.begin, 5)),
+        ("to", lambda alarm: "the end" if alarm.lasts else number(alarm.end, 5)),
+        ("ground", lambda alarm: alarm.ground),
+        (b.Column("largest at", form="long"), lambda alarm: number(alarm.at, 5)),
+        (
+            b.Column("imbalance of the feed", "imbalance"),
+            lambda alarm: number(alarm.values["imbalance.feed"], 3),
+        ),
+        ("threshold", lambda alarm: number(alarm.values["imbalance.feed_threshold"], 3)),
+        (
+            b.Column("imbalance of the forces", "forces", form="long"),
+            lambda alarm: number(alarm.values["imbalance.force"], 3),
+        ),
+        (
+            b.Column("threshold", form="long"),
+            lambda alarm: number(alarm.values["imbalance.force_threshold"], 3),
+        ),
+        (b.Column("rocker torque", form="long"), lambda alarm: number(alarm.values["rocker.tau"], 3)),
         title="Alarms, with the values at the largest imbalance in parts of its threshold",
     )
 
 
-def _basis(s: b.Source) -> Iterator[b.Block]:
-    rows = [
-        b.TableRow(
-            (
-                Name(name),
-                s.number(f"learned.{name}.value", digits=4),
-                s.number(f"learned.{name}.deviation", digits=2),
-            )
-        )
-        for name in s.result["learned"]
-    ]
+def _basis(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
     yield b.Text(
         s.line(
             "Angle, zero and loads were learned in the first {=learning}. Alarms of one side with less than two "
@@ -278,12 +250,19 @@ def _basis(s: b.Source) -> Iterator[b.Block]:
         ),
         "note",
     )
-    yield b.Table(
-        tuple(rows),
-        b.heads("learned number", "value", "standard deviation by noise"),
+    yield from table(
+        x.learned.items(),
+        ("learned number", lambda row: Name(row[0])),
+        ("value", lambda row: number(row[1].value, 4)),
+        ("standard deviation by noise", lambda row: number(row[1].deviation, 2)),
         title="Learned from the begin",
         form="long",
     )
-    rows = [b.TableRow((Name(name), s.number(f"tuning.{name}", digits=4))) for name in s.result["tuning"]]
-    yield b.Table(tuple(rows), b.heads("parameter", "value"), title="Tuning of the observer", form="long")
+    yield from table(
+        x.tuning.items(),
+        ("parameter", lambda row: Name(row[0])),
+        ("value", lambda row: number(row[1], 4)),
+        title="Tuning of the observer",
+        form="long",
+    )
     yield b.Text(line("Recording: ", s.words("file")), "fine", "long")

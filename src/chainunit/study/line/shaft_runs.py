@@ -17,18 +17,10 @@ from ...study.transients import follow
 from ...system import rigid
 from ..analysis import Analysis, Findings, Work, is_examined
 from ..drive import Drive
-from ..record import Amount, StudyRecord
+from ..record import StudyRecord
+from ..remark import note, warning
 from .rigid_line import HOLDS_FROM, RigidLine
-from .shaft import (
-    AMPLIFIED,
-    UNEVEN,
-    Cycles,
-    ShaftAnswers,
-    driveline_of,
-    remedies,
-    shaft_answers,
-    with_rigid,
-)
+from .shaft import AMPLIFIED, UNEVEN, Cycles, ShaftAnswers, driveline_of, remedies, shaft_answers, with_rigid
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -121,50 +113,75 @@ def remark(study: StudyRecord) -> None:
     if modes is None:
         return
     line = driveline_of(study.drive)
-    warn, note = study.warn, study.note
     if line.d2 == 0.0 and line.d3 == 0.0:
-        text = "The driveline has no damping: a vibration, once excited, does not decay; give d2 and d3."
-        note("undamped line", text)
-    ends: dict[str, Amount] = {
-        "k_least": (modes.k_least, "rad/s", "frequency"),
-        "k_largest": (modes.k_largest, "rad/s", "frequency"),
-    }
+        study.say(_UNDAMPED)
     fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
     if fastest > modes.antiresonance / 3.0:
-        warn(
-            "control near line",
-            "The speed loop crosses over at {crossover}, near {antiresonance}, at which the machine swings on the "
-            "shafts against a standing motor: its margins are those of a rigid drive and do not hold here. A "
-            "stiffer line separates the two. Lower gains do so, too, but the control also damps the torsion: a run "
-            "shows the effect of lower gains on the peaks.",
-            crossover=(fastest, "rad/s"),
-            antiresonance=(modes.antiresonance, "rad/s"),
-            **ends,
+        study.say(
+            _CONTROL,
+            crossover=fastest,
+            antiresonance=modes.antiresonance,
+            k_least=modes.k_least,
+            k_largest=modes.k_largest,
         )
     if study.statics.rigid_line is not None:
         _on_rigid_line(study, study.statics.rigid_line)
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
     if unevenness > UNEVEN:
-        say = warn if is_examined("driveline", study.findings) else note
-        say(
-            "uneven joints",
-            "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "
-            "this varies by {unevenness} twice a turn; {remedies}.",
-            least=(float(np.min(i)), "1", "", 5),
-            largest=(float(np.max(i)), "1", "", 5),
-            unevenness=(unevenness, "1", "percent"),
-            remedies=", and ".join(remedies(line)),
+        study.say(
+            _UNEVEN if is_examined("driveline", study.findings) else _UNEVEN_ALONE,
+            least=float(np.min(i)),
+            largest=float(np.max(i)),
+            unevenness=unevenness,
+            way=", and ".join(remedies(line)),
         )
     for name, shaft in shaft_findings(study).answers.items():
         if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
-            warn(
-                "amplification",
-                "{title}: the line's torque peaks at {amplification} times that of a rigid drive.",
-                name,
-                title=study.title_of(name),
-                amplification=(shaft.amplification, "1"),
-            )
+            study.say(_AMPLIFIED, name, title=study.title_of(name), amplification=shaft.amplification)
+
+
+_UNDAMPED = note(
+    "undamped-line",
+    "The driveline has no damping, so that a vibration, once excited, does not decay.",
+    remedy="Give d2 and d3.",
+)
+_CONTROL = warning(
+    "control-near-line",
+    "The speed loop crosses over at {crossover}, near {antiresonance}, at which the machine swings on the shafts "
+    "against a standing motor. Its margins are those of a rigid drive and do not hold here. A run shows the effect "
+    "of lower gains on the peaks, as the control also damps the torsion.",
+    remedy="A stiffer line or lower gains separate the two.",
+    sizes={
+        "rad/s": "crossover antiresonance",
+        ("rad/s", "frequency", 3, "least natural frequency of the line over a turn"): "k_least",
+        ("rad/s", "frequency", 3, "largest natural frequency of the line over a turn"): "k_largest",
+    },
+)
+_JOINTS = (
+    "The joints turn unevenly, as shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23).",
+    "This varies by {unevenness} twice a turn.",
+)
+_RATIOS = {("1", "", 5): "least largest", ("1", "percent"): "unevenness"}
+_UNEVEN = warning("uneven-joints", *_JOINTS, remedy="{way}.", sizes=_RATIOS)
+_UNEVEN_ALONE = note("uneven-joints-of-a-slow-line", *_JOINTS, remedy="{way}.", sizes=_RATIOS)
+_AMPLIFIED = warning(
+    "amplification",
+    "{title}: the line's torque peaks at {amplification} times that of a rigid drive.",
+    sizes={"1": "amplification"},
+)
+_NOT_RIGID = warning(
+    "no-rigid-line",
+    "The lowest natural frequency of the line is only {ratio} times the frequency of the {driver}'s turns. Below "
+    "{least} times (VDI 2149) a rigid model of the drive does not hold. The runs have the elastic line, and it is "
+    "rigid in {taken}.",
+    remedy="Stiffer shafts or a slower {driver} raise the ratio.",
+    sizes={
+        "1": "ratio",
+        ("rad/s", "frequency", 3, "lowest natural frequency of the line"): "natural_frequency",
+        ("rad/s", "frequency", 3, "frequency of the {driver}'s turns"): "driver_frequency",
+    },
+)
 
 
 def _on_rigid_line(study: StudyRecord, rigid_line: RigidLine) -> None:
@@ -174,15 +191,11 @@ def _on_rigid_line(study: StudyRecord, rigid_line: RigidLine) -> None:
     taken = ["the turn at constant speed"]
     taken += ["the speed loop"] if study.statics.loops else []
     taken += ["the choice of the drive"] if study.proposal is not None else []
-    study.warn(
-        "no rigid line",
-        "The lowest natural frequency of the line, {natural_frequency}, is only {ratio} times the frequency of the "
-        "{driver}'s turns, {driver_frequency}; below {least} times (VDI 2149) a rigid model of the drive does not "
-        "hold. The runs have the elastic line; it is rigid in {taken}. Stiffer shafts or a slower {driver} raise the "
-        "ratio.",
-        natural_frequency=(rigid_line.natural_frequency, "rad/s", "frequency"),
-        driver_frequency=(rigid_line.driver_frequency, "rad/s", "frequency"),
-        ratio=(rigid_line.ratio, "1"),
+    study.say(
+        _NOT_RIGID,
+        natural_frequency=rigid_line.natural_frequency,
+        driver_frequency=rigid_line.driver_frequency,
+        ratio=rigid_line.ratio,
         least=f"{HOLDS_FROM:g}",
         taken=" and ".join(filter(None, (", ".join(taken[:-1]), taken[-1]))),
     )

@@ -1,0 +1,82 @@
+"""A declared result as a report cites it: its numbers and texts are pieces of a line that know their places in the
+result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import is_dataclass, replace
+from typing import Any, TypeVar, cast
+
+from ..core.quantities import finite
+from ..reading.results import GIVEN, OWN, Estimate, InUnit, ResultPart, parts
+from . import blocks as b
+from .lines import Line, Name, Number, Words
+
+T = TypeVar("T")
+
+
+def cited(result: T, path: str = "") -> T:
+    """The same result, which stands at `path`, with pieces of a line in place of its numbers and texts. A type
+    checker takes it for the result, so that it sees each attribute; `number` gives the piece its type."""
+    return cast("T", _piece(result, path))
+
+
+class _Cited:
+    """A result whose attributes are pieces; an attribute that is no part of its data is that of the result."""
+
+    def __init__(self, result: Any, path: str) -> None:
+        of: Any = type(result)
+        self._result, self._path = result, path
+        self._parts: dict[str, ResultPart] = {each.attribute: each for each in parts(of)}
+
+    def __getattr__(self, name: str) -> Any:
+        value, declared = getattr(self._result, name), self._parts.get(name)
+        if declared is None:
+            return value
+        path = self._path if declared.inline else f"{self._path}.{declared.name}".removeprefix(".")
+        if declared.unit == OWN:
+            return _piece(value, path, self._result.unit, getattr(self._result, "kind", ""))
+        return value if declared.unit == GIVEN else _piece(value, path, declared.unit, declared.kind)
+
+
+def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
+    """The piece or the pieces of a value: number, text, result, mapping or sequence. A switch stays as it is."""
+    if isinstance(value, InUnit):
+        return _piece(value.value, path, value.unit, value.kind)
+    if isinstance(value, Estimate):
+        return Number(finite(value.value), value.unit, value.kind, path)
+    if isinstance(value, Mapping):
+        return {key: _piece(each, f"{path}.{key}", unit, kind) for key, each in value.items()}
+    if unit and (isinstance(value, list | tuple) or bool(getattr(value, "ndim", False))):
+        place = path if ".value." in path else f"{path}.value"
+        return [_piece(each, f"{place}.{k}", unit, kind) for k, each in enumerate(value)]
+    if unit:
+        return Number(value if type(value) is int else finite(value), unit, kind, path)
+    if isinstance(value, list | tuple):
+        return [_piece(each, f"{path}.{k}") for k, each in enumerate(value)]
+    if isinstance(value, str):
+        return Words(str(value), path)
+    return _Cited(value, path) if is_dataclass(value) else value
+
+
+def number(cited_number: object, digits: int = 0, **more: Any) -> Number:
+    """A cited number with so many digits; `more` are further fields of `Number`."""
+    assert isinstance(cited_number, Number), cited_number
+    return replace(cited_number, digits=digits, **more)
+
+
+def as_name(cited_name: object) -> Name:
+    """A cited text as a name, whose letters stay as they are."""
+    assert isinstance(cited_name, Words), cited_name
+    return Name(cited_name.text)
+
+
+def table(
+    items: Iterable[T], *columns: tuple[Line | b.Column, Callable[[T], b.Cell]], **more: Any
+) -> Iterator[b.Table]:
+    """A table with a row for each item; a column is its head and the cell of an item. No table without items; `more`
+    are further fields of `Table`."""
+    rows = tuple(b.TableRow(tuple(cell(item) for _, cell in columns)) for item in items)
+    if rows:
+        heads = (head if isinstance(head, b.Column) else b.Column(head) for head, _ in columns)
+        yield b.Table(rows, tuple(heads), **more)
