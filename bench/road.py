@@ -77,14 +77,14 @@ class Road:
 
 def road(command):
     """The road of the number in a command."""
-    found = Road()
-    sys.setprofile(found.follow)
+    trail = Road()
+    sys.setprofile(trail.follow)
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             app(command, standalone_mode=False)
     finally:
         sys.setprofile(None)
-    return found
+    return trail
 
 
 def commands(folder):
@@ -105,7 +105,7 @@ def commands(folder):
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as made:
         for name, command in commands(made).items():
-            found = road(command)
-            print(f"{name}: {len(found.functions)} functions, {len(found.files)} files, {found.moves} moves")
-            for file, count in found.files.most_common():
+            trail = road(command)
+            print(f"{name}: {len(trail.functions)} functions, {len(trail.files)} files, {trail.moves} moves")
+            for file, count in trail.files.most_common():
                 print(f"{count:8d} {file}")

@@ -14,6 +14,7 @@ import wheels
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from chainunit.core.errors import RunError
 from chainunit.core.register import entries
 
 pytestmark = pytest.mark.second
@@ -67,6 +68,10 @@ def test_what_is_imported_by_name_is_declared():
         if re.search(r"\bimport_module\(|__import__\(|\bentries\(.*\.load\(\)", file.read_text("utf-8"))
     }
     assert by_name == BY_NAME
+    with pytest.raises(
+        RunError, match=r"no installed package declares chainunit\.other: install chainunit anew"
+    ):
+        entries("chainunit.other")
 
 
 BY_NAME = {

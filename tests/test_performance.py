@@ -168,9 +168,9 @@ def test_the_road_of_a_number_is_short(bench, tmp_path):
     """From a file to C; a number that is nowhere has no road."""
     road = bench("road")
     most = {
-        "machine of a study file": (29, 150),
-        "system of a study file": (36, 250),
-        "linkage file": (36, 400),
+        "machine of a study file": (28, 120),
+        "system of a study file": (34, 220),
+        "linkage file": (30, 500),
     }
     for name, command in road.commands(tmp_path).items():
         found = road.road(command)

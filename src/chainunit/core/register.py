@@ -7,7 +7,7 @@ from functools import cache
 from importlib import metadata
 from typing import TypeVar
 
-from .errors import InputError
+from .errors import InputError, RunError
 
 Thing = TypeVar("Thing")
 
@@ -20,14 +20,18 @@ def entries(group: str) -> dict[str, metadata.EntryPoint]:
     ------
     InputError
         for a name that two installed packages declare.
+    RunError
+        if there are none, as in an installation from before this group.
     """
-    found: dict[str, metadata.EntryPoint] = {}
+    points: dict[str, metadata.EntryPoint] = {}
     for entry in sorted(metadata.entry_points(group=group), key=lambda entry: entry.name):
-        other = found.setdefault(entry.name, entry)
+        other = points.setdefault(entry.name, entry)
         if other.value != entry.value:
             packages = " and ".join(e.dist.name if e.dist else e.value for e in (other, entry))
             raise InputError(f"{entry.name} of {group}: is declared by {packages}; uninstall one of them")
-    return found
+    if not points:
+        raise RunError(f"no installed package declares {group}: install chainunit anew")
+    return points
 
 
 class Register(MutableMapping[str, Thing]):
