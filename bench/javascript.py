@@ -55,7 +55,7 @@ return [false, true].map((between) => least(() => {
 """
 
 
-def row(name: str, model: type[Model]) -> list[str]:
+def row(name: str, model: Model) -> list[str]:
     trace(model)
     began = time.perf_counter()
     text = model_text(model)

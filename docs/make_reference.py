@@ -9,16 +9,17 @@ from typing import Any
 import typer.main
 
 from chainunit.app.cli import app
-from chainunit.capabilities import modules
 from chainunit.report import study_task
 from chainunit.report.markdown import markdown
 from chainunit.report.reference import reference
+from chainunit.study.registry import modules
 
 
 def commands() -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
     """Name of each command, the first paragraph of its help, and its arguments and options with their help."""
     group = typer.main.get_command(app)
-    named = {name: each for name, each in group.commands.items() if not each.hidden}
+    commands = {name: group.commands[name] for name in group.list_commands(typer.Context(group))}
+    named = {name: command for name, command in commands.items() if not command.hidden}
     below = {
         f"{name} {own}": each
         for name, of in named.items()

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from chainunit import app
-from chainunit.capabilities import modules
+from chainunit.study.registry import modules
 
 FILE = Path(app.__file__).with_name("study_methods.pyi")
 
@@ -23,7 +23,7 @@ def text() -> str:
         ]
         methods.append(f"    {method} = _{method}")
         results.append(f'"{result}"')
-    head = "# Made by docs/make_types.py from the list of capabilities."
+    head = "# Made by docs/make_types.py from the entry points of capabilities."
     shown = f"__all__ = [{', '.join(sorted(results))}]"
     return "\n".join([head, *imports, "", shown, "", "class StudyMethods:", *methods, ""])
 

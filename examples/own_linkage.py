@@ -4,7 +4,6 @@
 # A jaw that a crank-rocker swings: crank, coupler, rocker. The material resists the tip of the jaw.
 
 # %%
-from typing import ClassVar
 
 import numpy as np
 
@@ -72,42 +71,46 @@ class Outputs(PortValues):
 
 
 # %%
-class Jaw(InverseMachine):
-    """A jaw: motion of the motor shaft in, torque and reactions out."""
-
-    name = "Jaw"
-    noun = "jaw"
-    description = "Jaw swung by a crank-rocker"
-    Parameters, Inputs, Outputs = Parameters, Inputs, Outputs
-    joints: ClassVar = {"crank_bearing": ("O1", "crank"), "jaw_bearing": ("O2", "rocker")}  # pin and link
-
-    @staticmethod
-    def linkage(xp, p, u):
-        return Linkage(
-            ground={"O1": Vec2(0.0, 0.0), "O2": Vec2(p.x, p.y)},
-            driver=Crank(Bar("crank", "O1", p.r, p.crank), "A"),
-            groups=(
-                Dyad(
-                    "B",
-                    Bar("coupler", "A", p.l, p.coupler),
-                    Bar("rocker", "O2", p.h, p.rocker, {"tip": (p.jaw, 0.0)}),
-                    1.0,  # of the two ways to assemble it: B lies left (1) or right (-1) of the ray from A to O2
-                ),
+def linkage_of_jaw(xp, p, u):
+    return Linkage(
+        ground={"O1": Vec2(0.0, 0.0), "O2": Vec2(p.x, p.y)},
+        driver=Crank(Bar("crank", "O1", p.r, p.crank), "A"),
+        groups=(
+            Dyad(
+                "B",
+                Bar("coupler", "A", p.l, p.coupler),
+                Bar("rocker", "O2", p.h, p.rocker, {"tip": (p.jaw, 0.0)}),
+                1.0,  # of the two ways to assemble it: B lies left (1) or right (-1) of the ray from A to O2
             ),
-            loads={
-                "weight": Weight(p.g),
-                "material": Resistance("tip", u.resistance, p.processing),
-                "pins": PinLosses(p.pin, p.joint_damping),
-            },
-        )
+        ),
+        loads={
+            "weight": Weight(p.g),
+            "material": Resistance("tip", u.resistance, p.processing),
+            "pins": PinLosses(p.pin, p.joint_damping),
+        },
+    )
 
-    @classmethod
-    def probes(cls, xp, p, u, s, a):
-        reactions = s.reactions(a)
-        return {
-            "tip_x": s.m.pins["tip"].p.x,
-            **{name: force(reactions[joint]) for name, joint in cls.joints.items()},
-        }
+
+def probes_of_jaw(xp, p, u, s, a):
+    reactions = s.reactions(a)
+    return {
+        "tip_x": s.m.pins["tip"].p.x,
+        **{name: force(reactions[joint]) for name, joint in Jaw.joints.items()},
+    }
+
+
+Jaw = InverseMachine(
+    name="Jaw",
+    text="A jaw: motion of the motor shaft in, torque and reactions out.",
+    noun="jaw",
+    description="Jaw swung by a crank-rocker",
+    Parameters=Parameters,
+    Inputs=Inputs,
+    Outputs=Outputs,
+    joints={"crank_bearing": ("O1", "crank"), "jaw_bearing": ("O2", "rocker")},
+    linkage=linkage_of_jaw,
+    probes=probes_of_jaw,
+)
 
 
 # %% [markdown]

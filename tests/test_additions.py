@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import wheels
 import xarray as xr
 
 import chainunit
@@ -120,6 +121,18 @@ class House:
         self.package = folder / "src" / "chainunit"
         shutil.copytree(Path(chainunit.__file__).parent, self.package)
         shutil.copytree(Path(__file__).parents[1] / "fmu", folder / "fmu")
+        self.project = wheels.PROJECT.read_text("utf-8")
+        wheels.install_copy(self.package.parent, self.project)
+
+    def declare(self, **entries: str) -> None:
+        """Add entry points to pyproject.toml, each by the last word of its group, and install anew."""
+        for group, entry in entries.items():
+            head = f'[project.entry-points."chainunit.{group}"]'
+            place = self.project.index(head)
+            line = self.project.index("\n", place) + 1
+            self.project = f"{self.project[:line]}{entry}\n{self.project[line:]}"
+        wheels.install_copy(self.package.parent, self.project)
+        self.touched.append("pyproject.toml")
 
     @property
     def content(self) -> dict[str, bytes]:
@@ -169,15 +182,16 @@ def files_of(house, add):
 @pytest.fixture(scope="module")
 def result(house):
     """The study of the six-bar by a motor of a new type, with a new event, a new measure and a new figure."""
-    assert files_of(house, lambda: house.add("machines/six_bar.py", HERE / "six_bar.py")) == 1
+
+    def machine():
+        house.add("machines/six_bar.py", HERE / "six_bar.py")
+        house.declare(machines='SixBar = "chainunit.machines.six_bar:SixBar"')
 
     def motor():
         house.add("drives/servo_motor.py", HERE / "servo_motor.py")
-        house.insert("drives/motors.py", "\nMOTORS:", "from .servo_motor import ServoMotor\n")
-        path = house.package / "drives" / "motors.py"
-        types = "(DcMotor, InductionMotor)"
-        path.write_text(path.read_text("utf-8").replace(types, types[:-1] + ", ServoMotor)"), "utf-8")
+        house.declare(motors='ServoMotor = "chainunit.drives.servo_motor:ServoMotor"')
 
+    assert files_of(house, machine) == 2
     assert files_of(house, motor) == 2
     assert files_of(house, lambda: house.insert("study/events.py", "", EVENT)) == 1
     line = "    speed_mean: Value = measure("
@@ -188,7 +202,7 @@ def result(house):
     return ResultEntries(json.loads((house.folder / "mine" / "result.json").read_text("utf-8")))
 
 
-def test_a_machine_is_a_file_and_has_fmu_and_study(house, result):
+def test_a_machine_is_a_file_and_a_line_and_has_fmu_and_study(house, result):
     output = house.run("export", "SixBar", "-o", "SixBar.fmu", "--config", "mine.toml")
     assert output.startswith("SixBar.fmu: SixBar")
     assert result["machine"]["crank_length"]["value"] == 0.1 and result["status"] == "complete"
@@ -246,12 +260,10 @@ def test_a_part_of_the_line_is_a_file_and_a_line(house):
 
     def part():
         house.add("study/line/planetary_gear.py", HERE / "planetary_gear.py")
-        path = house.package / "study" / "line" / "__init__.py"
-        names = 'NAMES = ("driveline",)'
-        whole = path.read_text("utf-8")
-        assert whole.count(names) == 1
-        path.write_text(whole.replace(names, 'NAMES = ("planetary_gear", "driveline")'), "utf-8")
-        house.touched.append("study/line/__init__.py")
+        house.declare(
+            line='planetary_gear = "chainunit.study.line.planetary_gear:PART"',
+            models='PlanetaryGear = "chainunit.study.line.planetary_gear:PlanetaryGear"',
+        )
 
     assert files_of(house, part) == 2
     (house.folder / "line.toml").write_text(LINE, "utf-8")
@@ -289,13 +301,13 @@ def test_a_capability_is_a_folder_and_a_line(house):
 
     def capability():
         house.add_folder("capabilities/pin_life", HERE / "pin_life")
-        house.insert("capabilities/__init__.py", '    "comparison",\n', '    "pin_life",\n')
+        house.declare(capabilities='pin_life = "chainunit.capabilities.pin_life"')
 
     before = house.content
     assert files_of(house, capability) == 2
     changed = {name for name, text in house.content.items() if before.get(name) != text}
     outside = {name for name in changed if not name.startswith("capabilities/pin_life/")}
-    assert outside == {"capabilities/__init__.py"} and set(before) <= set(house.content)
+    assert not outside and set(before) <= set(house.content)
     (house.folder / "life.toml").write_text(LIFE, "utf-8")
     keys = house.run("keys", "pin_life")
     assert all(f"│ {key} " in keys for key in ("pin", "C", "p", "wanted"))
@@ -343,3 +355,40 @@ def test_a_capability_is_a_folder_and_a_line(house):
     (house.folder / "foreign.toml").write_text(foreign, "utf-8")
     assert "pin_life: needs the bearings of the machine" in house.run("study", "foreign.toml", status=2)
     assert "has no table [pin_life]" in house.run("pin-life", "bare.toml", status=2)
+
+
+def test_a_capability_comes_with_a_package_of_somebody_else(tmp_path):
+    """A wheel with an entry point brings table, rules, result, command and method to the installed program, of which
+    no file changes."""
+    name, site = "pin_life", tmp_path / "site"
+    shutil.copytree(HERE / name, site / "somebody" / name)
+    (site / "somebody" / "__init__.py").write_text("")
+    point = {"chainunit.capabilities": {name: f"somebody.{name}"}}
+    (tmp_path / "life.toml").write_text(LIFE, "utf-8")
+
+    def python(code: str, *arguments: str, status: int = 0) -> str:
+        env = os.environ | {"PYTHONPATH": str(site)}
+        call = [sys.executable, "-c", code, *arguments]
+        process = subprocess.run(call, cwd=tmp_path, env=env, capture_output=True, text=True)
+        assert process.returncode == status, process.stderr
+        return process.stderr if status else process.stdout
+
+    command = "from chainunit.app.cli import main; main()"
+    assert "life.toml:8: pin_life: unknown key" in python(command, "study", "life.toml", status=2)
+    wheels.install(site, point, "somebody")
+    assert all(f"│ {key} " in python(command, "keys", name) for key in ("pin", "C", "p", "wanted"))
+    wrong = LIFE.replace("C rocker pivot", "C rocker pivo")
+    (tmp_path / "wrong.toml").write_text(wrong, "utf-8")
+    assert 'pin_life.pin = "C rocker pivo": is no turning pin' in python(
+        command, "study", "wrong.toml", status=2
+    )
+    assert "Traceback" not in python(command, "pin-life", "life.toml", "-o", "alone", status=1)
+    alone = json.loads((tmp_path / "alone" / "pin_life.json").read_text("utf-8"))["pin_life"]
+    assert 0.0 < alone["life"]["value"] < alone["wanted"]["value"] == 7.2e7
+    method = "import chainunit; print(chainunit.Study.pin_life.__module__, 'PinLifeResult' in dir(chainunit))"
+    assert python(method).split() == [f"somebody.{name}.study_method", "True"]
+    # two packages with a capability of one name
+    wheels.install(site, {"chainunit.capabilities": {name: "other"}}, "other")
+    words = f"{name} of chainunit.capabilities: is declared by somebody and other; uninstall one of them"
+    fault = python(command, "study", "life.toml", status=2)
+    assert words in fault or words.replace("somebody and other", "other and somebody") in fault

@@ -1,4 +1,4 @@
-"""Each capability is one folder and a name in the list: without both the rest works, and its keys are unknown."""
+"""Each capability is one folder and an entry point: without both the rest works, and its keys are unknown."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ import sys
 from pathlib import Path
 
 import pytest
+import wheels
 
 import chainunit
-from chainunit.capabilities import NAMES
+from chainunit.core.register import entries
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.study.registry import capabilities
+from chainunit.study.registry import CAPABILITIES, capabilities
 
 PACKAGE = Path(chainunit.__file__).parent
+NAMES = sorted(wheels.declared(wheels.PROJECT.read_text("utf-8"))[CAPABILITIES])
 STUDY = """
 [run]
 crank_speed = 6
@@ -56,10 +58,20 @@ print(json.dumps({"properties": list(properties), "refused": refused}))
 """
 
 
-def test_the_list_names_the_folders():
+ORDER = """
+chains sizing static_inertia energy sides blade random_overloads flywheels torsion checks optimize identification
+watch sweep comparison linear handover vouching
+""".split()
+
+
+def test_the_entry_points_name_the_folders():
     folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
     assert folders == set(NAMES) and len(NAMES) == len(folders)
-    assert [part.name for part in capabilities()] == list(NAMES)
+    assert [part.name for part in capabilities()] == ORDER and sorted(ORDER) == NAMES
+    # an install from before a new capability does not have it: install the project anew
+    assert {name: entry.value for name, entry in entries(CAPABILITIES).items()} == {
+        name: f"chainunit.capabilities.{name}" for name in NAMES
+    }
     own_tests = {path.parent.name for path in (Path(__file__).parent / "capabilities").glob("*/test_*.py")}
     assert own_tests <= set(NAMES)
     assert len([part for part in capabilities() if part.motor_table]) <= 1
@@ -122,10 +134,9 @@ def test_the_rest_works_without(name, tmp_path):
     # with the compiled modules, which are valid as long as the dates of the files are
     shutil.copytree(PACKAGE, copy)
     shutil.rmtree(copy / "capabilities" / name)
-    line, file = f'    "{name}",\n', copy / "capabilities" / "__init__.py"
-    text = file.read_text("utf-8")
+    line, text = f'{name} = "chainunit.capabilities.{name}"\n', wheels.PROJECT.read_text("utf-8")
     assert text.count(line) == 1
-    file.write_text(text.replace(line, ""), "utf-8")
+    wheels.install_copy(copy.parent, text.replace(line, ""))
     shutil.copytree(Path(__file__).parents[1] / "fmu", tmp_path / "fmu")
     (tmp_path / "study.toml").write_text(STUDY)
     own = next(part for part in capabilities() if part.name == name)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import pytest
 
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.errors import InputError
+from chainunit.core.model import Model
 from chainunit.core.quantities import Layout, Quantity, base_units, quotient, variables, within_bounds
 from chainunit.fmu.description import Interface, model_description, model_description_3
 from chainunit.models import MODELS
@@ -192,3 +195,28 @@ def test_the_unit_of_a_rate_is_that_of_an_engineer():
     for unit, rate in zip(units, rates, strict=True):
         powers = base_units(unit)
         assert base_units(rate) == {k: n for k, n in (powers | {"s": powers.get("s", 0) - 1}).items() if n}
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_a_model_is_a_frozen_instance_that_another_process_gets(model):
+    assert isinstance(model, Model) and type(Model) is type
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        model.name = "Other"
+    assert pickle.loads(pickle.dumps(model)) is model
+    for name in ("Parameters", "Inputs"):
+        values = getattr(model, name)()
+        assert pickle.loads(pickle.dumps(values)) == values
+
+
+def test_what_follows_from_a_model_follows_anew():
+    """Its parts from its outputs, and the number of derived values from its linkage; what is stated stays."""
+    knife = MODELS["KnifeDrive"]
+    other = knife.altered(name="Other", probes=lambda xp, p, u, s, a: knife.probes(xp, p, u, s, 2.0 * a))
+    p, u = knife.check(knife.Parameters()), knife.Inputs(w=3.0, a=1.0)
+    force, twice = (model.evaluate(MATH, p, u)[0].crank_bearing.fx for model in (knife, other))
+    assert force != twice and other.parts is not knife.parts
+    assert (other.derived_count, other.pins, other.direct_name) == (53, knife.pins, "OtherDirect")
+    with pytest.raises(
+        TypeError, match=r"Other: the module chainunit\.\w+\.knife_drive has no such model; state"
+    ):
+        pickle.dumps(other)

@@ -49,7 +49,7 @@ def both(model):
 )
 def test_the_description_differs_by_its_names_alone(model):
     """Of FMI 2 and 3, terminals included; no variable of the model is left with its dots, whatever text names it."""
-    interfaces = both(model if isinstance(model, type) else model())
+    interfaces = both(model if isinstance(model, Model) else model())
     names = {s.variable.name for s in interfaces[0].signals}
     assert any("." in name for name in names)
     for write in (model_description, model_description_3):
@@ -137,12 +137,14 @@ class Sum:
     y: float = quantity("1", "their sum")
 
 
-class Clash(Model):
-    """Two parameters that differ by their dots alone."""
-
-    name, description = "Clash", "two parameters that differ by their dots alone"
-    Parameters, Inputs = Other, Inner
-    parts = (Part(Sum, lambda xp, p, u, x, shared: Sum(y=p.a.b_c + p.a_b_c)),)
+Clash = Model(
+    name="Clash",
+    text="Two parameters that differ by their dots alone.",
+    description="two parameters that differ by their dots alone",
+    Parameters=Other,
+    Inputs=Inner,
+    parts=(Part(Sum, lambda xp, p, u, x, shared: Sum(y=p.a.b_c + p.a_b_c)),),
+)
 
 
 def test_names_that_become_the_same_are_refused(tmp_path):

@@ -470,7 +470,7 @@ def test_wall_and_web_of_a_chain_are_the_lines_to_b():
         now = named(model, p, u, model.state_layout.instance(x))
         states = model.state_layout.by_name(model.state_layout.instance(x))
         rocker = crank_rocker(p, u.phi / p.ratio).links["rocker"].at(p.e).p
-        walls = model.made.arguments[0]
+        walls = model.made[1][0]
         for side, a1 in (("left", -p.z), ("right", p.z)):
             theta = [states[f"{side}.theta_{k + 1}"] for k in range(walls)]
             b = np.array([a1, 0.0]) + p.l1 / walls * np.array(
@@ -498,7 +498,7 @@ def dense(model, p, u, x, side, a2):
         {"left": -1.0, "right": 1.0}[side],
     )
     N = len([n for n in states if n.startswith("left.theta")])
-    walls = model.made.arguments[0]
+    walls = model.made[1][0]
     theta, omega = (np.array([states[f"{side}.{n}_{k + 1}"] for k in range(N)]) for n in ("theta", "omega"))
     loads, own = getattr(u, side), getattr(p, side)
     on_web = p.web_share * loads.material_mass
@@ -991,8 +991,8 @@ def test_numbers_of_rods_that_make_no_model():
         with pytest.raises(InputError, match=f"{walls + webs} rods an organ.* at most 24 in all") as refusal:
             flexible(walls, webs)
         assert "\n" not in str(refusal.value)
-    assert flexible(3, 1) is flexible(3, 1) and flexible(3, 1).made.arguments == (3, 1)
-    assert flexible(3, 1).direct().made.arguments == (flexible(3, 1),)
+    assert flexible(3, 1) is flexible(3, 1) and flexible(3, 1).made[1] == (3, 1)
+    assert flexible(3, 1).direct().made[1] == (flexible(3, 1),)
 
 
 def test_two_rods_stand_where_a_hanging_chain_would_not():

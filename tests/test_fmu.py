@@ -743,13 +743,13 @@ def in_process(fmus, tmp_path, monkeypatch):
         resources = tmp_path / name / "resources"
         monkeypatch.syspath_prepend(str(resources))
         module = __import__((resources / "slavemodule.txt").read_text())
+        inputs = Interface(MODELS[name], {}).signals_of("input")
+        references = [s.reference for s in inputs if s.variable.type == "Real"]
 
         def slave():
             unit = getattr(module, name)(instance_name="unit", resources=str(resources))
             unit.enter_initialization_mode()
             unit.exit_initialization_mode()
-            inputs = Interface(MODELS[name], {}).signals_of("input")
-            references = [s.reference for s in inputs if s.variable.type == "Real"]
             unit.set_real(references, [0.3 + 0.1 * k for k in range(len(references))])
             return unit
 
@@ -762,7 +762,7 @@ REFERENCES = {s.name: s.reference for s in Interface(ChamberForces, {}).signals}
 
 
 def test_a_step_evaluates_once_what_was_read(in_process, monkeypatch):
-    """A host that reads one output a call evaluates once a step after its first step; many such reads, all outputs."""
+    """Also if a host reads one output a call, after its first step. Many such reads make it all outputs."""
     unit = in_process("ChamberForces")()
     module = sys.modules[type(unit._instance).__module__]
     evaluation, calls = module._evaluation, []
@@ -791,7 +791,7 @@ def test_a_step_evaluates_once_what_was_read(in_process, monkeypatch):
     assert evaluated("power") == [outputs]
 
 
-@pytest.mark.parametrize("name", ["ChamberForces", "ChainUnit", "InductionMotor", "LoadObserver"])
+@pytest.mark.parametrize("name", ["ChamberForces", "ChainUnit", "DcMotor"])
 def test_an_output_has_the_same_bits_whatever_is_read_with_it(in_process, name):
     slave = in_process(name)
     whole = slave()._instance

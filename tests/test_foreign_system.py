@@ -20,7 +20,7 @@ from test_foreign import changed
 from chainunit import InputError, RunError
 from chainunit.core.model import Terminal
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.drives.motor import Motor
+from chainunit.drives.motor import FOREIGN
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config, run
 from chainunit.study.choice import choose, drive_of
@@ -307,7 +307,7 @@ def test_what_needs_the_equations_says_so(machine, file):
 def test_a_drive_with_a_motor_of_somebody_else(file, tmp_path):
     """What a study does: from rest to steady running, then a jam from there."""
     given = config.load()
-    drive = Drive(Motor, None, given.machine, foreign=foreign_component(file, "motor"))
+    drive = Drive(FOREIGN, None, given.machine, foreign=foreign_component(file, "motor"))
     assert drive.follows
     fmus, made = export_drive(drive, tmp_path, "python")
     assert set(made) == {"machine"} and fmus["motor"] == file

@@ -68,6 +68,20 @@ def test_a_package_that_is_not_installed_has_a_sentence(module, package):
     assert "Traceback" in run("chainunit.nothing").stderr
 
 
+@pytest.mark.parametrize(("name", "most"), [("ChamberForces", 90), (TIPPER, 115)])
+def test_an_export_imports_the_machine_and_nothing_of_studies(name, most, tmp_path):
+    code = f"import sys; {_command('export', name, '-o', str(tmp_path / 'it.fmu'), '--backend', 'python')}"
+    after = "print('loaded', *(m for m in sys.modules if m.split('.')[0] == 'chainunit'))"
+    run = subprocess.run(
+        [sys.executable, "-c", f"{code}; {after}"], capture_output=True, text=True, check=True
+    )
+    loaded = run.stdout.splitlines()[-1].split()[1:]
+    assert "chainunit.fmu.native.export" in loaded and len(loaded) <= most, len(loaded)
+    assert not {m for m in loaded if m.startswith(("chainunit.study", "chainunit.capabilities"))}
+    others = {"accelerator", "knife_drive", "flexible"}
+    assert not others & {m.rpartition(".")[2] for m in loaded}
+
+
 RESULTS = ("BestResult", "IdentificationResult", "SweepResult", "WatchResult")
 
 

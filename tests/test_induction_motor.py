@@ -279,7 +279,7 @@ def test_without_voltage_the_terminals_are_short_circuited():
     locked = steady(engines.MATH, p, 0.0).i
     assert max(s.i for s in seen) > 0.8 * locked > 3.0 * before.i
     assert min(s.air_gap_tau for s in seen) < -before.air_gap_tau
-    assert "At 0 the terminals are short-circuited" in " ".join(InductionMotor.__doc__.split())
+    assert "At 0 the terminals are short-circuited" in " ".join(InductionMotor.text.split())
     x = run(p, u, 2.0, x)
     out = outputs(p, u, x)
     assert out.i < 1e-4 * before.i and abs(out.air_gap_tau) < 1e-4 * before.air_gap_tau

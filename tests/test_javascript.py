@@ -318,13 +318,14 @@ class Power:
     b: Value = quantity("1", "a power of it")
 
 
-class Powers(Model):
-    """A power whose bits differ between browsers."""
-
-    name = "Powers"
-    description = "a power with a broken exponent"
-    Parameters, Inputs = One, One
-    parts = (Part(Power, lambda xp, p, u, x, shared: Power(b=u.a**1.7)),)
+Powers = Model(
+    name="Powers",
+    text="A power whose bits differ between browsers.",
+    description="a power with a broken exponent",
+    Parameters=One,
+    Inputs=One,
+    parts=(Part(Power, lambda xp, p, u, x, shared: Power(b=u.a**1.7)),),
+)
 
 
 def test_a_function_whose_bits_differ_is_refused():
@@ -369,13 +370,14 @@ def results_of(xp, p, u, x, shared):
     )
 
 
-class Functions(Model):
-    """Each function of our own."""
-
-    name = "Functions"
-    description = "functions of two numbers"
-    Parameters, Inputs = One, Arguments
-    parts = (Part(Results, results_of),)
+Functions = Model(
+    name="Functions",
+    text="Each function of our own.",
+    description="functions of two numbers",
+    Parameters=One,
+    Inputs=Arguments,
+    parts=(Part(Results, results_of),),
+)
 
 
 RUN = """

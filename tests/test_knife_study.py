@@ -568,16 +568,9 @@ def test_a_motor_of_the_catalogue_is_one_of_it():
 
 def test_the_blade_follows_from_the_declaration_and_not_from_the_machine(monkeypatch):
     """A machine of another name that cuts has analysis and picture of the blade; one that does not cut has none."""
-    for name in ("OtherKnife", "Pusher"):
-        monkeypatch.setitem(MACHINES, name, None)
-
-    class OtherKnife(KnifeDrive):
-        name = "OtherKnife"
-
-    class Pusher(KnifeDrive):
-        name, cuts = "Pusher", False
-
-    for machine in (OtherKnife, Pusher):
+    machines = [KnifeDrive.altered(name="OtherKnife"), KnifeDrive.altered(name="Pusher", cuts=False)]
+    for machine in machines:
+        monkeypatch.setitem(MACHINES, machine.name, machine)
         chosen = parse(f'[system]\nmachine = "{machine.name}"')
         drive = Drive(chosen.motor.kind, chosen.motor.parameters, chosen.machine)
         assert BladeAnalysis.applies(drive, chosen.plans) == machine.cuts

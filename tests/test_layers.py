@@ -10,8 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import wheels
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
+
+from chainunit.core.register import entries
 
 pytestmark = pytest.mark.second
 
@@ -34,6 +37,49 @@ def test_imports_run_downward():
     upward = {(a, b) for a, b in HOUSE.imports() if not HOUSE.admitted(HOUSE.layer(a), HOUSE.layer(b))}
     assert upward <= UPWARD, f"these imports run upward: {sorted(upward - UPWARD)}"
     assert upward >= UPWARD, f"these are mended, take them out of UPWARD: {sorted(UPWARD - upward)}"
+
+
+HOMES = {
+    "chainunit.machines": {"machines"},
+    "chainunit.motors": {"drives"},
+    "chainunit.models": {"machines", "drives"},
+    "chainunit.line": {"study"},
+    "chainunit.capabilities": {"capabilities"},
+}
+"""By group of entry points, the layers that declare in it."""
+
+
+def test_what_is_imported_by_name_is_declared():
+    """The layers below find what the layers above have by entry points alone. Each is of the layers of its group, and
+    names a module that is there; the installed ones are these of the project."""
+    declared = wheels.declared(wheels.PROJECT.read_text("utf-8"))
+    assert declared.keys() == HOMES.keys()
+    for group, points in declared.items():
+        assert {name: entry.value for name, entry in entries(group).items() if _is_own(entry)} == points
+        for value in points.values():
+            module = value.partition(":")[0].removeprefix("chainunit.")
+            assert HOUSE.layer(module) in HOMES[group], value
+            path = HOUSE.PACKAGE.joinpath(*module.split("."))
+            assert path.is_dir() or path.with_suffix(".py").exists(), value
+    by_name = {
+        ".".join(file.relative_to(HOUSE.PACKAGE).with_suffix("").parts)
+        for file in HOUSE.PACKAGE.rglob("*.py")
+        if re.search(r"\bimport_module\(|__import__\(|\bentries\(.*\.load\(\)", file.read_text("utf-8"))
+    }
+    assert by_name == BY_NAME
+
+
+BY_NAME = {
+    "__init__",  # the names for users
+    "core.register",
+    "study.registry",  # the modules in the folder of a capability
+    "core.model",  # a model that pickle takes by its place
+}
+"""The modules that import others by name."""
+
+
+def _is_own(entry):
+    return entry.dist is None or entry.dist.name == "chainunit"
 
 
 @pytest.mark.second

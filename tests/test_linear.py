@@ -302,40 +302,46 @@ def test_points_of_steady_running_and_of_an_event():
 # -- places that are not smooth
 
 
-class Kinks(Model):
-    """A mass on a stop and friction near rest."""
-
-    name, description = "Kinks", "a mass on a stop"
-
-    @declaration
-    class Parameters:
-        stiffness: float = quantity("N/m", "of the stop", default=100.0)
-
-    @declaration
-    class Inputs:
-        force: float = quantity("N", "on the mass", default=0.0)
-
-    @declaration
-    class States:
-        x: float = quantity("m", "place")
-        v: float = quantity("m/s", "speed")
-
-    @declaration
-    class Outputs:
-        stop: float = quantity("N", "force of the stop")
-        root: float = quantity("1", "a root")
-
-    @staticmethod
-    def derivatives(xp, p, u, x):
-        friction = x.v / xp.sqrt(x.v * x.v + 1e-10)
-        return [x.v, u.force - p.stiffness * xp.maximum(x.x, 0.0) - friction]
-
-    @staticmethod
-    def _outputs(xp, p, u, x, shared):
-        return Kinks.Outputs(stop=p.stiffness * xp.maximum(x.x, 0.0), root=xp.sqrt(xp.maximum(x.x, 0.0)))
+@declaration
+class KinksParameters:
+    stiffness: float = quantity("N/m", "of the stop", default=100.0)
 
 
-Kinks.parts = (Part(Kinks.Outputs, Kinks._outputs),)
+@declaration
+class KinksInputs:
+    force: float = quantity("N", "on the mass", default=0.0)
+
+
+@declaration
+class KinksStates:
+    x: float = quantity("m", "place")
+    v: float = quantity("m/s", "speed")
+
+
+@declaration
+class KinksOutputs:
+    stop: float = quantity("N", "force of the stop")
+    root: float = quantity("1", "a root")
+
+
+def derivatives_of_kinks(xp, p, u, x):
+    friction = x.v / xp.sqrt(x.v * x.v + 1e-10)
+    return [x.v, u.force - p.stiffness * xp.maximum(x.x, 0.0) - friction]
+
+
+def outputs_of_kinks(xp, p, u, x, shared):
+    return KinksOutputs(stop=p.stiffness * xp.maximum(x.x, 0.0), root=xp.sqrt(xp.maximum(x.x, 0.0)))
+
+
+Kinks = Model(
+    name="Kinks",
+    description="a mass on a stop",
+    Parameters=KinksParameters,
+    Inputs=KinksInputs,
+    States=KinksStates,
+    derivatives=derivatives_of_kinks,
+    parts=(Part(KinksOutputs, outputs_of_kinks),),
+)
 
 
 def test_kinks_and_bends_are_told():
@@ -350,37 +356,43 @@ def test_kinks_and_bends_are_told():
     assert not linearize("Accelerator").bends
 
 
-class Meshing(Model):
-    """An angle with a force that bends once in a turn."""
-
-    name, description = "Meshing", "a stop in each turn"
-
-    @declaration
-    class Parameters:
-        stiffness: float = quantity("N.m", "stiffness", default=1.0)
-
-    @declaration
-    class Inputs:
-        torque: float = quantity("N.m", "torque", default=0.0)
-
-    @declaration
-    class States:
-        phi: float = quantity("rad", "angle")
-
-    @declaration
-    class Outputs:
-        stop: float = quantity("N.m", "torque of the stop")
-
-    @staticmethod
-    def derivatives(xp, p, u, x):
-        return [u.torque]
-
-    @staticmethod
-    def _outputs(xp, p, u, x, shared):
-        return Meshing.Outputs(stop=p.stiffness * xp.maximum(xp.sin(x.phi), 0.0))
+@declaration
+class MeshingParameters:
+    stiffness: float = quantity("N.m", "stiffness", default=1.0)
 
 
-Meshing.parts = (Part(Meshing.Outputs, Meshing._outputs),)
+@declaration
+class MeshingInputs:
+    torque: float = quantity("N.m", "torque", default=0.0)
+
+
+@declaration
+class MeshingStates:
+    phi: float = quantity("rad", "angle")
+
+
+@declaration
+class MeshingOutputs:
+    stop: float = quantity("N.m", "torque of the stop")
+
+
+def derivatives_of_meshing(xp, p, u, x):
+    return [u.torque]
+
+
+def outputs_of_meshing(xp, p, u, x, shared):
+    return MeshingOutputs(stop=p.stiffness * xp.maximum(xp.sin(x.phi), 0.0))
+
+
+Meshing = Model(
+    name="Meshing",
+    description="a stop in each turn",
+    Parameters=MeshingParameters,
+    Inputs=MeshingInputs,
+    States=MeshingStates,
+    derivatives=derivatives_of_meshing,
+    parts=(Part(MeshingOutputs, outputs_of_meshing),),
+)
 
 
 def test_an_angle_of_many_turns_has_no_bend_of_another_turn():

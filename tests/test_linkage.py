@@ -32,7 +32,7 @@ from chainunit.machines.parts import Force, Pin, Processing, force
 from chainunit.mechanism.chains import ChainedState
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.machine import MachineState, Mechanism
-from chainunit.mechanism.models import MACHINES, InverseMachine, ShaftMotion
+from chainunit.mechanism.models import InverseMachine, ShaftMotion
 
 DATA = json.loads((Path(__file__).parent / "data" / "stephenson.json").read_text())
 BODIES = {body["name"]: body for body in DATA["description"]["bodies"]}
@@ -81,47 +81,47 @@ def bar(name: str, pin: str, end: str, points: Any = None) -> Bar:
     return Bar(name, pin, body["points"][end][0], mass, {n: tuple(body["points"][n]) for n in points or ()})
 
 
-class SixBar(InverseMachine):
-    """A Stephenson six-bar: the second dyad hangs on a point of the coupler."""
+def linkage_of_sixbar(xp, p, u):
+    """Crank, dyad, dyad."""
+    return Linkage(
+        GROUND,
+        Crank(bar("crank", "O1", "A"), "A"),
+        (
+            Dyad("B", bar("coupler", "A", "B", ["P"]), bar("rocker", "O2", "B"), 1.0),
+            Dyad("Q", bar("link", "P", "Q"), bar("output", "O3", "Q", ["W"]), -1.0),
+        ),
+        {
+            "weight": Weight(p.g),
+            "load": Push("W", Vec2(u.load.fx, u.load.fy)),
+            "resistance": Resistance("P", u.resistance, p.processing),
+            "pins": PinLosses(p.pin, p.joint_damping),
+        },
+    )
 
-    name = "SixBar"
-    description = "Stephenson six-bar"
-    Parameters = Parameters
-    Inputs = Inputs
-    Outputs = Outputs
-    joints = MappingProxyType({"output_bearing": ("O3", "output")})
 
-    @staticmethod
-    def linkage(xp, p, u):
-        """Crank, dyad, dyad."""
-        return Linkage(
-            GROUND,
-            Crank(bar("crank", "O1", "A"), "A"),
-            (
-                Dyad("B", bar("coupler", "A", "B", ["P"]), bar("rocker", "O2", "B"), 1.0),
-                Dyad("Q", bar("link", "P", "Q"), bar("output", "O3", "Q", ["W"]), -1.0),
-            ),
-            {
-                "weight": Weight(p.g),
-                "load": Push("W", Vec2(u.load.fx, u.load.fy)),
-                "resistance": Resistance("P", u.resistance, p.processing),
-                "pins": PinLosses(p.pin, p.joint_damping),
-            },
-        )
+def probes_of_sixbar(xp, p, u, s, a):
+    """Bearing and angle of the output link."""
+    output = s.m.links["output"].u
+    return {
+        "output_bearing": force(s.reactions(a)[SixBar.joints["output_bearing"]]),
+        "angle": xp.atan2(output.y, output.x),
+    }
 
-    @classmethod
-    def probes(cls, xp, p, u, s, a):
-        """Bearing and angle of the output link."""
-        output = s.m.links["output"].u
-        return {
-            "output_bearing": force(s.reactions(a)[cls.joints["output_bearing"]]),
-            "angle": xp.atan2(output.y, output.x),
-        }
+
+SixBar = InverseMachine(
+    name="SixBar",
+    text="A Stephenson six-bar: the second dyad hangs on a point of the coupler.",
+    description="Stephenson six-bar",
+    Parameters=Parameters,
+    Inputs=Inputs,
+    Outputs=Outputs,
+    joints=MappingProxyType({"output_bearing": ("O3", "output")}),
+    linkage=linkage_of_sixbar,
+    probes=probes_of_sixbar,
+)
 
 
 TurningSixBar = SixBar.direct()
-# other tests ask which machines the package has
-MACHINES.pop(SixBar.name)
 LOSSY = {"ratio": 3.0, "pin.friction": 0.15, "joint_damping": 0.3}
 
 
@@ -234,23 +234,17 @@ def test_the_direct_model_is_the_inverse_of_the_inverse_one(seed):
     assert out.power == pytest.approx(stored + out.dissipated_power, abs=1e-10 * abs(stored) + 1e-9)
 
 
-class LightSixBar(SixBar):
-    """Whose crank is given no body at all."""
-
-    @staticmethod
-    def linkage(xp, p, u):
-        """The same but for the crank."""
-        bars = SixBar.linkage(xp, p, u)
-        return replace(bars, driver=Crank(bars.driver.bar._replace(mass=None), "A"))
+def light_linkage(xp, p, u):
+    """The same but for the crank, which has no body at all."""
+    bars = SixBar.linkage(xp, p, u)
+    return replace(bars, driver=Crank(bars.driver.bar._replace(mass=None), "A"))
 
 
-class OtherSixBar(SixBar):
-    """With another probe."""
-
-    @classmethod
-    def probes(cls, xp, p, u, s, a):
-        """The angle as a constant."""
-        return super().probes(xp, p, u, s, a) | {"angle": 3.0}
+LightSixBar = SixBar.altered(name="LightSixBar", linkage=light_linkage)
+OtherSixBar = SixBar.altered(
+    name="OtherSixBar",
+    probes=lambda xp, p, u, s, a: SixBar.probes(xp, p, u, s, a) | {"angle": 3.0},
+)
 
 
 def test_a_machine_made_of_another_has_its_own_outputs():
@@ -341,7 +335,7 @@ def test_a_chain_hangs_on_any_linkage():
 
 
 def test_names_follow_from_the_description():
-    topology = SixBar.topology()
+    topology = SixBar.topology
     assert topology.links == {
         "crank": ("O1", "A"), "coupler": ("A", "B", "P"), "rocker": ("O2", "B"), "link": ("P", "Q"),
         "output": ("O3", "Q", "W"),

@@ -127,13 +127,13 @@ def backwards(data):
 def test_the_order_of_entries_changes_nothing_of_a_model():
     """Not either by the file of the two that this process reads first."""
     (_, _, _, _, model, _), *_ = closing(1)
-    (data,) = model.made.arguments
+    (data,) = model.made[1]
     assert list(backwards(data)) != list(data)
     outputs = []
     for given in (backwards(data), data):
         linkage_model._machine_of.cache_clear()
         machine = machine_of(given)
-        outputs.append(repr((machine.made.arguments, [v.name for v in outputs_of(machine)])))
+        outputs.append(repr((machine.made[1], [v.name for v in outputs_of(machine)])))
     assert outputs[0] == outputs[1]
 
 

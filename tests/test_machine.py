@@ -44,7 +44,7 @@ def test_a_machine_follows_from_its_model(model):
 def test_each_bearing_has_an_output_and_a_joint(model):
     names = [name for part in model.parts for name in part.layout.names]
     assert list(model.pins.values()) == list(model.joints) and len(model.pins) == len(model.joints)
-    assert set(model.joints.values()) <= set(model.topology().joints)
+    assert set(model.joints.values()) <= set(model.topology.joints)
     for output in model.pins.values():
         assert {f"{output}.fx", f"{output}.fy"} <= set(names)
     turned = Machine(model).pin_turns({"phi0": np.linspace(0.0, 1.0, 20)})
@@ -124,10 +124,8 @@ def test_what_a_chain_unit_has_beside_others():
 
 
 def test_a_machine_derived_from_the_chain_unit_is_one(monkeypatch):
-    monkeypatch.setitem(MACHINES, "OtherUnit", None)
-
-    class OtherUnit(ChamberForces):
-        name = "OtherUnit"
+    OtherUnit = ChamberForces.altered(name="OtherUnit")
+    monkeypatch.setitem(MACHINES, "OtherUnit", OtherUnit)
 
     machine = parse('[system]\nmachine = "OtherUnit"\n[machine]\nratio = 20').machine
     assert isinstance(machine, ChainUnitMachine) and machine.model is OtherUnit and machine.ratio == 20.0
@@ -143,7 +141,7 @@ def test_a_machine_shows_the_call_that_makes_it():
     knife = Machine(KnifeDrive, {"knife.m": 90.0}, ratio=10.0)
     assert repr(knife) == 'Machine(KnifeDrive, {"knife.m": 90, "ratio": 10})'
     assert eval(repr(knife)).p == knife.p
-    other = type("OtherUnit", (ChamberForces,), {})
+    other = ChamberForces.altered(name="OtherUnit")
     assert repr(ChainUnitMachine(model=other)) == "ChainUnitMachine(model=OtherUnit)"
     # a length that is off by rounding is no change
     assert repr(ChainUnitMachine(r=0.15000000000000002)) == "ChainUnitMachine()"

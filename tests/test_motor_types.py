@@ -10,7 +10,7 @@ from additions.servo_motor import ServoMotor
 from reports import page_of
 from systems import pair
 
-from chainunit.drives.motors import MOTORS
+from chainunit.models import MOTORS
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study import config, run
 from chainunit.study.result import as_dict

@@ -94,18 +94,19 @@ class Result:
     z: Value = quantity("1", "result")
 
 
-class Formula(Model):
-    """A sum of two products, a quotient, a root and a sine."""
-
-    name = "Formula"
-    description = "operations that are easy to count"
-    Parameters, Inputs = Factor, Pair
-    parts = (
+Formula = Model(
+    name="Formula",
+    text="A sum of two products, a quotient, a root and a sine.",
+    description="operations that are easy to count",
+    Parameters=Factor,
+    Inputs=Pair,
+    parts=(
         Part(
             Result,
             lambda xp, p, u, x, shared: Result(z=u.x * u.y + p.k * u.x + xp.sqrt(u.y) / u.x + xp.sin(u.x)),
         ),
-    )
+    ),
+)
 
 
 def test_operations_are_counted(bench):
@@ -160,3 +161,20 @@ def test_another_engine_finds_the_torque(name, torque, loop, bench, tmp_path, mo
     other = bench("other_engines")
     rows = other.ENGINES[name](other.Rods(), 1000)
     assert rows and all(0.0 < row["torque"] < torque and 0.0 < row["loop"] < loop for row in rows)
+
+
+@pytest.mark.second
+def test_the_road_of_a_number_is_short(bench, tmp_path):
+    """From a file to C; a number that is nowhere has no road."""
+    road = bench("road")
+    most = {
+        "machine of a study file": (29, 150),
+        "system of a study file": (36, 250),
+        "linkage file": (36, 400),
+    }
+    for name, command in road.commands(tmp_path).items():
+        found = road.road(command)
+        files, moves = most[name]
+        assert {"fmu/native/generate.py", "core/printing/c_forms.py"} <= set(found.files)
+        assert len(found.files) <= files and found.moves <= moves, (name, len(found.files), found.moves)
+    assert road.road(["export", "DcMotor", "-o", str(tmp_path / "it.fmu")]).moves == 0

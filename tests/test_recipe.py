@@ -39,22 +39,28 @@ class GearOutputs(PortSlopes, PortValues):
     pass
 
 
-class Gear(Model):
-    """No states; takes a port and shows one."""
-
-    name = "Gear"
-    description = "a gear"
-    Parameters, Inputs = GearParameters, GearInputs
-    terminals = (load_terminal(), load_terminal("load.", "machine"))
-    parts = (
+Gear = Model(
+    name="Gear",
+    text="No states; takes a port and shows one.",
+    description="a gear",
+    Parameters=GearParameters,
+    Inputs=GearInputs,
+    terminals=(load_terminal(), load_terminal("load.", "machine")),
+    parts=(
         Part(
             GearOutputs,
             lambda xp, p, u, x, shared: GearOutputs(
-                tau_bias=u.load.tau_bias / p.ratio, J=u.load.J / p.ratio**2, dJ_dphi=0.0 * u.share,
-                phi0=u.load.phi0, w0=u.load.w0, tau_bias_dphi=u.load.tau_bias_dphi, tau_bias_dw=u.load.tau_bias_dw,
+                tau_bias=u.load.tau_bias / p.ratio,
+                J=u.load.J / p.ratio**2,
+                dJ_dphi=0.0 * u.share,
+                phi0=u.load.phi0,
+                w0=u.load.w0,
+                tau_bias_dphi=u.load.tau_bias_dphi,
+                tau_bias_dw=u.load.tau_bias_dw,
             ),
         ),
-    )  # fmt: skip
+    ),
+)
 
 
 @pytest.mark.parametrize("model", [*MODELS.values(), Gear], ids=[*MODELS, "Gear"])
@@ -105,9 +111,7 @@ def test_icons_follow_from_the_terminals():
     }.items():  # fmt: skip
         assert shown(MODELS[name]) == {"svg": f"{reference}.svg", "png": f"{reference}.png"}
     assert shown(Gear)["svg"] == "line.svg"
-    other = type(
-        "Other", (Gear,), {"name": "Other", "terminals": (Terminal("x", "other", "", {}), *flanges("inflow"))}
-    )
+    other = Gear.altered(name="Other", terminals=(Terminal("x", "other", "", {}), *flanges("inflow")))
     assert shown(other)["svg"] == "machine.svg"
 
 

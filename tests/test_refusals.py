@@ -9,8 +9,7 @@ from command import chainunit
 from wrong_files import FILES
 
 from chainunit.core.errors import InputError, shown
-from chainunit.drives.motors import MOTORS
-from chainunit.models import MACHINES
+from chainunit.models import MACHINES, MOTORS
 from chainunit.reading.tables import in_file
 from chainunit.reading.toml_lines import lines_of
 from chainunit.study.config import parse

@@ -18,7 +18,7 @@ from chainunit.core import integrators
 from chainunit.core.engines import MATH
 from chainunit.core.model import Model, Part
 from chainunit.core.native.compilers import compiler
-from chainunit.core.quantities import Value, declaration, declared_class, group, quantity
+from chainunit.core.quantities import Layout, Value, declaration, declared_class, group, quantity
 from chainunit.core.solver import Solver
 from chainunit.fmu.backends import export
 
@@ -64,57 +64,37 @@ def slope(xp, p, x):
     return [1.0, -p.rate * (x.stiff - xp.cos(9.0 * x.clock)), xp.abs(late) / (1e-3 + xp.abs(late)) + pull]
 
 
-class Problem(Model):
-    """The problem with notes of the accepted steps."""
+def problem(name, notes, controlled, longest):
+    """The problem with notes of the accepted steps; without notes it has no constraints, and rows between its
+    steps."""
+    States = states_with(notes)
+    layout, more = Layout(States), notes + len(NAMES) - len(START)
 
-    name, description = "Problem", "a stiff problem with kinks"
-    Parameters, Inputs, States = Numbers, Nothing, states_with(NOTES)
-    parts = (Part(Answer, lambda xp, p, u, x, shared: Answer(height=x.stiff)),)
-    controlled = True
+    def constrained(xp, p, u, x):
+        now = layout.values(x)
+        before = now[len(NAMES) :]
+        return [*now[: len(NAMES)], *([x.clock, *before[:-1]] if before else [])]
 
-    @staticmethod
-    def initial_states(xp, p):
-        return None
-
-    @classmethod
-    def start_states(cls, xp, p, u, z):
-        return cls.state_layout.instance([*START, *[0.0] * (len(cls.state_layout.names) - len(START))])
-
-    @classmethod
-    def derivatives(cls, xp, p, u, x):
-        return [*slope(xp, p, x), *[0.0] * (len(cls.state_layout.names) - len(START))]
-
-    @staticmethod
-    def internal_step(xp, p):
-        return LONGEST
-
-    @staticmethod
-    def tolerance(xp, p):
-        return TOLERANCE
-
-    @classmethod
-    def constrained_states(cls, xp, p, u, x):
-        now = cls.state_layout.values(x)
-        notes = now[len(NAMES) :]
-        return [*now[: len(NAMES)], *([x.clock, *notes[:-1]] if notes else [])]
+    return Model(
+        name=name,
+        description="a stiff problem with kinks",
+        Parameters=Numbers,
+        Inputs=Nothing,
+        States=States,
+        parts=(Part(Answer, lambda xp, p, u, x, shared: Answer(height=x.stiff)),),
+        controlled=controlled,
+        initial_states=lambda xp, p: None,
+        start_states=lambda xp, p, u, z: layout.instance([*START, *[0.0] * more]),
+        derivatives=lambda xp, p, u, x: [*slope(xp, p, x), *[0.0] * more],
+        internal_step=lambda xp, p: longest,
+        tolerance=lambda xp, p: TOLERANCE,
+        constrained_states=constrained,
+    )
 
 
-class Free(Problem):
-    """The problem without constraints: steps of any length, rows between them."""
-
-    name = "Free"
-    States = states_with(0)
-
-
-class Even(Free):
-    """The problem in equal steps."""
-
-    name = "Even"
-    controlled = False
-
-    @staticmethod
-    def internal_step(xp, p):
-        return 0.0015
+Problem = problem("Problem", NOTES, True, LONGEST)
+Free = problem("Free", 0, True, LONGEST)
+Even = problem("Even", 0, False, 0.0015)
 
 
 def by_python(model):

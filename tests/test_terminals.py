@@ -97,9 +97,7 @@ def test_what_has_no_shaft_has_no_flange():
     root = ElementTree.fromstring(companion_files(Interface(MODELS["LoadObserver"], {}), "1", 2)[FILE])
     assert [t.get("name") for t in root.iter("Terminal")] == ["measured"]
 
-    class Bare(Gear):
-        name, terminals = "Bare", ()
-
+    Bare = Gear.altered(name="Bare", terminals=())
     assert FILE not in companion_files(Interface(Bare, {}), "1", 2)
     assert FILE in companion_files(Interface(Bare, {}), "1", 3)  # of the icon
 
@@ -219,31 +217,33 @@ def test_fmu_manipulation_toolbox_joins_them(files):
 # -- the sign
 
 
-class Spring(Model):
-    """A spring and the end of its shaft as FMUs of other tools give it: the angle in, the torque out of it."""
-
-    name, description = "Spring", "a torsion spring at the shaft of a machine"
-
-    @declaration
-    class Parameters:
-        c: float = quantity("N.m/rad", "stiffness", default=300.0)
-
-    @declaration
-    class Inputs:
-        angle: float = quantity("rad", "angle of the machine's end", default=0.0)
-
-    @declaration
-    class Outputs:
-        torque: float = quantity("N.m", "torque on the machine")
-
-    terminals = (Terminal("end", ROTATIONAL, "", {"phi": "angle", "tau": "torque"}, {"tau": "outflow"}),)
-
-    @staticmethod
-    def _outputs(xp, p, u, x, shared):
-        return Spring.Outputs(torque=-p.c * u.angle)
+@declaration
+class SpringParameters:
+    c: float = quantity("N.m/rad", "stiffness", default=300.0)
 
 
-Spring.parts = (Part(Spring.Outputs, Spring._outputs),)
+@declaration
+class SpringInputs:
+    angle: float = quantity("rad", "angle of the machine's end", default=0.0)
+
+
+@declaration
+class SpringOutputs:
+    torque: float = quantity("N.m", "torque on the machine")
+
+
+def outputs_of_spring(xp, p, u, x, shared):
+    return SpringOutputs(torque=-p.c * u.angle)
+
+
+Spring = Model(
+    name="Spring",
+    description="a torsion spring at the shaft of a machine",
+    terminals=(Terminal("end", ROTATIONAL, "", {"phi": "angle", "tau": "torque"}, {"tau": "outflow"}),),
+    Parameters=SpringParameters,
+    Inputs=SpringInputs,
+    parts=(Part(SpringOutputs, outputs_of_spring),),
+)
 
 
 def test_the_sign_is_that_of_modelica():

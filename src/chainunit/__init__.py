@@ -61,7 +61,7 @@ else:
 
     def _results_of_capabilities():
         """The classes of the results of the methods of `Study` that capabilities bring, by their names."""
-        modules = import_module(".capabilities", __name__).modules("study_method")
+        modules = import_module(".study.registry", __name__).modules("study_method")
         return {module.RESULT.__name__: module.RESULT for module in modules}
 
     def __dir__():

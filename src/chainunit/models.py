@@ -1,48 +1,56 @@
-"""The models that become FMUs, by name. A module of `machines` adds its own machine, a part of the line its
-own model."""
+"""The models that become FMUs, by name: machines, motors and others, of this package and of others that declare
+theirs by entry points."""
 
-from importlib import import_module
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Mapping
 from pathlib import Path
-from pkgutil import iter_modules
+from typing import TYPE_CHECKING
 
-from . import machines
 from .core.errors import InputError, near_name
-from .core.model import Model
-from .drives.motors import MOTORS
-from .machines.flexible import ChainUnitFlexible
-from .machines.linkages.file import read_linkage
-from .machines.load_observer import LoadObserver
-from .mechanism.models import MACHINES as MACHINES
+from .core.inputs import TOML, file_text
+from .core.register import Register
 
-for _module in iter_modules(machines.__path__):
-    import_module(f"{machines.__name__}.{_module.name}")
+if TYPE_CHECKING:
+    from .core.model import Model
+    from .drives.motor import Motor
+    from .mechanism.models import InverseMachine
 
-# the parts of the line stand above
-_REGISTRY = import_module(f"{__package__}.study.registry")
-
-_CHAIN_UNIT = MACHINES["ChamberForces"]
-_MODELS: tuple[type[Model], ...] = (
-    _CHAIN_UNIT,
-    _CHAIN_UNIT.direct(),
-    *MOTORS.values(),
-    *(part.model for part in _REGISTRY.parts_of_line()),
-    *(machine for machine in MACHINES.values() if machine is not _CHAIN_UNIT),
-    ChainUnitFlexible,
-    LoadObserver,
-)
-MODELS = {model.name: model for model in _MODELS}
+MACHINES: Register[InverseMachine] = Register("chainunit.machines")
+"""The machines that study files may name."""
+MOTORS: Register[Motor] = Register("chainunit.motors")
+"""The types of motor that study files may name."""
+MODELS: Mapping[str, Model] = ChainMap(Register("chainunit.models"), MOTORS, MACHINES)  # type: ignore[arg-type]
 """All models."""
 
 
-def model_named(name: str, direct: bool = False) -> type[Model]:
-    """The model of that name, or of a linkage file (.toml), of which also the `direct` model.
+def is_study_file(name: str) -> bool:
+    """Whether the name is that of a study file: a file in TOML without the tables of a linkage."""
+    if not name.lower().endswith(".toml"):
+        return False
+    from .reading.tables import toml  # a model with a name needs no reader of files
+
+    try:
+        data = toml(file_text(Path(name), TOML))
+    except InputError:
+        return False  # whoever reads the file says what is wrong
+    return not {"links", "ground", "driver", "joints"} & set(data)
+
+
+def model_named(name: str, direct: bool = False, rods: int | None = None) -> Model:
+    """The model of that name, or of a linkage file (.toml), of which also the `direct` model. An organ of
+    ChainUnitFlexible has so many `rods`.
 
     Raises
     ------
     InputError
-        for another name, for a file that is wrong, and for `direct` with a model.
+        for another name, for a file that is wrong, for `direct` with a model, and for another number of `rods` than
+        an organ may have.
     """
     if name.lower().endswith(".toml"):
+        from .machines.linkages.file import read_linkage
+
         machine = read_linkage(Path(name))
         return machine.direct() if direct else machine
     if name not in MODELS:
@@ -52,4 +60,8 @@ def model_named(name: str, direct: bool = False) -> type[Model]:
         raise InputError(
             "direct: is of linkage files; the direct model of a machine has a name, as ChainUnit"
         )
+    if rods is not None:
+        from .machines.flexible import with_rods
+
+        return with_rods(rods, {})
     return MODELS[name]

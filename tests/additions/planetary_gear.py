@@ -101,36 +101,42 @@ def _outputs(xp, p, u, x, s):
     )
 
 
-class PlanetaryGear(Model):
-    """A planetary gear."""
+def _internal_step(xp, p):
+    return xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J_carrier / p.c))
 
-    name = "PlanetaryGear"
-    description = "Planetary gear with stiffness, damping and backlash: takes a load port and shows one"
-    Parameters, Inputs, States = Parameters, ShaftInput, States
-    terminals = line_terminals()
-    input_rates = MappingProxyType({"phi": "w", "w": "a"})
-    shared = Point
-    parts = (Part(Outputs, _outputs),)
 
-    @staticmethod
-    def internal_step(xp, p):
-        return xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J_carrier / p.c))
+def _initial_states(xp, p):
+    driven = DrivenState(phi=p.phi_start / p.ratio, w=p.w_start / p.ratio)
+    return States(driven=driven, load_energy=0.0)
 
-    @staticmethod
-    def initial_states(xp, p):
-        driven = DrivenState(phi=p.phi_start / p.ratio, w=p.w_start / p.ratio)
-        return States(driven=driven, load_energy=0.0)
 
-    @staticmethod
-    def derivatives(xp, p, u, x):
-        s = Point(xp, p, u, x)
-        return [s.load * x.driven.w, x.driven.w, s.a]
+def _derivatives(xp, p, u, x):
+    s = Point(xp, p, u, x)
+    return [s.load * x.driven.w, x.driven.w, s.a]
+
+
+PlanetaryGear = Model(
+    name="PlanetaryGear",
+    text="A planetary gear.",
+    description="Planetary gear with stiffness, damping and backlash: takes a load port and shows one",
+    Parameters=Parameters,
+    Inputs=ShaftInput,
+    States=States,
+    terminals=line_terminals(),
+    input_rates=MappingProxyType({"phi": "w", "w": "a"}),
+    shared=Point,
+    parts=(Part(Outputs, _outputs),),
+    internal_step=_internal_step,
+    initial_states=_initial_states,
+    derivatives=_derivatives,
+)
 
 
 class PlanetaryPart(PartOfLine):
     """The part, with the table [planetary]."""
 
     name, model = "planetary", PlanetaryGear
+    order = 5
     tables = {  # noqa: RUF012
         "planetary": FileSection(PlanetaryTable, optional=True, title="Planetary gear")
     }

@@ -81,45 +81,55 @@ def _outputs(xp, p, u, x, s):
     return Outputs(**s.outputs(), i=s.i, heat=s.heat, supply_power=s.heat + s.air_gap * x.w)
 
 
-class ServoMotor(Motor):
-    """A servo motor."""
+def _current_limit(p):
+    return p.control.i
 
-    name = "ServoMotor"
-    description = (
+
+def _tune(p, inertia, fixed=()):
+    kp = 20.0 * inertia / p.coil.k
+    gains = {"control.kp": kp, "control.ki": 4.0 * kp}
+    gains = {name: gain for name, gain in gains.items() if name not in fixed}
+    tuned = ServoMotor.parameter_layout.from_names(gains, p)
+    return tuned, Tuning(gains, 78.0, 20.0) if gains else None
+
+
+def _torque_limit(xp, p, w):
+    return p.coil.k * p.control.i + 0.0 * w
+
+
+def _largest_torque(p, T, *at):
+    return p.coil.k * p.control.i
+
+
+def _internal_step(xp, p):
+    return xp.minimum(2.5e-4, friction_time(xp, p.rotor))
+
+
+def _initial_states(xp, p):
+    return States(phi=p.phi_start, w=p.w_start, T=p.ambient.T, integral=0.0, load_energy=0.0)
+
+
+ServoMotor = Motor(
+    name="ServoMotor",
+    text="A servo motor.",
+    description=(
         "Servo motor with PI speed control, current limit and winding temperature; takes a load port"
-    )
-    Parameters, Inputs, States, Point = Parameters, Inputs, States, ServoPoint
-    current, temperature, winding = "i", "T", "coil"
-    limited_by = {"w": 1e-9}  # noqa: RUF012
-    control = "the gains of the servo drive are given"
-    parts = (Part(Outputs, _outputs),)
-
-    @staticmethod
-    def current_limit(p):
-        return p.control.i
-
-    @classmethod
-    def tune(cls, p, inertia, fixed=()):
-        kp = 20.0 * inertia / p.coil.k
-        gains = {"control.kp": kp, "control.ki": 4.0 * kp}
-        gains = {name: gain for name, gain in gains.items() if name not in fixed}
-        tuned = cls.parameter_layout.from_names(gains, p)
-        return tuned, Tuning(gains, 78.0, 20.0) if gains else None
-
-    @staticmethod
-    def limit(xp, p, w):
-        return p.coil.k * p.control.i + 0.0 * w
-
-    @staticmethod
-    def largest_torque(p, T, *at):
-        return p.coil.k * p.control.i
-
-    pull_out = largest_torque
-
-    @staticmethod
-    def internal_step(xp, p):
-        return xp.minimum(2.5e-4, friction_time(xp, p.rotor))
-
-    @staticmethod
-    def initial_states(xp, p):
-        return States(phi=p.phi_start, w=p.w_start, T=p.ambient.T, integral=0.0, load_energy=0.0)
+    ),
+    Parameters=Parameters,
+    Inputs=Inputs,
+    States=States,
+    Point=ServoPoint,
+    current="i",
+    temperature="T",
+    winding="coil",
+    limited_by={"w": 1e-9},
+    control="the gains of the servo drive are given",
+    parts=(Part(Outputs, _outputs),),
+    current_limit=_current_limit,
+    tune=_tune,
+    limit=_torque_limit,
+    largest_torque=_largest_torque,
+    pull_out=_largest_torque,
+    internal_step=_internal_step,
+    initial_states=_initial_states,
+)

@@ -68,46 +68,48 @@ def _mass(rod: Rod) -> Mass:
     return Mass(rod.m, rod.s, rod.I)
 
 
-class SixBar(InverseMachine):
-    """A Stephenson six-bar: motion of the motor shaft in, torque and reactions out."""
-
-    name = "SixBar"
-    description = "Stephenson six-bar: crank, dyad, dyad; from motor angle and speed to torque and reactions"
-    Parameters = Parameters
-    Inputs = Inputs
-    Outputs = Outputs
-    joints = MappingProxyType(
-        {"crank_bearing": ("O1", "crank"), "crank_pin": ("A", "coupler"), "output_bearing": ("O3", "output")}
+def _linkage(xp: Any, p: Any, u: Any) -> Linkage:
+    """Crank, dyad, dyad."""
+    coupler = Bar("coupler", "A", p.coupler_length, _mass(p.coupler), {"P": (0.25, 0.2)})
+    return Linkage(
+        {"O1": Vec2(0.0, 0.0), "O2": Vec2(0.4, -0.05), "O3": Vec2(-0.3, 0.2)},
+        Crank(Bar("crank", "O1", p.crank_length, _mass(p.crank)), "A"),
+        (
+            Dyad("B", coupler, Bar("rocker", "O2", p.rocker_length, _mass(p.rocker)), 1.0),
+            Dyad(
+                "Q",
+                Bar("link", "P", p.link_length, _mass(p.link)),
+                Bar("output", "O3", p.output_length, _mass(p.output)),
+                -1.0,
+            ),
+        ),
+        {
+            "weight": Weight(p.g),
+            "pusher": Resistance("Q", u.resistance, p.processing),
+            "pins": PinLosses(p.pin, p.joint_damping),
+        },
     )
 
-    @staticmethod
-    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """Crank, dyad, dyad."""
-        coupler = Bar("coupler", "A", p.coupler_length, _mass(p.coupler), {"P": (0.25, 0.2)})
-        return Linkage(
-            {"O1": Vec2(0.0, 0.0), "O2": Vec2(0.4, -0.05), "O3": Vec2(-0.3, 0.2)},
-            Crank(Bar("crank", "O1", p.crank_length, _mass(p.crank)), "A"),
-            (
-                Dyad("B", coupler, Bar("rocker", "O2", p.rocker_length, _mass(p.rocker)), 1.0),
-                Dyad(
-                    "Q",
-                    Bar("link", "P", p.link_length, _mass(p.link)),
-                    Bar("output", "O3", p.output_length, _mass(p.output)),
-                    -1.0,
-                ),
-            ),
-            {
-                "weight": Weight(p.g),
-                "pusher": Resistance("Q", u.resistance, p.processing),
-                "pins": PinLosses(p.pin, p.joint_damping),
-            },
-        )
 
-    @classmethod
-    def probes(cls, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-        """Angle of the output link, and the reactions."""
-        reactions, output = s.reactions(a), s.m.links["output"].u
-        return {
-            "angle": xp.atan2(output.y, output.x),
-            **{name: force(reactions[joint]) for name, joint in cls.joints.items()},
-        }
+def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+    """Angle of the output link, and the reactions."""
+    reactions, output = s.reactions(a), s.m.links["output"].u
+    return {
+        "angle": xp.atan2(output.y, output.x),
+        **{name: force(reactions[joint]) for name, joint in SixBar.joints.items()},
+    }
+
+
+SixBar = InverseMachine(
+    name="SixBar",
+    text="A Stephenson six-bar: motion of the motor shaft in, torque and reactions out.",
+    description="Stephenson six-bar: crank, dyad, dyad; from motor angle and speed to torque and reactions",
+    Parameters=Parameters,
+    Inputs=Inputs,
+    Outputs=Outputs,
+    joints=MappingProxyType(
+        {"crank_bearing": ("O1", "crank"), "crank_pin": ("A", "coupler"), "output_bearing": ("O3", "output")}
+    ),
+    linkage=_linkage,
+    probes=_probes,
+)

@@ -9,14 +9,15 @@ import re
 import sys
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 import typer.core
+import typer.main
 
-from ..capabilities import modules
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
 from ..report.command_options import AllOption, BackendOption, OutputFolder, PicturesOption
@@ -75,11 +76,27 @@ _GROUPS = {
 
 
 class _Commands(typer.core.TyperGroup):
-    """The group of all commands. It turns an interrupt into an error of this package, as typer would turn a
-    KeyboardInterrupt into a bare exit status."""
+    """The group of all commands. Those of capabilities are imported if the base has none of the name that is asked
+    for. It turns an interrupt into an error of this package, as typer would turn a KeyboardInterrupt into a bare exit
+    status."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names of all commands, with those of capabilities."""
+        self._take_all()
+        return super().list_commands(ctx)
+
+    def _take_all(self) -> None:
+        self.commands = {**_commands_of_capabilities(), **self.commands}
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of that name; None if there is none."""
+        if cmd_name not in self.commands:
+            self._take_all()
+        return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """The commands by group, each with its example."""
+        self._take_all()
         listed = [name for group in _GROUPS.values() for name in group]
         others = {
             name: (command.get_short_help_str(), f"chainunit {name} --help")
@@ -94,6 +111,8 @@ class _Commands(typer.core.TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """As typer does; a wrong name suggests no hidden command."""
+        if args and args[0] not in self.commands:
+            self._take_all()
         commands = self.commands
         if args and args[0] not in commands:
             self.commands = {name: command for name, command in commands.items() if not command.hidden}
@@ -202,14 +221,23 @@ def study(
     )
 
 
-for module in modules("command"):
-    if (group := getattr(module, "GROUP", None)) is not None:
-        below = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
-        app.add_typer(below, name=group, help=module.__doc__)
+@cache
+def _commands_of_capabilities() -> dict[str, Any]:
+    """The commands that capabilities bring, by name."""
+    from ..study.registry import modules
+
+    commands = typer.Typer(rich_markup_mode=None)
+    for module in modules("command"):
+        if (group := getattr(module, "GROUP", None)) is not None:
+            below = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+            commands.add_typer(below, name=group, help=module.__doc__)
+            for command in module.COMMANDS:
+                below.command()(command)
         for command in module.COMMANDS:
-            below.command()(command)
-    for command in module.COMMANDS:
-        app.command(hidden=group is not None)(command)
+            commands.command(hidden=group is not None)(command)
+    return dict(typer.main.get_group(commands).commands)
+
+
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp", hidden=True)(export_ssp)
 app.command()(catalogue)

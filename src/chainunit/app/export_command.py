@@ -88,7 +88,7 @@ def export(
 ) -> None:
     """Write a model as an FMU; of a study file its whole system as one FMU, or as an SSP package of FMUs."""
     from ..fmu.backends import export as write
-    from ..study.package import is_study_file, model_and_start
+    from ..models import is_study_file, model_named
 
     file = output
     whole = is_study_file(name)
@@ -113,9 +113,14 @@ def export(
     loaded = study_file(study_path) if study_path else None
     kind: Any = backend.value if backend else None
     with terminal_console(stderr=True).status("exporting") as status:
-        model, start = model_and_start(
-            name, loaded, rods, direct=direct, backend=kind, progress=status.update
-        )
+        if loaded:
+            from ..study.package import model_and_start
+
+            model, start = model_and_start(
+                name, loaded, rods, direct=direct, backend=kind, progress=status.update
+            )
+        else:
+            model, start = model_named(name, direct, rods), {}
         file = file or Path(f"{model.name}.fmu")
         made = write(
             model,

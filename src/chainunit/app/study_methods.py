@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..capabilities import modules
+from ..study.registry import modules
 
 
 class StudyMethods:

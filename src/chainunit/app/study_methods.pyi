@@ -1,4 +1,4 @@
-# Made by docs/make_types.py from the list of capabilities.
+# Made by docs/make_types.py from the entry points of capabilities.
 from ..capabilities.comparison.study_method import ComparisonResult as ComparisonResult
 from ..capabilities.comparison.study_method import compare as _compare
 from ..capabilities.identification.study_method import IdentificationResult as IdentificationResult

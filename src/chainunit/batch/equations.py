@@ -33,7 +33,7 @@ class Equations:
     place of the first that is not, from 1.
     """
 
-    model: type[Model]
+    model: Model
     arguments: tuple[Variable, ...]
     results: tuple[Result, ...]
     operations: Operations
@@ -55,12 +55,12 @@ class Equations:
         return sum(self.sizes[: entry[0]]) + entry[1]
 
 
-def columns_of(model: type[Model]) -> tuple[Variable, ...]:
+def columns_of(model: Model) -> tuple[Variable, ...]:
     """All that a batch can compute of a model: its outputs, and the quantities of `Model.further_quantities`."""
     return tuple(variable for variable, _ in trace(model).columns.values())
 
 
-def arguments_of(model: type[Model]) -> tuple[Variable, ...]:
+def arguments_of(model: Model) -> tuple[Variable, ...]:
     """All parameters, inputs and states of a model in declared order."""
     layouts = (model.parameter_layout, model.input_layout, model.state_layout)
     return tuple(v for of in layouts if of for v in of.variables)
@@ -87,7 +87,7 @@ def find(names: Iterable[str], among: Sequence[str], kind: str) -> list[int]:
 
 
 @lru_cache(maxsize=64)
-def equations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...]) -> Equations:
+def equations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> Equations:
     """The `outputs` of a model, and the derivative of each by each of the arguments `by`.
 
     Raises

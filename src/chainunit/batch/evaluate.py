@@ -59,7 +59,7 @@ class StateReason:
         return str(self.kind.value).format(subject=self.subject, words=self.words)
 
 
-def reasons_of(model: type[Model]) -> list[StateReason]:
+def reasons_of(model: Model) -> list[StateReason]:
     """The reasons of a model by their codes; those of values outside their bounds follow them."""
     return [
         StateReason(ReasonKind.NONE),
@@ -69,7 +69,7 @@ def reasons_of(model: type[Model]) -> list[StateReason]:
 
 
 def evaluate(
-    model: type[Model],
+    model: Model,
     values: Mapping[str, Any],
     outputs: Sequence[str] | None = None,
     *,

@@ -36,7 +36,7 @@ class PythonLoop:
 
     def __init__(
         self,
-        model: type[Model],
+        model: Model,
         outputs: Sequence[str],
         varying: Sequence[str],
         driven: Sequence[str],

@@ -153,7 +153,7 @@ class Transients:
 
     def __init__(
         self,
-        model: type[Model],
+        model: Model,
         outputs: Sequence[str],
         *,
         varying: Sequence[str] = (),
@@ -272,7 +272,7 @@ class Transients:
 
 @lru_cache(maxsize=32)
 def _compiled(
-    model: type[Model],
+    model: Model,
     outputs: tuple[str, ...],
     varying: tuple[str, ...],
     driven: tuple[str, ...],
@@ -345,7 +345,7 @@ def _compiled(
     return _NativeLoop(digest, load(source, compiler, files), uniform)
 
 
-def _method(model: type[Model]) -> str:
+def _method(model: Model) -> str:
     """How the model is integrated, see transients.h."""
     if not model.controlled:
         return "EVEN"
@@ -353,14 +353,12 @@ def _method(model: type[Model]) -> str:
 
 
 @lru_cache(maxsize=4)
-def _operations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...]) -> Operations:
+def _operations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> Operations:
     """The operations of `_equations`."""
     return Operations(*_equations(model, outputs, by))
 
 
-def _equations(
-    model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...]
-) -> tuple[list[Any], list[Any]]:
+def _equations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> tuple[list[Any], list[Any]]:
     """The arguments, and three groups: the derivatives of the states, these outputs and states, and the states that
     meet the constraints of a model with error control. The derivatives of each group in a direction follow it; the
     direction consists of derivatives of the states, behind the states, and of those `by` names, a fourth argument."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import copyreg
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property, reduce
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, NamedTuple, Self
 
 from .bounds import refusal
 from .engines import MATH
@@ -76,14 +79,6 @@ class FmuData:
     """sizes of inputs in the reference results, by name, in place of the usual ones"""
 
 
-class Making(NamedTuple):
-    """The call of a function of a module that makes a class that no module names: by it another process gets the
-    class."""
-
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-
-
 @dataclass(frozen=True)
 class StartProblem:
     """How the states at the start are found: the number of `unknowns` of an iteration, its `rounds`, and the
@@ -134,117 +129,175 @@ class Part:
         self.by_differences = by_differences
 
 
-class ModelType(type):
-    """The type of all models."""
+Limits = Iterable[tuple[Any, Any, Any]]
+"""Value, lower limit and upper limit of each of several requirements, in order."""
+
+UNSTATED: Any = None
+"""The default of what follows from the rest of a model unless it is stated."""
 
 
-def _pickled_form(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
-    """A model as pickle stores it: by its name, or, for a class that has no name in a module, by the call
-    that makes it."""
-    made = vars(model).get("made")
-    return model.__qualname__ if made is None else tuple(made)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Model:
+    """A model: four declarations, and the equations between them as plain functions.
 
-
-copyreg.pickle(ModelType, _pickled_form)
-
-
-def keep(model: type[Model], *names: str) -> None:
-    """Let pickle take instances of these declarations of a model that is `made`, whose classes no module names."""
-    for name in names:
-        declared = getattr(model, name)
-
-        def reduced(instance: Any, declared: type = declared, name: str = name) -> str | tuple[Any, ...]:
-            if type(instance) is not declared:  # of another declaration with these fields
-                return copyreg.__newobj__, (type(instance),), vars(instance)  # type: ignore[attr-defined]
-            return _unpickled, (
-                model,
-                name,
-                Layout(declared).values(instance),
-                getattr(instance, "derived", None),
-            )
-
-        declared.__reduce__ = reduced
-
-
-def _unpickled(model: type[Model], name: str, values: Sequence[Any], derived: Any) -> Any:
-    """The instance of that declaration of a model; see `keep`."""
-    instance = Layout(getattr(model, name)).instance(values)
-    if derived is not None:
-        object.__setattr__(instance, "derived", derived)
-    return instance
-
-
-class Model(metaclass=ModelType):
-    """A model: four declarations and the equations between them.
-
-    A subclass sets the class attributes; it is never instantiated. Inputs and outputs are those of
-    the FMU of the same name.
+    The equations are written for any engine `xp`, parameters `p`, inputs `u` and states `x`. Inputs and outputs are
+    those of the FMU of the same name.
     """
 
-    name: ClassVar[str]
-    description: ClassVar[str]
-    Parameters: ClassVar[type]
-    Inputs: ClassVar[type]
-    States: ClassVar[type | None] = None
-    parts: ClassVar[tuple[Part, ...]]
-    required: ClassVar[tuple[Requirement, ...]] = ()
-    terminals: ClassVar[tuple[Terminal, ...]] = ()
-    derived_count: ClassVar[int] = 0
+    name: str
+    description: str = ""
+    text: str = ""
+    """Paragraphs for its users, as its FMU has them."""
+    Parameters: Any
+    Inputs: Any
+    States: Any = None
+    parts: tuple[Part, ...] = UNSTATED
+    required: tuple[Requirement, ...] = UNSTATED
+    terminals: tuple[Terminal, ...] = UNSTATED
+    derived_count: int = UNSTATED
     """Number of values that follow from the fixed parameters alone and are computed once before a run; see
     `derive`."""
-    input_rates: ClassVar[Mapping[str, str]] = {}
+    input_rates: Mapping[str, str] = UNSTATED
     """Inputs of a co-simulation FMU whose time derivative is another input (``phi`` has ``w``, ``w`` has
     ``a``). They are extrapolated inside a step, up to their bounds; without that a turning shaft would stand
     still in each step, and outputs at its end would be those of its begin."""
-    start_problem: ClassVar[StartProblem] = StartProblem()
+    start_problem: StartProblem = UNSTATED
     """Iteration for the states at the start; see `start`."""
-    controlled: ClassVar[bool] = False
+    controlled: bool = UNSTATED
     """Whether a co-simulation FMU integrates with error control to `tolerance` and corrects the states by
     `constrained_states` after each substep; otherwise it integrates in equal steps."""
-    made: ClassVar[Making | None] = None
-    """How a function of its module makes this class; None for a class that the module names."""
-    components: ClassVar[Mapping[str, type[Model]]] = {}
+    components: Mapping[str, Model] = field(default_factory=dict)
     """By name, the models that make this one, if it is a system of models."""
-    fmu_data: ClassVar[FmuData] = FmuData()
-    repeated: ClassVar[Mapping[str, str]] = {}
+    fmu_data: FmuData = FmuData()
+    repeated: Mapping[str, str] = field(default_factory=dict)
     """Outputs that are another output under a further name, by their names: their FMU has one value for both."""
-    constant: ClassVar[Mapping[str, float]] = {}
+    constant: Mapping[str, float] = field(default_factory=dict)
     """Outputs that never change, with their values by name."""
+    home: str = UNSTATED
+    """The module that has it by its name: that of its parameters, unless it is stated."""
+    made: tuple[Callable[..., Any], tuple[Any, ...]] | None = None
+    """The function of a module that makes it, and its arguments, if no module has it by its name."""
 
-    parameter_layout: ClassVar[Layout]
-    input_layout: ClassVar[Layout]
-    state_layout: ClassVar[Layout | None]
+    requirements: Callable[[Any, Any], Limits] = UNSTATED
+    """The limits (xp, p) of each requirement of `required`. A later one may be undefined if an earlier one is not
+    met."""
+    derive: Callable[[Any, Any], list[Any]] = UNSTATED
+    """Values (xp, p) computed once from the fixed parameters; the equations read them as ``p.derived``."""
+    initial_states: Callable[[Any, Any], Any] = UNSTATED
+    """States (xp, p) at the start, if they follow from the parameters alone (models with states)."""
+    start_guess: Callable[[Any, Any, Any], list[Any]] = UNSTATED
+    """First guess (xp, p, u) of the unknowns of the start."""
+    improve_start: Callable[[Any, Any, Any, list[Any]], list[Any]] = UNSTATED
+    """The unknowns of the start after one more round (xp, p, u, unknowns)."""
+    start_states: Callable[[Any, Any, Any, list[Any]], Any] = UNSTATED
+    """States at the start with the inputs u, from the unknowns (xp, p, u, unknowns)."""
+    start_limits: Callable[[Any, Any, Any, Any], Limits] = UNSTATED
+    """The limits (xp, p, u, x) of each requirement of the `start_problem`, for the states x."""
+    derivatives: Callable[[Any, Any, Any, Any], list[Any]] = UNSTATED
+    """Time derivatives (xp, p, u, x) of the states, in declared order (models with states)."""
+    internal_step: Callable[[Any, Any], Any] = UNSTATED
+    """Longest step (xp, p) of the internal integrator [s] (models with states)."""
+    tolerance: Callable[[Any, Any], Any] = UNSTATED
+    """Relative tolerance (xp, p) of the internal integrator, of states or of their nominal size (`controlled`
+    models)."""
+    constrained_states: Callable[[Any, Any, Any, Any], list[Any]] = UNSTATED
+    """The states near x, in declared order, that meet the model's constraints (xp, p, u, x) (`controlled` models)."""
+    shared: Callable[[Any, Any, Any, Any], Any] = UNSTATED
+    """The common values of the parts (xp, p, u, x), computed once per point."""
+    sketch: Callable[[Mapping[str, float] | None], Sketch | None] = UNSTATED
+    """The machine as lines, if it is a mechanism: with the parameters given by name, or with the declared ones."""
+    further_quantities: Callable[[Any, Any, Any, Any, Mapping[str, Any]], list[tuple[Variable, Any]]] = (
+        UNSTATED
+    )
+    """Quantities beside the outputs (xp, p, u, x, outputs by name), each declared and with its value at one point.
+    Batches and cycle quantities know them; FMUs do not have them."""
+    obstacle: Callable[[Any], str] | None = None
+    """A sentence on what keeps the machine from working with the parameters p, in place of the refusal of a
+    requirement; empty if it has none."""
 
-    def __init_subclass__(cls) -> None:
-        if not hasattr(cls, "Parameters"):  # a common base of several models
-            return
-        cls.parameter_layout = Layout(cls.Parameters)
-        cls.input_layout = Layout(cls.Inputs)
-        cls.state_layout = Layout(cls.States) if cls.States else None
+    def __post_init__(self) -> None:
+        """State what follows; a kind of models states more before."""
+        self.follow(
+            home=getattr(self.Parameters, "__module__", ""),
+            parts=(),
+            required=(),
+            terminals=(),
+            derived_count=0,
+            input_rates=MappingProxyType({}),
+            start_problem=StartProblem(),
+            controlled=False,
+            requirements=lambda xp, p: (),
+            derive=lambda xp, p: [],
+            start_guess=lambda xp, p, u: [],
+            start_states=lambda xp, p, u, z: self.initial_states(xp, p),
+            start_limits=lambda xp, p, u, x: (),
+            shared=lambda xp, p, u, x: None,
+            sketch=lambda start=None: None,
+            further_quantities=lambda xp, p, u, x, outputs: [],
+        )
+        if self.made:
+            for name in ("Parameters", "Inputs", "States", "Feed"):
+                _let_pickle(self, name)
 
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Value, lower limit and upper limit of each requirement of `required`, in order. A later one may be
-        undefined where an earlier one is not met."""
-        return iter(())
+    def follow(self, **values: Any) -> None:
+        """State these attributes, except those that are stated."""
+        followed = vars(self).setdefault("_followed", set())
+        for name, value in values.items():
+            if getattr(self, name) is UNSTATED:
+                object.__setattr__(self, name, value)
+                followed.add(name)
 
-    @staticmethod
-    def derive(xp: Any, p: Any) -> list[Any]:
-        """Values computed once from the fixed parameters; the equations read them as ``p.derived``."""
-        return []
+    def altered(self, **changes: Any) -> Self:
+        """The model with other attributes; what followed from the old ones follows from these."""
+        followed = vars(self)["_followed"]
+        stated = {f.name: getattr(self, f.name) for f in fields(self) if f.init and f.name not in followed}
+        return type(self)(**stated | changes)
 
-    @classmethod
-    def with_derived(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its place in a module, or by the call that makes it, another process gets the model."""
+        if self.made is not None:
+            return self.made
+        if getattr(sys.modules.get(self.home), self.name, None) is not self:
+            raise TypeError(f"{self.name}: the module {self.home} has no such model; state its home")
+        return _model_in, (self.home, self.name)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What makes this model, as JSON has it: of two processes, too, equal for equal models."""
+        if self.made is None:
+            return {"of": f"{self.home}:{self.name}"}
+        function, arguments = self.made
+        values = [x.identity if isinstance(x, Model) else str(x) for x in arguments]
+        return {"of": f"{function.__module__}:{function.__qualname__}", "arguments": values}
+
+    @cached_property
+    def parameter_layout(self) -> Layout:
+        """The layout of the parameters."""
+        return Layout(self.Parameters)
+
+    @cached_property
+    def input_layout(self) -> Layout:
+        """The layout of the inputs."""
+        return Layout(self.Inputs)
+
+    @cached_property
+    def state_layout(self) -> Layout | None:
+        """The layout of the states, or None."""
+        return Layout(self.States) if self.States else None
+
+    def with_derived(self, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
         """The parameters with the values of `derive`, or with the values `derived` in their place."""
-        if not cls.derived_count:
+        if not self.derived_count:
             return p
         # not `copy.copy`, which asks for the pickled form: that has no symbols and no values of a subclass
         ready = object.__new__(type(p))
-        vars(ready).update(vars(p), derived=cls.derive(xp, p) if derived is None else derived)
+        vars(ready).update(vars(p), derived=self.derive(xp, p) if derived is None else derived)
         return ready
 
-    @classmethod
-    def check(cls, p: Any) -> Any:
+    def check(self, p: Any) -> Any:
         """The parameters `with_derived`. Parameters that are out of bounds, or with which the machine does not work,
         are refused.
 
@@ -253,134 +306,111 @@ class Model(metaclass=ModelType):
         InputError
             for a value outside its own bounds, in one line with the allowed range.
         GeometryError
-            where a requirement is not met, in one line with the allowed range.
+            for a requirement that is not met, in one line with the allowed range, or by its `obstacle`.
         """
-        for line in violations(cls.parameter_layout, p):
+        for line in violations(self.parameter_layout, p):
             raise InputError(line)
-        p = within_bounds(cls.parameter_layout, p)
+        p = within_bounds(self.parameter_layout, p)
         try:
-            p = cls.with_derived(MATH, p)
+            p = self.with_derived(MATH, p)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
-            p = cls.with_derived(MATH, p, [math.nan] * cls.derived_count)
-        cls._meets(p, cls.required, cls.requirements(MATH, p))
+            p = self.with_derived(MATH, p, [math.nan] * self.derived_count)
+        try:
+            self._meets(p, self.required, self.requirements(MATH, p))
+        except GeometryError:
+            if self.obstacle is not None and (words := self.obstacle(p)):
+                raise GeometryError(words) from None
+            raise
         return p
 
-    @classmethod
-    def _meets(
-        cls, p: Any, requirements: tuple[Requirement, ...], limits: Iterator[tuple[Any, Any, Any]]
-    ) -> None:
-        for each, (value, low, high) in zip(requirements, limits, strict=True):
+    def _meets(self, p: Any, requirements: tuple[Requirement, ...], limits: Limits) -> None:
+        for requirement, (value, low, high) in zip(requirements, limits, strict=True):
             if not low < value < high:
-                error = GeometryError(each.refusal(value, low, high, cls.parameter_layout.by_name(p)))
-                error.names = (each.subject, *each.context, *each.depends)
+                words = requirement.refusal(value, low, high, self.parameter_layout.by_name(p))
+                error = GeometryError(words)
+                error.names = (requirement.subject, *requirement.context, *requirement.depends)
                 raise error
 
-    @classmethod
-    def extrapolations(cls, values: Sequence[Any]) -> list[Extrapolation]:
+    def extrapolations(self, values: Sequence[Any]) -> list[Extrapolation]:
         """The extrapolation of each input of `input_rates`, from the `values` of all inputs."""
 
         def rate(name: str | None) -> Any:
-            other = cls.input_rates.get(name or "")
+            other = self.input_rates.get(name or "")
             return values[names.index(other)] if other else 0.0
 
-        names = cls.input_layout.names
+        names = self.input_layout.names
         return [
-            Extrapolation(names.index(name), rate(name), 0.5 * rate(cls.input_rates[name]))
-            for name in cls.input_rates
+            Extrapolation(names.index(name), rate(name), 0.5 * rate(self.input_rates[name]))
+            for name in self.input_rates
         ]
 
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """States at the start, where they follow from the parameters alone (models with states)."""
-        raise NotImplementedError
-
-    @staticmethod
-    def start_guess(xp: Any, p: Any, u: Any) -> list[Any]:
-        """First guess of the unknowns of the start."""
-        return []
-
-    @staticmethod
-    def improve_start(xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
-        """The unknowns of the start after one more round."""
-        raise NotImplementedError
-
-    @classmethod
-    def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
-        """States at the start with the inputs `u`, from the unknowns."""
-        return cls.initial_states(xp, p)
-
-    @staticmethod
-    def start_limits(xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Value, lower limit and upper limit of each requirement of the `start_problem`, in order, for the
-        states `x`."""
-        return iter(())
-
-    @classmethod
-    def begin(cls, p: Any, u: Any) -> Any:
+    def begin(self, p: Any, u: Any) -> Any:
         """The states at the start, checked.
 
         Raises
         ------
         GeometryError
-            where the states do not meet a condition, in one line.
+            if the states do not meet a condition, in one line.
         """
-        x = cls.start(MATH, p, u)
-        cls._meets(p, cls.start_problem.required, cls.start_limits(MATH, p, u, x))
+        x = self.start(MATH, p, u)
+        self._meets(p, self.start_problem.required, self.start_limits(MATH, p, u, x))
         return x
 
-    @classmethod
-    def start(cls, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:
+    def start(self, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:
         """States at the start with the inputs `u`, by the rounds of the `start_problem` or so many `rounds`: a few
         show the dependencies."""
-        z = cls.start_guess(xp, p, u)
-        for _ in range(cls.start_problem.rounds if rounds is None else rounds):
-            z = cls.improve_start(xp, p, u, z)
-        return cls.start_states(xp, p, u, z)
+        z = self.start_guess(xp, p, u)
+        for _ in range(self.start_problem.rounds if rounds is None else rounds):
+            z = self.improve_start(xp, p, u, z)
+        return self.start_states(xp, p, u, z)
 
-    @staticmethod
-    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order (models with states)."""
-        raise NotImplementedError
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """Longest step of the internal integrator [s] (models with states)."""
-        raise NotImplementedError
-
-    @staticmethod
-    def tolerance(xp: Any, p: Any) -> Any:
-        """Relative tolerance of the internal integrator, of states or of their nominal size (`controlled` models)."""
-        raise NotImplementedError
-
-    @staticmethod
-    def constrained_states(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """The states near `x`, in declared order, that meet the model's constraints (`controlled` models)."""
-        raise NotImplementedError
-
-    @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> Any:
-        """The common values of the parts, computed once per point."""
-        return None
-
-    @classmethod
-    def evaluate(cls, xp: Any, p: Any, u: Any, x: Any = None) -> tuple[Any, ...]:
+    def evaluate(self, xp: Any, p: Any, u: Any, x: Any = None) -> tuple[Any, ...]:
         """The outputs of every part at one point (or array of points). Parameters that are not yet `with_derived`
         are prepared in each call."""
-        if cls.derived_count and not hasattr(p, "derived"):
-            p = cls.with_derived(MATH, p)
-        shared = cls.shared(xp, p, u, x)
-        return tuple(part.equations(xp, p, u, x, shared) for part in cls.parts)
+        if self.derived_count and not hasattr(p, "derived"):
+            p = self.with_derived(MATH, p)
+        shared = self.shared(xp, p, u, x)
+        return tuple(part.equations(xp, p, u, x, shared) for part in self.parts)
 
-    @classmethod
-    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch | None:
-        """The machine as lines, if it is a mechanism: with the parameters `start` by name, else the declared ones."""
-        return None
 
-    @classmethod
-    def further_quantities(
-        cls, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
-    ) -> list[tuple[Variable, Any]]:
-        """Quantities beside the `outputs`, which are given by name, each declared and with its value at one point.
-        Batches and cycle quantities know them; FMUs do not have them."""
-        return []
+def _model_in(module: str, name: str) -> Any:
+    """The model that a module has by its name."""
+    return getattr(import_module(module), name)
+
+
+def _let_pickle(model: Model, name: str) -> None:
+    """Let pickle take instances of a declaration of a model that is `made`, if no module names its class."""
+    declared = getattr(model, name, None)
+    if declared is None or _has_name(declared):
+        return
+
+    def reduced(instance: Any) -> tuple[Any, ...]:
+        if type(instance) is not declared:  # of another declaration with these fields
+            return _plain_instance, (type(instance), vars(instance))
+        return _instance, (model, name, Layout(declared).values(instance), getattr(instance, "derived", None))
+
+    declared.__reduce__ = reduced
+
+
+def _has_name(declared: type) -> bool:
+    """Whether the module of a class has it by its name."""
+    named: Any = sys.modules.get(declared.__module__)
+    try:
+        return reduce(getattr, declared.__qualname__.split("."), named) is declared
+    except AttributeError:
+        return False
+
+
+def _plain_instance(declared: type, values: dict[str, Any]) -> Any:
+    instance: Any = object.__new__(declared)
+    vars(instance).update(values)
+    return instance
+
+
+def _instance(model: Model, name: str, values: Sequence[Any], derived: Any) -> Any:
+    """The instance of that declaration of a model, with these values."""
+    instance = Layout(getattr(model, name)).instance(values)
+    if derived is not None:
+        object.__setattr__(instance, "derived", derived)
+    return instance

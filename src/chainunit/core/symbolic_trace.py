@@ -22,7 +22,7 @@ class Trace:
     `derivatives` the derivatives of the states.
     """
 
-    model: type[Model]
+    model: Model
     symbols: list[Any]
     p: Any
     u: Any
@@ -70,7 +70,7 @@ class Trace:
         return list(casadi.substitute(list(expressions), [self.symbols[3]], [derived]))
 
 
-def outputs_of(model: type[Model]) -> tuple[Variable, ...]:
+def outputs_of(model: Model) -> tuple[Variable, ...]:
     """All outputs of a model in declared order."""
     return tuple(v for part in model.parts for v in part.layout.variables)
 
@@ -90,7 +90,7 @@ def chosen_columns(t: Trace, names: Sequence[str]) -> tuple[Variable, ...]:
 
 
 @lru_cache(maxsize=8)
-def trace(model: type[Model]) -> Trace:
+def trace(model: Model) -> Trace:
     """The equations of `model` in symbols."""
     import casadi
 

@@ -1,7 +1,7 @@
 """A system of models as one: declarations side by side, and equations in the order of their dependencies.
 
-The description of a system is data as JSON has them, from which another process makes the same model
-(`chainunit.core.system_model.system_model`); `chainunit.system.compiled` writes it. Each component is a group: the
+The description of a system is data as JSON has them, beside its models by name: `chainunit.system.compiled` writes
+it, and `chainunit.core.system_model.system_model` makes the model of both. Each component is a group: the
 names are the full names of the system, such as ``motor.armature.R``.
 """
 
@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from operator import attrgetter
 from typing import Any
 
-from .errors import InputError
 from .integrators import MAX_STEPS
 from .model import Model, Requirement, Terminal
 from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
@@ -44,51 +42,6 @@ SOLVER = tuple(f"{_SOLVER}.{name}" for name in Layout(SystemSolver).names)
 """Full names of the parameters of the integrator."""
 
 
-# -- models by reference
-
-
-def reference(model: type[Model]) -> dict[str, Any]:
-    """A model as JSON can hold it: by its name in a module, or by the call that makes it."""
-    made = vars(model).get("made")
-    if made is None:
-        return {"of": _place(model)}
-    function, arguments = made.function, made.arguments
-    return {"of": _place(function), "arguments": [_argument(each) for each in arguments]}
-
-
-def _argument(value: Any) -> Any:
-    return reference(value) if isinstance(value, type) else value
-
-
-def _place(thing: Any) -> str:
-    """Module and name, such as ``.drives.dc_motor:DcMotor``; a module of this package begins with a dot.
-
-    Raises
-    ------
-    InputError
-        for a name that no module has.
-    """
-    module = thing.__module__
-    if "<locals>" in thing.__qualname__:
-        raise InputError(
-            f"{thing.__qualname__}: is defined inside a function; the model of a component must have a name in a "
-            "module, or a `maker`"
-        )
-    own = f"{__package__}."
-    return f"{module[len(own) - 1 :] if module.startswith(own) else module}:{thing.__qualname__}"
-
-
-def model_at(place: Mapping[str, Any]) -> Any:
-    """The model of a `reference`."""
-    module, _, name = place["of"].partition(":")
-    thing = attrgetter(name)(import_module(module, __package__))
-    if "arguments" not in place:
-        return thing
-    return thing(
-        *(model_at(each) if isinstance(each, dict) and "of" in each else each for each in place["arguments"])
-    )
-
-
 # -- the parts of a system
 
 
@@ -102,7 +55,7 @@ class Member:
     """
 
     name: str
-    model: type[Model]
+    model: Model
     parameters: Sequence[Any]
     free: Sequence[Any]
     sources: Sequence[str | None]
@@ -118,16 +71,15 @@ class Member:
 class SystemDescription:
     """What all values of a system share, from its description.
 
-    The description has the `name` and `title` of the model, a `reference` of each of the `components`, the
+    The description has the `name` and `title` of the model, the
     `connections`, the inputs and outputs that are `left_out`, the free `terminals` by full name, the `extra` outputs
     besides the variables of the first parts; the outputs in the order of their dependencies, all (`steps`), the
     outputs for the derivatives (`rate_steps`) and for the constraints (`closed_steps`); and the order of the `start`,
     in which no outputs stand for the states.
     """
 
-    def __init__(self, data: Mapping[str, Any], models: Iterable[type[Model]]) -> None:
-        self.data = data
-        self.models = {name: model for (name, _), model in zip(data["components"], models, strict=True)}
+    def __init__(self, data: Mapping[str, Any], models: Mapping[str, Model]) -> None:
+        self.data, self.models = data, models
         self.sources: dict[str, str] = {target: source for source, target in data["connections"]}
         self.steps: Steps = data["steps"]
         self.rate_steps: Steps = data["rate_steps"]
@@ -152,7 +104,7 @@ class SystemDescription:
     def _declared(
         self,
         name: str,
-        declaration_of: Callable[[type[Model]], type | None],
+        declaration_of: Callable[[Model], type | None],
         leave_out: Iterable[str],
         further_fields: Any = (),
     ) -> Any:
@@ -183,9 +135,7 @@ class SystemDescription:
                 fields.append((component, of, group(of, component)))
         return declared_class("FurtherOutputs", (), fields) if fields else None
 
-    def _member(
-        self, name: str, model: type[Model], inputs: Iterable[str], common: Mapping[str, str]
-    ) -> Member:
+    def _member(self, name: str, model: Model, inputs: Iterable[str], common: Mapping[str, str]) -> Member:
         def getter(full: str) -> Any:
             return attrgetter(full)
 
@@ -216,9 +166,7 @@ class SystemDescription:
             f"makes the steps of all.\n\nConnected inside: {joined or 'nothing'}."
         )
 
-    def required(
-        self, requirements_of: Callable[[type[Model]], Sequence[Requirement]]
-    ) -> tuple[Requirement, ...]:
+    def required(self, requirements_of: Callable[[Model], Sequence[Requirement]]) -> tuple[Requirement, ...]:
         """The requirements of all components, by full names."""
         return tuple(
             replace(

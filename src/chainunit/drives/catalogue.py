@@ -112,7 +112,7 @@ class CatalogueMotor:
         ):
             return identify(self.nameplate)
 
-    def model(self) -> tuple[type[Motor], Any]:
+    def model(self) -> tuple[Motor, Any]:
         """The model of the motor, and its parameters.
 
         Raises

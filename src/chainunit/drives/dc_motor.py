@@ -17,14 +17,23 @@ limited to that of the supply. Back-calculation keeps the integrators from windi
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Container, Iterator
+from typing import TYPE_CHECKING, Any
 
 from ..core.engines import MATH
 from ..core.model import Part, Requirement
 from ..core.ports import LoadInput, measured_terminal
 from ..core.quantities import Value, declaration, group, quantity
-from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, friction_time
+from .motor import (
+    T_RATED,
+    TERMINALS,
+    Motor,
+    MotorOutputs,
+    MotorParameters,
+    MotorPoint,
+    ShaftStates,
+    friction_time,
+)
 
 if TYPE_CHECKING:
     from .speed_control import Loop, Tuning
@@ -158,92 +167,101 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: DcMotorPoint) -> Outputs:
     return Outputs(**s.outputs(), i_ref=s.i_ref, v=s.v, supply_power=s.v * x.armature.i, heat=s.heat)
 
 
-class DcMotor(Motor):
-    """A DC motor under speed control that owns the shaft and takes the machine's load port."""
+def _current_limit(p: Any) -> float | None:
+    """The current limit of the converter."""
+    return float(p.limit.i)
 
-    name = "DcMotor"
-    description = (
-        "DC motor with cascaded PI control, current limit and winding temperature; takes a load port"
+
+def _tune(p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
+    """The parameters with tuned gains at a total `inertia` at the shaft [kg m2]; gains in `fixed` stay."""
+    from .speed_control import tune
+
+    tuning = tune(p.armature, inertia)
+    gains = {name: gain for name, gain in tuning.parameters.items() if name not in fixed}
+    return DcMotor.parameter_layout.from_names(gains, p), tuning if gains else None
+
+
+def _speed_loop(p: Any, inertia: float) -> Loop | None:
+    """The loop of the speed control at a total `inertia` at the shaft [kg m2]."""
+    from .speed_control import loop
+
+    return loop(p, inertia)
+
+
+def _torque_limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:
+    """The torque at the current limit, or at the voltage limit with the winding at `T` [K], by default cold."""
+    arm = p.armature
+    R = arm.R * (1.0 + arm.alpha * (T - T_RATED))
+    return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / R)
+
+
+def _largest_torque(p: Any, T: float, *at: float) -> float:
+    """The torque at the current limit, or at the voltage limit at this speed."""
+    (w,) = at
+    return float(_torque_limit(MATH, p, w, T))
+
+
+def _pull_out(p: Any, T: float, *at: float) -> float:
+    """The torque at standstill, without friction and back-EMF."""
+    return float(_torque_limit(MATH, p, 0.0, T))
+
+
+def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """The limit of the inductance: no time constant of the armature below 1 microsecond."""
+    yield p.armature.L, 1e-6 * (p.armature.R + p.current_control.kp), math.inf
+
+
+def _internal_step(xp: Any, p: Any) -> Any:
+    """The least of a quarter of the time constant of the closed current loop, which is usually the fastest part,
+    the time constant of the rotor with its friction alone, and 0.25 ms. The Runge-Kutta method is stable up to
+    2.8 time constants, which leaves a reserve for a winding that heats up."""
+    by_current = 0.25 * p.armature.L / (p.armature.R + p.current_control.kp)
+    return xp.minimum(xp.minimum(2.5e-4, by_current), friction_time(xp, p.rotor))
+
+
+def _initial_states(xp: Any, p: Any) -> Any:
+    """The states without current, at the start angle and speed, with the winding at ambient temperature."""
+    return States(
+        phi=p.phi_start,
+        w=p.w_start,
+        armature=ArmatureState(i=0.0, T=p.ambient.T),
+        integral=Integral(i=0.0, v=0.0),
+        load_energy=0.0,
     )
-    Parameters = Parameters
-    Inputs = Inputs
-    States = States
-    Point = DcMotorPoint
-    current, temperature, winding = "armature.i", "armature.T", "armature"
-    terminals = (*Motor.terminals, measured_terminal(current="armature.i", power="supply_power"))
-    limited_by: ClassVar[Mapping[str, float]] = {"w": 1e-9}
-    required = (
+
+
+DcMotor = Motor(
+    name="DcMotor",
+    text="A DC motor under speed control that owns the shaft and takes the machine's load port.",
+    description=(
+        "DC motor with cascaded PI control, current limit and winding temperature; takes a load port"
+    ),
+    Parameters=Parameters,
+    Inputs=Inputs,
+    States=States,
+    Point=DcMotorPoint,
+    current="armature.i",
+    temperature="armature.T",
+    winding="armature",
+    terminals=(*TERMINALS, measured_terminal(current="armature.i", power="supply_power")),
+    limited_by={"w": 1e-9},
+    required=(
         Requirement(
             "armature.L",
             "H",
             "the current changes faster than the internal integrator can follow",
             ("armature.R", "current_control.kp"),
         ),
-    )
-
-    control = "all gains are given"
-
-    @staticmethod
-    def current_limit(p: Any) -> float | None:
-        """The current limit of the converter."""
-        return float(p.limit.i)
-
-    @classmethod
-    def tune(cls, p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
-        """The parameters with tuned gains at a total `inertia` at the shaft [kg m2]; gains in `fixed` stay."""
-        from .speed_control import tune
-
-        tuning = tune(p.armature, inertia)
-        gains = {name: gain for name, gain in tuning.parameters.items() if name not in fixed}
-        return cls.parameter_layout.from_names(gains, p), tuning if gains else None
-
-    @staticmethod
-    def speed_loop(p: Any, inertia: float) -> Loop | None:
-        """The loop of the speed control at a total `inertia` at the shaft [kg m2]."""
-        from .speed_control import loop
-
-        return loop(p, inertia)
-
-    @staticmethod
-    def limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:
-        """The torque at the current limit, or at the voltage limit with the winding at `T` [K], by default cold."""
-        arm = p.armature
-        R = arm.R * (1.0 + arm.alpha * (T - T_RATED))
-        return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / R)
-
-    @staticmethod
-    def largest_torque(p: Any, T: float, *at: float) -> float:
-        """The torque at the current limit, or at the voltage limit at this speed."""
-        (w,) = at
-        return float(DcMotor.limit(MATH, p, w, T))
-
-    @staticmethod
-    def pull_out(p: Any, T: float, *at: float) -> float:
-        """The torque at standstill, without friction and back-EMF."""
-        return float(DcMotor.limit(MATH, p, 0.0, T))
-
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The limit of the inductance: no time constant of the armature below 1 microsecond."""
-        yield p.armature.L, 1e-6 * (p.armature.R + p.current_control.kp), math.inf
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """The least of a quarter of the time constant of the closed current loop, which is usually the fastest part,
-        the time constant of the rotor with its friction alone, and 0.25 ms. The Runge-Kutta method is stable up to
-        2.8 time constants, which leaves a reserve for a winding that heats up."""
-        by_current = 0.25 * p.armature.L / (p.armature.R + p.current_control.kp)
-        return xp.minimum(xp.minimum(2.5e-4, by_current), friction_time(xp, p.rotor))
-
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """The states without current, at the start angle and speed, with the winding at ambient temperature."""
-        return States(
-            phi=p.phi_start,
-            w=p.w_start,
-            armature=ArmatureState(i=0.0, T=p.ambient.T),
-            integral=Integral(i=0.0, v=0.0),
-            load_energy=0.0,
-        )
-
-    parts = (Part(Outputs, _outputs),)
+    ),
+    control="all gains are given",
+    parts=(Part(Outputs, _outputs),),
+    current_limit=_current_limit,
+    tune=_tune,
+    speed_loop=_speed_loop,
+    limit=_torque_limit,
+    largest_torque=_largest_torque,
+    pull_out=_pull_out,
+    requirements=_limits,
+    internal_step=_internal_step,
+    initial_states=_initial_states,
+)

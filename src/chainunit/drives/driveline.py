@@ -168,8 +168,39 @@ def _slopes(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> PortSlopes:
     return PortSlopes(tau_bias_dphi=along * per_motor_turn, tau_bias_dw=by_w * per_motor_turn)
 
 
-class CardanDriveline(Model):
-    """A cardan shaft with two Hooke joints and two elastic shafts between a motor and a machine, with the inertia on
+def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """The limits of both bends: a right angle."""
+    for name in BENDS:
+        yield getattr(p, name), -math.inf, RIGHT
+
+
+def _internal_step(xp: Any, p: Any) -> Any:
+    """Longest internal step: a tenth of the time in which the driven inertia swings on shaft 3 by one radian,
+    half of the time in which its speed decays at any i23, and at most 0.25 ms."""
+    slowest = xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J4 / p.c3))
+    # the share (d phi2/d phi4)^2 = (i c3/(c2 + i^2 c3))^2 of d2 acts, at most c3/(4 c2)
+    damping = p.d3 + p.d2 * xp.maximum(1.0, p.c3 / (4.0 * p.c2))
+    return 1.0 / (1.0 / slowest + 2.0 * damping / p.J4)
+
+
+def _initial_states(xp: Any, p: Any) -> Any:
+    """The states without twist, with both ends in the same motion."""
+    angle, i, _ = two_joints(xp, p, p.gamma1 + p.phi_start / p.ratio)
+    return States(
+        driven=DrivenState(phi=angle - _assembled(xp, p), w=i * p.w_start / p.ratio), load_energy=0.0
+    )
+
+
+def _rates(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    """Time derivatives of the states, in declared order."""
+    s = _Point(xp, p, u, x)
+    return [s.tau4 * x.driven.w, x.driven.w, s.a4]
+
+
+CardanDriveline = Model(
+    name="CardanDriveline",
+    text="""\
+    A cardan shaft with two Hooke joints and two elastic shafts between a motor and a machine, with the inertia on
     the driven side.
 
     Connect the motor's phi, w, a to the inputs of these names, and the port tau_bias ... w0 to the motor's load.
@@ -180,56 +211,25 @@ class CardanDriveline(Model):
     on the other side: in longer steps the vibration grows without end, while each step returns OK. The coupling is of
     second order in the step where the motor turns. Below about 0.1 rad/s, as in a start from rest, it is of first
     order, as the port does not follow the driven side there.
-    """
-
-    name = "CardanDriveline"
+    """,
     # without damping the explicit Euler method raises any swing: this step by a tenth at most until the stop
-    fmu_data = FmuData(experiment={"step": 2e-5, "stop": 1.0})
-    description = (
+    fmu_data=FmuData(experiment={"step": 2e-5, "stop": 1.0}),
+    description=(
         "Cardan shaft with two Hooke joints between motor and machine: elastic shafts, uneven ratio, damping; "
         "takes a load port and shows one"
-    )
-    Parameters = Parameters
-    Inputs = ShaftInput
-    States = States
-    terminals = line_terminals()
-    input_rates = MappingProxyType({"phi": "w", "w": "a"})
-    required = tuple(
+    ),
+    Parameters=Parameters,
+    Inputs=ShaftInput,
+    States=States,
+    terminals=line_terminals(),
+    input_rates=MappingProxyType({"phi": "w", "w": "a"}),
+    required=tuple(
         Requirement(name, "rad", "a Hooke joint turns only with a bend below 90 deg") for name in BENDS
-    )
-
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The limits of both bends: a right angle."""
-        for name in BENDS:
-            yield getattr(p, name), -math.inf, RIGHT
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """Longest internal step: a tenth of the time in which the driven inertia swings on shaft 3 by one radian,
-        half of the time in which its speed decays at any i23, and at most 0.25 ms."""
-        slowest = xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J4 / p.c3))
-        # the share (d phi2/d phi4)^2 = (i c3/(c2 + i^2 c3))^2 of d2 acts, at most c3/(4 c2)
-        damping = p.d3 + p.d2 * xp.maximum(1.0, p.c3 / (4.0 * p.c2))
-        return 1.0 / (1.0 / slowest + 2.0 * damping / p.J4)
-
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """The states without twist, with both ends in the same motion."""
-        angle, i, _ = two_joints(xp, p, p.gamma1 + p.phi_start / p.ratio)
-        return States(
-            driven=DrivenState(phi=angle - _assembled(xp, p), w=i * p.w_start / p.ratio), load_energy=0.0
-        )
-
-    @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> _Point:
-        """The line at one state."""
-        return _Point(xp, p, u, x)
-
-    @staticmethod
-    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order."""
-        s = _Point(xp, p, u, x)
-        return [s.tau4 * x.driven.w, x.driven.w, s.a4]
-
-    parts = (Part(Outputs, _outputs), Part(PortSlopes, _slopes))
+    ),
+    parts=(Part(Outputs, _outputs), Part(PortSlopes, _slopes)),
+    requirements=_limits,
+    internal_step=_internal_step,
+    initial_states=_initial_states,
+    shared=_Point,
+    derivatives=_rates,
+)

@@ -48,30 +48,33 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: FreeRotorPoint) -> Outputs:
     return Outputs(**s.outputs(), supply_power=0.0, heat=0.0)
 
 
-class FreeRotor(Motor):
-    """The rotor of a motor without supply, which owns the shaft and takes the machine's load port."""
+def _follows(p: Any) -> bool:
+    """It follows no reference."""
+    return False
 
-    name = "FreeRotor"
-    description = "Rotor of a motor that is switched off; takes a load port"
-    Parameters = Parameters
-    Inputs = Inputs
-    States = States
-    Point = FreeRotorPoint
-    current, temperature = "", ""
 
-    @staticmethod
-    def follows(p: Any) -> bool:
-        """It follows no reference."""
-        return False
+def _internal_step(xp: Any, p: Any) -> Any:
+    """As long as the rotor with its friction alone permits, at most 2 ms."""
+    return xp.minimum(2e-3, friction_time(xp, p.rotor))
 
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """As long as the rotor with its friction alone permits, at most 2 ms."""
-        return xp.minimum(2e-3, friction_time(xp, p.rotor))
 
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """The start angle and speed."""
-        return States(phi=p.phi_start, w=p.w_start, load_energy=0.0)
+def _initial_states(xp: Any, p: Any) -> Any:
+    """The start angle and speed."""
+    return States(phi=p.phi_start, w=p.w_start, load_energy=0.0)
 
-    parts = (Part(Outputs, _outputs),)
+
+FreeRotor = Motor(
+    name="FreeRotor",
+    text="The rotor of a motor without supply, which owns the shaft and takes the machine's load port.",
+    description="Rotor of a motor that is switched off; takes a load port",
+    Parameters=Parameters,
+    Inputs=Inputs,
+    States=States,
+    Point=FreeRotorPoint,
+    current="",
+    temperature="",
+    parts=(Part(Outputs, _outputs),),
+    follows=_follows,
+    internal_step=_internal_step,
+    initial_states=_initial_states,
+)

@@ -62,15 +62,15 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> GearOutputs:
     )
 
 
-class Gear(Model):
-    """A rigid gear without mass and loss: it divides angle and speed, and gives the load of the machine to the
-    motor."""
-
-    name = "Gear"
-    description = (
+Gear = Model(
+    name="Gear",
+    text="""A rigid gear without mass and loss: it divides angle and speed, and gives the load of the machine to the
+    motor.""",
+    description=(
         "Rigid gear without mass and loss between motor and machine: takes a load port and shows one"
-    )
-    Parameters = GearParameters
-    Inputs = ShaftInput
-    terminals = line_terminals()
-    parts = (Part(GearOutputs, _outputs),)
+    ),
+    Parameters=GearParameters,
+    Inputs=ShaftInput,
+    terminals=line_terminals(),
+    parts=(Part(GearOutputs, _outputs),),
+)

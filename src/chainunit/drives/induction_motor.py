@@ -23,8 +23,8 @@ electric drives", 1989; the saturation curve of motulator, with which the tests 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 from ..core.model import FmuData, Part, Requirement
 from ..core.planar import Vec2
@@ -33,6 +33,7 @@ from ..core.quantities import Value, declaration, group, quantity
 from .contactor import Switching, connection, opening
 from .induction_steady import SLIPS, Flux, breakdown, circuit, skin_slope, steady, volts_per_hertz
 from .motor import (
+    TERMINALS,
     Motor,
     MotorOutputs,
     MotorParameters,
@@ -277,7 +278,7 @@ class InductionMotorPoint(MotorPoint):
             self.R_s * (self.i_d * self.i_d + self.i_q * self.i_q)
             + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
         )
-        self.cooling = InductionMotor.cooling(xp, p, x.w)
+        self.cooling = _cooling(xp, p, x.w)
         self.turn(p, u, x)
         self._flux_rates(p, u, x, main, 6.0 * b * b * p.main.beta * p.main.beta / p.main.L)
 
@@ -354,8 +355,73 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: InductionMotorPoint) -> Outputs
     )
 
 
-class InductionMotor(Motor):
-    """A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes a load port.
+def _follows(p: Any) -> bool:
+    """Whether the motor runs on an inverter."""
+    return bool(p.inverter.on)
+
+
+def _torque_limit(xp: Any, p: Any, w: Any) -> Any:
+    """On the line the torque of a cold motor at this speed; on an inverter the largest torque at any frequency,
+    with an error of about 1 % (the current limit of the inverter is not in the model)."""
+    on_line = steady(xp, p, w).air_gap_tau
+    most = on_line * 0.0
+    for slip in SLIPS:
+        f = xp.maximum(p.pole_pairs * w / _TURN, 0.0) + slip * p.supply.f
+        most = xp.maximum(most, steady(xp, p, w, volts_per_hertz(xp, p, f), f).air_gap_tau)
+    return on_line + p.inverter.on * (most - on_line)
+
+
+def _cooling(xp: Any, p: Any, w: Any) -> Any:
+    """Cooling by the fan on the shaft: least at rest, full at synchronous speed and above."""
+    speed_share = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
+    return p.cooling.still + (1.0 - p.cooling.still) * speed_share
+
+
+def _largest_torque(p: Any, T: float, *at: float) -> float:
+    """The pull-out torque at the present voltage [V] and frequency [Hz] of the motor."""
+    return float(breakdown(p, at[0] / p.supply.V, at[1], T).air_gap_tau) if min(at) > 0.0 else 0.0
+
+
+def _pull_out(p: Any, T: float, *at: float) -> float:
+    """The pull-out torque after friction and windage."""
+    return float(breakdown(p, at[0] / p.supply.V, at[1], T).tau) if min(at) > 0.0 else 0.0
+
+
+def _breakdown_speed(p: Any, T: float, *at: float) -> float:
+    """The speed of the pull-out torque after friction and windage."""
+    V, f = at
+    slip = float(breakdown(p, V / p.supply.V, f, T).slip) if min(V, f) > 0.0 else 1.0
+    return (1.0 - slip) * _TURN * f / p.pole_pairs
+
+
+def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """The limit of the leakage: no time constant of the fluxes below 1 microsecond."""
+    yield p.cage.L, 1e-6 * _resistance(p) / (1.0 - p.cage.skin_L), math.inf
+
+
+def _internal_step(xp: Any, p: Any) -> Any:
+    """The least of a quarter of the time constant of the fluxes and of the contactor, 1/12 rad of the supply,
+    `friction_time`, 0.25 ms."""
+    by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
+    longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
+    return xp.minimum(xp.minimum(longest, 0.25 * p.switching.decay), friction_time(xp, p.rotor))
+
+
+def _initial_states(xp: Any, p: Any) -> Any:
+    """The states without flux at the start, at ambient temperature; an inverter starts at frequency 0."""
+    return States(
+        phi=p.phi_start,
+        w=p.w_start,
+        stator=StatorState(psi=Flux(d=0.0, q=0.0), T=p.ambient.T),
+        cage=CageState(psi=Flux(d=0.0, q=0.0)),
+        supply=SupplyState(frequency=p.supply.f * (1.0 - p.inverter.on), ramp=p.soft_start.voltage),
+        load_energy=0.0,
+    )
+
+
+InductionMotor = Motor(
+    name="InductionMotor",
+    text="""A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes a load port.
 
     With the start values the motor starts direct on line. With `soft_start.voltage` below 1 it has a soft starter.
     With `inverter.on` = 1 it runs on an inverter and follows `w_ref`. The input `voltage` makes dips. At 0 the
@@ -363,97 +429,42 @@ class InductionMotor(Motor):
     shaft. With the input `contactor` at 0 the terminals are open: the currents vanish in `switching.decay`, the motor
     coasts, and its field decays with the time constant of the cage; a contactor that closes meanwhile finds the field
     at its phase. With `star` at 1 the winding is in star. A soft starter does not begin anew after an opening.
-    """
-
-    name = "InductionMotor"
+    """,
     # the flux at switching on turns at the supply's frequency and hardly decays
-    fmu_data = FmuData(experiment={"step": 5e-5, "stop": 2.0})
-    description = (
+    fmu_data=FmuData(experiment={"step": 5e-5, "stop": 2.0}),
+    description=(
         "Squirrel-cage induction motor (dynamic dq model), direct on line, with a soft starter or V/f inverter; "
         "takes a load port"
-    )
-    Parameters = Parameters
-    Inputs = Inputs
-    States = States
-    Point = InductionMotorPoint
-    current, temperature, winding = "i", "stator.T", "stator"
-    terminals = (*Motor.terminals, measured_terminal(current="i", power="supply_power"))
-    limited_by: ClassVar[Mapping[str, float]] = {"v": 1e-3, "supply.frequency": 1e-3}
-    required = (
+    ),
+    Parameters=Parameters,
+    Inputs=Inputs,
+    States=States,
+    Point=InductionMotorPoint,
+    current="i",
+    temperature="stator.T",
+    winding="stator",
+    terminals=(*TERMINALS, measured_terminal(current="i", power="supply_power")),
+    limited_by={"v": 1e-3, "supply.frequency": 1e-3},
+    required=(
         Requirement(
             "cage.L",
             "H",
             "the fluxes change faster than the internal integrator can follow",
             ("stator.R", "cage.R", "cage.skin_R", "cage.skin_L"),
         ),
-    )
-    control = "an inverter, which follows the speed asked for by its frequency"
-
-    @staticmethod
-    def follows(p: Any) -> bool:
-        """Whether the motor runs on an inverter."""
-        return bool(p.inverter.on)
-
-    @staticmethod
-    def limit(xp: Any, p: Any, w: Any) -> Any:
-        """On the line the torque of a cold motor at this speed; on an inverter the largest torque at any frequency,
-        with an error of about 1 % (the current limit of the inverter is not in the model)."""
-        on_line = steady(xp, p, w).air_gap_tau
-        most = on_line * 0.0
-        for slip in SLIPS:
-            f = xp.maximum(p.pole_pairs * w / _TURN, 0.0) + slip * p.supply.f
-            most = xp.maximum(most, steady(xp, p, w, volts_per_hertz(xp, p, f), f).air_gap_tau)
-        return on_line + p.inverter.on * (most - on_line)
-
-    @staticmethod
-    def cooling(xp: Any, p: Any, w: Any) -> Any:
-        """Cooling by the fan on the shaft: least at rest, full at synchronous speed and above."""
-        speed_share = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
-        return p.cooling.still + (1.0 - p.cooling.still) * speed_share
-
-    @staticmethod
-    def largest_torque(p: Any, T: float, *at: float) -> float:
-        """The pull-out torque at the present voltage [V] and frequency [Hz] of the motor."""
-        return float(breakdown(p, at[0] / p.supply.V, at[1], T).air_gap_tau) if min(at) > 0.0 else 0.0
-
-    @staticmethod
-    def pull_out(p: Any, T: float, *at: float) -> float:
-        """The pull-out torque after friction and windage."""
-        return float(breakdown(p, at[0] / p.supply.V, at[1], T).tau) if min(at) > 0.0 else 0.0
-
-    @staticmethod
-    def breakdown_speed(p: Any, T: float, *at: float) -> float:
-        """The speed of the pull-out torque after friction and windage."""
-        V, f = at
-        slip = float(breakdown(p, V / p.supply.V, f, T).slip) if min(V, f) > 0.0 else 1.0
-        return (1.0 - slip) * _TURN * f / p.pole_pairs
-
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The limit of the leakage: no time constant of the fluxes below 1 microsecond."""
-        yield p.cage.L, 1e-6 * _resistance(p) / (1.0 - p.cage.skin_L), math.inf
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """The least of a quarter of the time constant of the fluxes and of the contactor, 1/12 rad of the supply,
-        `friction_time`, 0.25 ms."""
-        by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
-        longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
-        return xp.minimum(xp.minimum(longest, 0.25 * p.switching.decay), friction_time(xp, p.rotor))
-
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """The states without flux at the start, at ambient temperature; an inverter starts at frequency 0."""
-        return States(
-            phi=p.phi_start,
-            w=p.w_start,
-            stator=StatorState(psi=Flux(d=0.0, q=0.0), T=p.ambient.T),
-            cage=CageState(psi=Flux(d=0.0, q=0.0)),
-            supply=SupplyState(frequency=p.supply.f * (1.0 - p.inverter.on), ramp=p.soft_start.voltage),
-            load_energy=0.0,
-        )
-
-    parts = (Part(Outputs, _outputs),)
+    ),
+    control="an inverter, which follows the speed asked for by its frequency",
+    parts=(Part(Outputs, _outputs),),
+    follows=_follows,
+    limit=_torque_limit,
+    cooling=_cooling,
+    largest_torque=_largest_torque,
+    pull_out=_pull_out,
+    breakdown_speed=_breakdown_speed,
+    requirements=_limits,
+    internal_step=_internal_step,
+    initial_states=_initial_states,
+)
 
 
 def _resistance(p: Any) -> Any:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from ..core.engines import MATH
-from ..core.model import Model, Terminal
+from ..core.model import UNSTATED, Model
 from ..core.ports import LoadState, Start, flanges, load_terminal, shaft_motion
 from ..core.quantities import Value, declaration, group, quantity
 
@@ -88,43 +89,89 @@ class MotorPoint:
         raise NotImplementedError
 
 
+TERMINALS = (*flanges("outflow"), load_terminal("load."))
+"""The terminals of every motor."""
+
+
+def _follows(p: Any) -> bool:
+    return True
+
+
+def _current_limit(p: Any) -> float | None:
+    return None
+
+
+def _speed_loop(p: Any, inertia: float) -> Loop | None:
+    return None
+
+
+def _cooling(xp: Any, p: Any, w: Any) -> Any:
+    return 1.0
+
+
+def _tune(p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
+    return p, None
+
+
+def _breakdown_speed(p: Any, T: float, *at: float) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Motor(Model):
     """A motor that owns the shaft: it has the states of `ShaftStates`, the outputs of `MotorOutputs`, and further
-    ones of each kind of motor.
+    ones of each kind of motor. `FOREIGN` is the motor of which only the terminals are known."""
 
-    The base class itself stands for a foreign FMU, of which only the terminals are known: its parameters are None,
-    and it has neither a speed loop nor known limits.
-    """
-
-    terminals: ClassVar[tuple[Terminal, ...]] = (*flanges("outflow"), load_terminal("load."))
-    Point: ClassVar[Any]
+    Point: Any = UNSTATED
     """The `MotorPoint` of the kind, called with xp, p, u, x."""
+    current: str = ""
+    """Output that is the current [A]."""
+    temperature: str = ""
+    """Output that is the temperature of the winding [K]."""
+    winding: str = ""
+    """Parameters that heat and cool the winding: among them `alpha` [1/K], `C` [J/K] and `R_th` [K/W]."""
+    cooling: Callable[[Any, Any, Any], Any] = _cooling
+    """Cooling (xp, p, w) at the speed w [rad/s], as a share of the cooling for which `R_th` holds."""
+    limit: Callable[..., Any] = UNSTATED
+    """Largest air-gap torque (xp, p, w) at the speed w [rad/s] that the supply allows in steady running [N m]."""
+    control: str = "its own, which follows the speed asked for"
+    """A text on how the speed of the motor is controlled, for one that `follows` the reference."""
+    follows: Callable[[Any], bool] = _follows
+    """Whether the motor with the parameters p follows the speed reference `w_ref`; else its speed follows from supply
+    and load."""
+    current_limit: Callable[[Any], float | None] = _current_limit
+    """Largest current (p) of the converter [A]; None without such a limit."""
+    tune: Callable[..., tuple[Any, Tuning | None]] = _tune
+    """The parameters with the gains of the speed control tuned (p, inertia, fixed) to the total inertia at the shaft
+    [kg m2], except the gains with names in `fixed`; and the tuning, None if all gains are fixed. An InputError
+    refuses a motor of which no gains make a loop that is stable enough."""
+    speed_loop: Callable[[Any, float], Loop | None] = _speed_loop
+    """The linearised speed loop (p, inertia) at the total inertia at the shaft [kg m2]; None for a motor without
+    one."""
+    limited_by: Mapping[str, float] = field(default_factory=dict)
+    """Outputs on which the largest torque at an instant depends, each with its resolution as a share of its largest
+    value."""
+    largest_torque: Callable[..., float] = UNSTATED
+    """Largest air-gap torque [N m] that the motor can give at an instant (p, T, *at) with the winding at T [K]; `at`
+    are the values of `limited_by`. A speed among them is positive in the direction of the torque, negative if the
+    torque brakes. The result is zero or negative if the motor can give no torque."""
+    pull_out: Callable[..., float] = UNSTATED
+    """Largest torque at the shaft [N m] while a load slows the motor down, from this point until it stalls;
+    arguments as in `largest_torque`."""
+    breakdown_speed: Callable[..., float] = _breakdown_speed
+    """Speed of the shaft [rad/s] below which the torque falls with the speed: a load that slows the motor down to
+    it stalls the motor. 0 for a motor without such a speed; arguments as in `largest_torque`."""
 
-    @classmethod
-    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> Any:
-        """The motor at one state."""
-        return cls.Point(xp, p, u, x)
+    def __post_init__(self) -> None:
+        self.follow(terminals=TERMINALS, shared=self.Point, derivatives=self._rates)
+        super().__post_init__()
 
-    @classmethod
-    def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
-        s = cls.shared(xp, p, u, x)
+        s = self.shared(xp, p, u, x)
         return [s.tau * x.w, x.w, s.a, *s.rates(xp, p, u, x)]
 
-    current: ClassVar[str]
-    """Output that is the current [A]."""
-    temperature: ClassVar[str]
-    """Output that is the temperature of the winding [K]."""
-    winding: ClassVar[str]
-    """Parameters that heat and cool the winding: among them `alpha` [1/K], `C` [J/K] and `R_th` [K/W]."""
-
-    @staticmethod
-    def cooling(xp: Any, p: Any, w: Any) -> Any:
-        """Cooling at the speed `w` [rad/s], as a share of the cooling for which `R_th` holds."""
-        return 1.0
-
-    @classmethod
-    def settled_temperature(cls, p: Any, heat: float, ran_at: float, w: float) -> float:
+    def settled_temperature(self, p: Any, heat: float, ran_at: float, w: float) -> float:
         """Steady temperature of the winding under a permanent duty [K].
 
         `heat` [W] is the mean loss of the duty in a run with the winding at `ran_at` [K], `w` [rad/s] its mean speed.
@@ -134,70 +181,16 @@ class Motor(Model):
 
         Infinite where the loss grows faster than the cooling.
         """
-        winding = getattr(p, cls.winding)
-        resistance = winding.R_th / cls.cooling(MATH, p, w)
+        winding = getattr(p, self.winding)
+        resistance = winding.R_th / self.cooling(MATH, p, w)
         gain = resistance * heat / (1.0 + winding.alpha * (ran_at - T_RATED))
         if gain * winding.alpha >= 1.0:
             return math.inf
         return float((p.ambient.T + gain * (1.0 - winding.alpha * T_RATED)) / (1.0 - gain * winding.alpha))
 
-    @staticmethod
-    def limit(xp: Any, p: Any, w: Any) -> Any:
-        """Largest air-gap torque at the speed `w` [rad/s] that the supply allows in steady running [N m]."""
-        raise NotImplementedError
 
-    control: ClassVar[str] = "its own, which follows the speed asked for"
-    """A text on how the speed of the motor is controlled, for one that `follows` the reference."""
-
-    @staticmethod
-    def follows(p: Any) -> bool:
-        """Whether the motor follows the speed reference `w_ref`; else its speed follows from supply and load."""
-        return True
-
-    @staticmethod
-    def current_limit(p: Any) -> float | None:
-        """Largest current of the converter [A]; None without such a limit."""
-        return None
-
-    @classmethod
-    def tune(cls, p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
-        """The parameters with the gains of the speed control tuned to the total `inertia` at the shaft [kg m2],
-        except the gains with names in `fixed`; and the tuning, None if all gains are fixed.
-
-        Raises
-        ------
-        InputError
-            where no gains make a loop that is stable enough.
-        """
-        return p, None
-
-    @staticmethod
-    def speed_loop(p: Any, inertia: float) -> Loop | None:
-        """The linearised speed loop at the total `inertia` at the shaft [kg m2]; None for a motor without one."""
-        return None
-
-    limited_by: ClassVar[Mapping[str, float]]
-    """Outputs on which the largest torque at an instant depends, each with its resolution as a share of its largest
-    value."""
-
-    @staticmethod
-    def largest_torque(p: Any, T: float, *at: float) -> float:
-        """Largest air-gap torque [N m] that the motor can give at an instant with the winding at `T` [K]; `at` are
-        the values of `limited_by`. A speed among them is positive in the direction of the torque, negative where the
-        torque brakes. The result is zero or negative where the motor can give no torque."""
-        raise NotImplementedError
-
-    @staticmethod
-    def pull_out(p: Any, T: float, *at: float) -> float:
-        """Largest torque at the shaft [N m] while a load slows the motor down, from this point until it stalls;
-        arguments as in `largest_torque`."""
-        raise NotImplementedError
-
-    @staticmethod
-    def breakdown_speed(p: Any, T: float, *at: float) -> float:
-        """Speed of the shaft [rad/s] below which the torque falls with the speed: a load that slows the motor down to
-        it stalls the motor. 0 for a motor without such a speed; arguments as in `largest_torque`."""
-        return 0.0
+FOREIGN = Motor(name="FOREIGN", home=__name__, Parameters=None, Inputs=None)
+"""A motor that is a foreign FMU: its parameters are None, and it has neither a speed loop nor known limits."""
 
 
 def friction_time(xp: Any, rotor: Any) -> Any:

@@ -78,38 +78,36 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Friction) -> Outputs:
     )
 
 
-class SlipClutch(Model):
-    """A friction clutch without inertia of its own between a motor and its load."""
+def _internal_step(xp: Any, p: Any) -> Any:
+    """A tenth of a millisecond: the inertia behind the clutch, which decides, is not known here."""
+    return 1e-4
 
-    name = "SlipClutch"
-    description = (
+
+def _initial_states(xp: Any, p: Any) -> Any:
+    """The driven shaft in the motion of the motor's shaft."""
+    return States(driven=DrivenState(phi=p.phi_start, w=p.w_start), load_energy=0.0)
+
+
+def _rates(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    """Time derivatives of the states, in declared order."""
+    s = _Friction(xp, p, u, x)
+    return [s.tau_load * x.driven.w, x.driven.w, s.a]
+
+
+SlipClutch = Model(
+    name="SlipClutch",
+    text="A friction clutch without inertia of its own between a motor and its load.",
+    description=(
         "Friction clutch that slips at its setting: takes a load port and shows one, owns the driven shaft"
-    )
-    Parameters = Parameters
-    Inputs = ShaftInput
-    States = States
-    terminals = line_terminals()
-    input_rates = MappingProxyType({"phi": "w", "w": "a"})
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """A tenth of a millisecond: the inertia behind the clutch, which decides, is not known here."""
-        return 1e-4
-
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """The driven shaft in the motion of the motor's shaft."""
-        return States(driven=DrivenState(phi=p.phi_start, w=p.w_start), load_energy=0.0)
-
-    @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> _Friction:
-        """The clutch at one state."""
-        return _Friction(xp, p, u, x)
-
-    @staticmethod
-    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order."""
-        s = _Friction(xp, p, u, x)
-        return [s.tau_load * x.driven.w, x.driven.w, s.a]
-
-    parts = (Part(Outputs, _outputs),)
+    ),
+    Parameters=Parameters,
+    Inputs=ShaftInput,
+    States=States,
+    terminals=line_terminals(),
+    input_rates=MappingProxyType({"phi": "w", "w": "a"}),
+    parts=(Part(Outputs, _outputs),),
+    internal_step=_internal_step,
+    initial_states=_initial_states,
+    shared=_Friction,
+    derivatives=_rates,
+)

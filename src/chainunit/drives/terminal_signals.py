@@ -24,7 +24,7 @@ class TerminalSignals:
 
 
 def terminal_signals(
-    motor: type[Motor], p: Any, w: float, torque: float, T: float | None = None
+    motor: Motor, p: Any, w: float, torque: float, T: float | None = None
 ) -> TerminalSignals:
     """The signals of a motor with the parameters `p` in running at the reference `w` [rad/s] with the mean `torque`
     on its rotor [N m].
@@ -38,9 +38,9 @@ def terminal_signals(
     TypeError
         for another motor.
     """
-    if issubclass(motor, DcMotor):
+    if motor is DcMotor:
         return TerminalSignals({"current": "armature.i"}, per_current=p.armature.k)
-    if issubclass(motor, InductionMotor):
+    if motor is InductionMotor:
         f = p.supply.f
         if motor.follows(p):
             f = p.pole_pairs * w / (2.0 * math.pi) + p.inverter.slip * torque
@@ -50,4 +50,4 @@ def terminal_signals(
             per_power=p.pole_pairs / (2.0 * math.pi * f),
             resistance=3.0 * p.stator.R * warm,
         )
-    raise TypeError(f"{motor.__name__}: the torque on its rotor is not known from signals at its terminals")
+    raise TypeError(f"{motor.name}: the torque on its rotor is not known from signals at its terminals")

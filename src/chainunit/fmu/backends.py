@@ -30,7 +30,7 @@ class Origin:
 
 
 def export(
-    model: type[Model],
+    model: Model,
     file: Path,
     start: dict[str, float] | None = None,
     *,
@@ -84,7 +84,7 @@ def export(
 
 
 def _by_python(
-    model: type[Model],
+    model: Model,
     file: Path,
     start: dict[str, float] | None,
     names: Names,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -17,7 +18,7 @@ from ..core.model import About, Model
 from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, quotient, written
 from ..core.symbolic_trace import Trace, trace
 from .recipe import Experiment
-from .script import Script, name_in_fmu, text_in_fmu
+from .script import Script, name_in_fmu
 
 RELEASED = "2026-11-27"
 """The day of this version's release, equal to the one in CITATION.cff."""
@@ -40,9 +41,7 @@ class Interface:
     """The variables of a model's FMU in the order of their value references: parameters, inputs, states
     (each an output), other outputs part by part."""
 
-    def __init__(
-        self, model: type[Model], start: dict[str, float], script: type[Script] | None = None
-    ) -> None:
+    def __init__(self, model: Model, start: dict[str, float], script: type[Script] | None = None) -> None:
         """
         Parameters
         ----------
@@ -82,7 +81,9 @@ class Interface:
 
     def text(self, text: str) -> str:
         """A text that names variables of the model, with their names in the FMU."""
-        return text_in_fmu(text, self._variables, self.script.names)
+        if self.script.names == "structured":
+            return text
+        return re.sub(r"\w+(?:\.\w+)+", lambda m: self.name(m[0]) if m[0] in self._variables else m[0], text)
 
     @cached_property
     def _variables(self) -> frozenset[str]:
@@ -197,7 +198,7 @@ class Interface:
 
 
 @lru_cache(maxsize=8)
-def shared_interface(model: type[Model]) -> Interface:
+def shared_interface(model: Model) -> Interface:
     """The interface that keeps the equations of a model: its start values, and the version of FMI, do not change
     them."""
     return Interface(model, {}, Script)

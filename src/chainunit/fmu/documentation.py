@@ -37,7 +37,7 @@ def page(interface: Interface, version: str, sketch: Sketch | None) -> str:
     """A self-contained page: a description of the model with its `sketch`, and tables of its parameters, inputs and
     outputs."""
     model = interface.model
-    text = escape(inspect.cleandoc(model.__doc__ or "") + model.fmu_data.notes).replace("\n\n", "</p><p>")
+    text = escape(inspect.cleandoc(model.text) + model.fmu_data.notes).replace("\n\n", "</p><p>")
     picture = f"<figure>{drawing(sketch)}<figcaption>{_FIGURE}</figcaption></figure>\n" if sketch else ""
     tables = "".join(
         f"<h2>{title}</h2>\n{_table(interface.signals_of(causality), causality)}"

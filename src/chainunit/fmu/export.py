@@ -40,7 +40,7 @@ _KINDS = {
 
 
 def export(
-    model: type[Model],
+    model: Model,
     file: Path,
     start: dict[str, float] | None = None,
     *,

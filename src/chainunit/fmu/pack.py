@@ -18,7 +18,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time of a zip entry
 
 
 def interface_of(
-    model: type[Model], start: Mapping[str, float] | None, script: type[Script] | None = None
+    model: Model, start: Mapping[str, float] | None, script: type[Script] | None = None
 ) -> Interface:
     """The interface of `model` with these start values; they are checked as parameters of the model.
 

@@ -26,13 +26,10 @@ def printed_model(interface: Interface) -> str:
     columns = [v.name for v in shared.others]
     values, *functions = kernels(shared.trace, shared.derived, slopes=False, columns=columns)
     statements, outputs = python_statements(values)
-    equations = _rows({"STATEMENTS": statements, "OUTPUTS": outputs})
+    rows = "\n".join(f"{name} = {_text(value)}" for name, value in _tables(interface).items())
+    equations = f"STATEMENTS = {_text(statements)}\nOUTPUTS = {_text(outputs)}"
     head = _HEAD.format(title=model.name)
-    return f"{head}{interface.text(_rows(_tables(interface)))}\n{equations}\n\n\n{python_text(functions)}"
-
-
-def _rows(tables: dict[str, Any]) -> str:
-    return "\n".join(f"{name} = {_text(value)}" for name, value in tables.items())
+    return f"{head}{interface.text(rows)}\n{equations}\n\n\n{python_text(functions)}"
 
 
 def _text(value: Any) -> str:

@@ -29,7 +29,7 @@ def recipes() -> Path:
     return inside if (inside := here / "recipes").exists() else here.parents[2] / "fmu"
 
 
-def icon(model: type[Model], kind: str, sketch: Sketch | None) -> bytes:
+def icon(model: Model, kind: str, sketch: Sketch | None) -> bytes:
     """The icon of a model, "svg" or "png": for a user's machine its `sketch`; else the file in `data/icons` with the
     model's name, else the general icon of a motor (the model takes a load port), of a line (it takes one and gives
     one), or of a machine."""

@@ -147,7 +147,7 @@ def related_files(content: bytes | None = None) -> Element:
 
 @lru_cache(maxsize=32)
 def _tables(
-    model: type[Model], script: type[Script], starts: tuple[tuple[str, float], ...]
+    model: Model, script: type[Script], starts: tuple[tuple[str, float], ...]
 ) -> dict[str, tuple[list[str], list[list[float]]]]:
     """Head and rows of each file, which are the same for each version of FMI.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Container
 from typing import ClassVar, Literal
 
 from ..core.model import Model
@@ -18,17 +16,10 @@ def name_in_fmu(name: str, names: Names) -> str:
     return name.replace(".", "_") if names == "flat" else name
 
 
-def text_in_fmu(text: str, variables: Container[str], names: Names) -> str:
-    """A text with the names in the FMU of the model's `variables` in it."""
-    if names == "structured":
-        return text
-    return re.sub(r"\w+(?:\.\w+)+", lambda m: name_in_fmu(m[0], names) if m[0] in variables else m[0], text)
-
-
 class Script:
     """A model, and values for its FMU in place of the usual ones."""
 
-    model: ClassVar[type[Model]]
+    model: ClassVar[Model]
     start: ClassVar[dict[str, float]] = {}
     """Start values of parameters and inputs, by name, in place of the declared ones."""
     experiment: ClassVar[dict[str, float]] = {}

@@ -6,7 +6,6 @@ force is the force on the rotor from its bearing.
 
 from __future__ import annotations
 
-from types import MappingProxyType
 from typing import Any
 
 from ..core.planar import ZERO
@@ -77,36 +76,40 @@ class Outputs(PortValues):
     tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
 
 
-class Accelerator(InverseMachine):
-    """The accelerator of a crusher: motion of the motor shaft in, torque and reaction of the bearing out."""
+def _linkage(xp: Any, p: Any, u: Any) -> Linkage:
+    """A crank alone."""
+    return Linkage(
+        ground={"O": ZERO},
+        driver=Crank(Bar("rotor", "O", p.radius, p.rotor), "rim"),
+        groups=(),
+        loads={
+            "weight": Weight(p.g),
+            "material": Brake("rotor", u.load, p.brake),
+            "pins": PinLosses(p.pin, p.joint_damping),
+        },
+    )
 
-    name, noun, driver_noun = "Accelerator", "accelerator", "accelerator"
-    description = (
+
+def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+    """Rim and bearing."""
+    return {"rim_speed": p.radius * s.w, "bearing": force(s.reactions(a)["O", "rotor"])}
+
+
+Accelerator = InverseMachine(
+    name="Accelerator",
+    text="The accelerator of a crusher: motion of the motor shaft in, torque and reaction of the bearing out.",
+    noun="accelerator",
+    driver_noun="accelerator",
+    description=(
         "Accelerator of a crusher: a rotor that the material brakes; from motor angle and speed to torque, load port "
         "and reaction of the bearing"
-    )
-    Parameters = Parameters
-    Inputs = Inputs
-    Outputs = Outputs
-    joints = MappingProxyType({"bearing": ("O", "rotor")})
-    pins = MappingProxyType({"O rotor bearing": "bearing"})
-    usual_speed = (10.0, 1000.0)
-
-    @staticmethod
-    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """A crank alone."""
-        return Linkage(
-            ground={"O": ZERO},
-            driver=Crank(Bar("rotor", "O", p.radius, p.rotor), "rim"),
-            groups=(),
-            loads={
-                "weight": Weight(p.g),
-                "material": Brake("rotor", u.load, p.brake),
-                "pins": PinLosses(p.pin, p.joint_damping),
-            },
-        )
-
-    @classmethod
-    def probes(cls, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-        """Rim and bearing."""
-        return {"rim_speed": p.radius * s.w, "bearing": force(s.reactions(a)[cls.joints["bearing"]])}
+    ),
+    Parameters=Parameters,
+    Inputs=Inputs,
+    Outputs=Outputs,
+    joints={"bearing": ("O", "rotor")},
+    pins={"O rotor bearing": "bearing"},
+    usual_speed=(10.0, 1000.0),
+    linkage=_linkage,
+    probes=_probes,
+)

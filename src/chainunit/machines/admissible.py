@@ -18,7 +18,7 @@ _FARTHEST = 1e3
 """Ratio to the declared start value up to which a limit is sought."""
 
 
-def admits(model: type[MachineModel]) -> Callable[[Mapping[str, float]], bool]:
+def admits(model: MachineModel) -> Callable[[Mapping[str, float]], bool]:
     """Whether a machine of the `model` works with these parameters, the others at their declared start values."""
     layout = model.parameter_layout
 

@@ -72,14 +72,14 @@ class ChainUnitMachine(Machine):
         parameters: Parameters | Mapping[str, float] | None = None,
         /,
         *,
-        model: type[ChamberForces] = ChamberForces,
+        model: InverseMachine = ChamberForces,
         **values: Any,
     ) -> None:
         super().__init__(model, parameters, **values)
 
     @property
     def _kind(self) -> list[str]:
-        return [] if self.model is ChamberForces else [f"model={self.model.__name__}"]
+        return [] if self.model is ChamberForces else [f"model={self.model.name}"]
 
     @classmethod
     def from_ratios(
@@ -374,12 +374,12 @@ class ChainedUnit(Machine):
     @property
     def rods(self) -> tuple[int, int]:
         """Numbers of rods in wall and web of an organ."""
-        assert issubclass(self.model, ChainedModel)
+        assert isinstance(self.model, ChainedModel)
         return self.model.organs.walls, self.model.organs.webs
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """See `Machine`; the angles in A2, B and A1 of each side come from the angles of the rods."""
-        assert issubclass(self.model, ChainedModel)
+        assert isinstance(self.model, ChainedModel)
         angles, rods = super().pin_turns(run), self.model.organs.at_pins
         for side in SIDES:
             first, last, web, end = (run[f"{side}.theta_{k}"] for k in rods)
@@ -427,11 +427,11 @@ class ChainUnitOfChains(ChainUnitMachine):
         return ChainedUnit(flexible(*rods), self.by_name | self._law)
 
 
-def machine_of(model: type[InverseMachine], parameters: Any = None, /, **values: float) -> Machine:
+def machine_of(model: InverseMachine, parameters: Any = None, /, **values: float) -> Machine:
     """The machine of a model, of the class with the methods for its kind; arguments and errors are those of
     `Machine`."""
-    if issubclass(model, ChamberForces):
+    if model.Parameters is ChamberForces.Parameters:
         return ChainUnitMachine(parameters, model=model, **values)
-    if issubclass(model, ChainedModel):
+    if isinstance(model, ChainedModel):
         return ChainedUnit(model, parameters, **values)
     return Machine(model, parameters, **values)

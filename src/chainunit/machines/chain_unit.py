@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ..core.model import FmuData, Requirement
 from ..core.planar import ZERO, Link, Vec2
@@ -486,36 +486,69 @@ def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
     }
 
 
-class ChamberForces(InverseMachine):
-    """The inverse model: motion of the motor shaft in, torque and every reaction out."""
+def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """Limits with which the crank turns, and both organs close over the whole swing of the rocker."""
+    yield p.c, p.r, math.inf
+    yield p.r, 0.0, longest_crank(xp, p.l, p.h, xp.sqrt(p.c * p.c + p.hy * p.hy))
+    right, left = rocker_extremes(xp, p)
+    swing = xp.maximum(xp.abs(right), xp.abs(left))
+    yield swing, -math.inf, 0.5 * math.pi
+    low, high = half_width_range(xp, p.e, p.l1, p.l2, swing, p.z)
+    yield p.z, low, high
 
-    name, noun, sides = "ChamberForces", "chain unit", SIDES
-    fmu_data = FmuData(
+
+def _linkage(xp: Any, p: Any, u: Any) -> Linkage:
+    """Crank, dyad, and an organ on each side."""
+    return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))
+
+
+def _further_quantities(
+    xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
+) -> list[tuple[Variable, Any]]:
+    """Those of every machine, and the mean pull in each rod of two bars, ``mean_pull(left.web)``: below zero a chain
+    is slack."""
+    columns = ChamberForces.usual_quantities(xp, p, u, x, outputs)
+    pulls = organ_pulls(xp, p, u, *(outputs[f"rocker.{name}"] for name in ("psi", "w", "a")))
+    for side in SIDES:
+        for rod in RODS:
+            words = f"mean pull of the {rod} of the {side} organ"
+            variable = Variable(f"mean_pull({side}.{rod})", words, Quantity("N", words))
+            columns.append((variable, 0.5 * sum(pulls[side][rod].values())))
+    return columns
+
+
+ChamberForces = InverseMachine(
+    name="ChamberForces",
+    text="The inverse model: motion of the motor shaft in, torque and every reaction out.",
+    noun="chain unit",
+    sides=SIDES,
+    fmu_data=FmuData(
         notes="\n\nThe start values describe the packaged study, with three exceptions: the shaft stands, "
         "ratio is 1 (there 50), and the processing forces are 0 (there 10 N a side), which makes the rocker torque "
         "some percent less.",
         sizes={"stop.stiffness": 100.0, "stop.damping": 5.0},  # a stop that blocks nothing
-    )
-    description = (
+    ),
+    description=(
         "Forces in a chain unit: crank, coupler, rocker and two working organs; "
         "from motor angle and speed to torque, load port and every support reaction"
-    )
-    direct_name = "ChainUnit"
-    direct_description = (
+    ),
+    direct_name="ChainUnit",
+    direct_description=(
         "A chain unit that turns by itself: crank, coupler, rocker and two working organs; "
         "from motor torque to angle, speed, acceleration and every support reaction"
-    )
-    Parameters = Parameters
-    Inputs = Inputs
-    Outputs = Outputs
-    Feed = Feed
-    joints = JOINTS
-    pins = PINS
-    angles: ClassVar[Mapping[str, str]] = {"ψ": "rocker"}
-    within: ClassVar[Mapping[str, str]] = {"e": "h", "coupler.s": "l", "rocker.s": "h"}
-    probes = staticmethod(_probes)
-
-    required = (
+    ),
+    Parameters=Parameters,
+    Inputs=Inputs,
+    Outputs=Outputs,
+    Feed=Feed,
+    joints=JOINTS,
+    pins=PINS,
+    angles={"ψ": "rocker"},
+    within={"e": "h", "coupler.s": "l", "rocker.s": "h"},
+    linkage=_linkage,
+    probes=_probes,
+    further_quantities=_further_quantities,
+    required=(
         Requirement("c", "m", "the crank circle must stay left of the pivot C", depends=("r",)),
         dataclasses.replace(TURNS, context=("l", "h", "c", "hy")),
         Requirement(
@@ -532,37 +565,9 @@ class ChamberForces(InverseMachine):
             "lengthen l1 + l2, or lessen the swing by a shorter r or a longer h",
             ("r", "l", "h", "c", "hy"),
         ),
-    )
+    ),
+    requirements=_limits,
+)
 
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Limits with which the crank turns, and both organs close over the whole swing of the rocker."""
-        yield p.c, p.r, math.inf
-        yield p.r, 0.0, longest_crank(xp, p.l, p.h, xp.sqrt(p.c * p.c + p.hy * p.hy))
-        right, left = rocker_extremes(xp, p)
-        swing = xp.maximum(xp.abs(right), xp.abs(left))
-        yield swing, -math.inf, 0.5 * math.pi
-        low, high = half_width_range(xp, p.e, p.l1, p.l2, swing, p.z)
-        yield p.z, low, high
-
-    @staticmethod
-    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """Crank, dyad, and an organ on each side."""
-        return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))
-
-    @classmethod
-    def further_quantities(
-        cls, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
-    ) -> list[tuple[Variable, Any]]:
-        """Those of every machine, and the mean pull in each rod of two bars, ``mean_pull(left.web)``: below zero a
-        chain is slack."""
-        columns = super().further_quantities(xp, p, u, x, outputs)
-        if cls.States is not None:
-            return columns
-        pulls = organ_pulls(xp, p, u, *(outputs[f"rocker.{each}"] for each in ("psi", "w", "a")))
-        for side in SIDES:
-            for rod in RODS:
-                words = f"mean pull of the {rod} of the {side} organ"
-                variable = Variable(f"mean_pull({side}.{rod})", words, Quantity("N", words))
-                columns.append((variable, 0.5 * sum(pulls[side][rod].values())))
-        return columns
+ChainUnit = ChamberForces.direct()
+"""The machine that turns by itself: motor torque in, motion out."""

@@ -126,7 +126,7 @@ class Equilibria:
 class Resting(Protocol):
     """A machine as its equilibria need it, see `chainunit.machines.machine.Machine`."""
 
-    model: type[InverseMachine]
+    model: InverseMachine
 
     @property
     def ratio(self) -> float:

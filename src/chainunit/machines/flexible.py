@@ -18,10 +18,11 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Any
 
 from ..core.errors import InputError
-from ..core.model import FmuData, Making, Requirement, StartProblem
+from ..core.model import FmuData, Requirement, StartProblem
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
@@ -60,111 +61,132 @@ _MASSES = tuple(
 )
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ChainedModel(LinkageModel):
     """A model of the chain unit with chains. Its internal integrator controls the error to `tolerance`."""
 
-    organs: ClassVar[Organs]
-    never_repeats: ClassVar[str] = "chains do not repeat a turn"
-    controlled = True
+    organs: Organs
+    never_repeats: str = "chains do not repeat a turn"
 
-    def __init_subclass__(cls) -> None:
-        if hasattr(cls, "organs"):
-            unknowns = cls.organs.unknowns
-            cls.start_problem = StartProblem(unknowns, 100 if unknowns else 0, _HANGS)
-        super().__init_subclass__()
+    def __post_init__(self) -> None:
+        unknowns = self.organs.unknowns
+        self.follow(
+            controlled=True,
+            start_problem=StartProblem(unknowns, 100 if unknowns else 0, _HANGS),
+            linkage=_drive_alone,
+            internal_step=_internal_step,
+            tolerance=_tolerance,
+            start_limits=self._start_limits,
+            start_guess=self._start_guess,
+            improve_start=self._improved_start,
+            start_states=self._start_states,
+            constrained_states=self._closed,
+            shared=self._with_chains,
+            derivatives=self._rates,
+        )
+        super().__post_init__()
 
-    @staticmethod
-    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """The drive without the chains: their places follow from their states."""
-        return drive(p, u, (), {})
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """Longest internal step: 20 ms, a quarter of a radian of the crank at 12 rad/s."""
-        return 0.02
-
-    @staticmethod
-    def tolerance(xp: Any, p: Any) -> Any:
-        """The parameter `tolerance`."""
-        return p.tolerance
-
-    @classmethod
-    def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
+    def at_crank(self, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank; without states `x`, those at the start."""
         raise NotImplementedError
 
-    @classmethod
-    def start_limits(cls, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Value, lower and upper limit of the requirements at the start: closed chains, and rods off their stops."""
-        return cls.organs.start_limits(xp, p, u, x, cls.at_crank(p, u, x)[0])
+    def _start_limits(self, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """The limits at the start: closed chains, and rods off their stops."""
+        return self.organs.start_limits(xp, p, u, x, self.at_crank(p, u, x)[0])
 
-    @classmethod
-    def start_guess(cls, xp: Any, p: Any, u: Any) -> list[Any]:
-        """First guess of the unknowns of the start."""
-        return cls.organs.guess(xp, p, u, cls.at_crank(p, u)[0])
+    def _start_guess(self, xp: Any, p: Any, u: Any) -> list[Any]:
+        return self.organs.guess(xp, p, u, self.at_crank(p, u)[0])
 
-    @classmethod
-    def improve_start(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
-        """The unknowns of the start after one more round."""
-        return cls.organs.improved(xp, p, u, cls.at_crank(p, u)[0], z)
+    def _improved_start(self, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
+        return self.organs.improved(xp, p, u, self.at_crank(p, u)[0], z)
 
-    @classmethod
-    def start_states(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
+    def _start_states(self, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
         """States of both organs at the start."""
-        assert cls.States is not None
-        return cls.States(**cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z))
+        return self.States(**self.organs.start_states(xp, p, u, *self.at_crank(p, u), z))
 
-    @classmethod
-    def constrained_states(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def _closed(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states with which both chains end at A2 and move with it."""
-        return cls.organs.constrained_states(xp, p, u, x, *cls.at_crank(p, u, x))
+        return self.organs.constrained_states(xp, p, u, x, *self.at_crank(p, u, x))
 
-    @classmethod
-    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> ChainedState:
+    def _with_chains(self, xp: Any, p: Any, u: Any, x: Any) -> ChainedState:
         """The machine at its crank angle and speed."""
-        q, w = cls.at_crank(p, u, x)
-        return ChainedState(xp, cls.organs.mechanism(xp, p, u, cls.organs.split(x), q), w, x=x)
+        q, w = self.at_crank(p, u, x)
+        return ChainedState(xp, self.organs.mechanism(xp, p, u, self.organs.split(x), q), w, x=x)
+
+    def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        raise NotImplementedError
 
 
+def _drive_alone(xp: Any, p: Any, u: Any) -> Linkage:
+    """The drive without the chains: their places follow from their states."""
+    return drive(p, u, (), {})
+
+
+def _internal_step(xp: Any, p: Any) -> Any:
+    """Longest internal step: 20 ms, a quarter of a radian of the crank at 12 rad/s."""
+    return 0.02
+
+
+def _tolerance(xp: Any, p: Any) -> Any:
+    """The parameter `tolerance`."""
+    return p.tolerance
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class DrivenChains(ChainedModel, InverseMachine):
+    """The inverse model of the chain unit with chains."""
+
+    def at_crank(self, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
+        """See `ChainedModel`; they follow from the inputs."""
+        return u.phi / p.ratio, u.w / p.ratio
+
+    @functools.cache  # noqa: B019 - models live as long as the program
+    def direct(self) -> DirectMachine:
+        """The direct model of the same machine: torque in, motion out."""
+        declared = self.organs.RodsStart
+        rods = group(declared, "start of the rods", default=declared())
+        return self._direct_of(TurningChains, [("rods_start", declared, rods)], organs=self.organs)
+
+    def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        q, w = self.at_crank(p, u, x)
+        m = self.organs.mechanism(xp, p, u, self.organs.split(x), q)
+        return [v for h in self.organs.hold(xp, m, w) for v in h.rates(u.a / p.ratio, CLOSING)]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class TurningChains(ChainedModel, DirectMachine):
     """The direct model of the chain unit with chains."""
 
-    @classmethod
-    def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
+    def at_crank(self, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
         """See `ChainedModel`; they are states of this model."""
-        shaft = cls.initial_states(None, p) if x is None else x
+        shaft = self.initial_states(None, p) if x is None else x
         return shaft.phi / p.ratio, shaft.w / p.ratio
 
-    @classmethod
-    def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:
+    def start_from(self, outputs: Mapping[str, float]) -> dict[str, float]:
         """See `DirectMachine`; the start parameters include the angles and speeds of the rods."""
         rods = {
             f"rods_start.{side}.{name}": outputs[f"{side}.{name}"]
             for side in SIDES
-            for name in cls.organs.rod_names
+            for name in self.organs.rod_names
         }
         return {**super().start_from(outputs), "rods_start.given": 1.0, **rods}
 
-    @classmethod
-    def start_states(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
+    def _start_states(self, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
         """States at the start: angle and speed of the motor, and both organs."""
-        chains = cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z, p.rods_start)
-        return cls.States(**vars(cls.initial_states(xp, p)), **chains)
+        chains = self.organs.start_states(xp, p, u, *self.at_crank(p, u), z, p.rods_start)
+        return self.States(**vars(self.initial_states(xp, p)), **chains)
 
-    @classmethod
-    def constrained_states(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """The states with which both chains end at A2 and move with it."""
-        return [x.phi, x.w, *super().constrained_states(xp, p, u, x)]
+    def _closed(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        return [x.phi, x.w, *super()._closed(xp, p, u, x)]
 
-    @classmethod
-    def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order."""
-        s = cls.shared(xp, p, u, x)
+    def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        s = self.shared(xp, p, u, x)
         a = acceleration(p, u, s)
         return [x.w, a, *(v for h in s.chains.values() for v in h.rates(a / p.ratio, CLOSING))]
 
 
-def flexible(walls: int, webs: int) -> type[InverseMachine]:
+def flexible(walls: int, webs: int) -> InverseMachine:
     """The machine with `walls` + `webs` rods an organ; its direct model is `flexible(walls, webs).direct()`.
 
     Raises
@@ -180,7 +202,7 @@ def flexible(walls: int, webs: int) -> type[InverseMachine]:
     return _flexible(walls, webs)
 
 
-def with_rods(number: int, start: Mapping[str, float]) -> type[InverseMachine]:
+def with_rods(number: int, start: Mapping[str, float]) -> InverseMachine:
     """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
     are nearest to equal length, by the lengths among the `start` values.
 
@@ -198,68 +220,47 @@ def with_rods(number: int, start: Mapping[str, float]) -> type[InverseMachine]:
 
 
 @functools.cache
-def _flexible(walls: int, webs: int) -> type[InverseMachine]:
-    chains = Organs(walls, webs)
-
-    class ChainUnitFlexible(ChainedModel, InverseMachine):
-        """The chain unit with its organs as chains of rods; `flexible` sets their numbers.
+def _flexible(walls: int, webs: int) -> InverseMachine:
+    organs = Organs(walls, webs)
+    return DrivenChains(
+        name="ChainUnitFlexible",
+        text="""The chain unit with its organs as chains of rods; `flexible` sets their numbers.
 
         Inputs, outputs and load port are those of ChamberForces and connect in the same way. The internal integrator
         controls the error to `tolerance`. In Model Exchange phi, w and a must be set before each evaluation of the
         derivatives. Rods are counted from A1; a rod is slack where its mean axial pull is below zero.
-        """
-
-        name = "ChainUnitFlexible"
-        made = Making(flexible, (walls, webs))
-        fmu_data = FmuData(sizes=ChamberForces.fmu_data.sizes)
-        description = (
-            f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "
+        """,
+        made=(flexible, (walls, webs)),
+        fmu_data=FmuData(sizes=ChamberForces.fmu_data.sizes),
+        description=(
+            f"Forces in a chain unit whose organs are chains of {organs.number} rods, {walls} in the wall and {webs} "
             "in the web: from motor angle and speed to torque, load port and every support reaction"
-        )
-        direct_description = (
-            f"A chain unit that turns by itself, with organs of {chains.number} rods: from motor torque to angle, "
+        ),
+        direct_description=(
+            f"A chain unit that turns by itself, with organs of {organs.number} rods: from motor torque to angle, "
             "speed, acceleration and every support reaction"
-        )
-        organs = chains
-        Parameters = Parameters
-        Inputs = Inputs
-        Feed = ChamberForces.Feed
-        States = declared_class("States", (), both(chains.States))
-        Outputs = declared_class("ChainOutputs", (Outputs,), both(chains.Side))
-        joints, pins = ChamberForces.joints, ChamberForces.pins
-        probes = chains.probes
-        by_differences = frozenset(("dJ_dphi", *Layout(PortSlopes).names))
-        required = (*ChamberForces.required, *_MASSES)
+        ),
+        organs=organs,
+        Parameters=Parameters,
+        Inputs=Inputs,
+        Feed=ChamberForces.Feed,
+        States=declared_class("States", (), both(organs.States)),
+        Outputs=declared_class("ChainOutputs", (Outputs,), both(organs.Side)),
+        joints=ChamberForces.joints,
+        pins=ChamberForces.pins,
+        probes=organs.probes,
+        by_differences=frozenset(("dJ_dphi", *Layout(PortSlopes).names)),
+        required=(*ChamberForces.required, *_MASSES),
+        requirements=_limits,
+    )
 
-        @staticmethod
-        def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-            """The limits of the machine with two bars, and masses above zero."""
-            yield from ChamberForces.requirements(xp, p)
-            for masses in (p.left, p.right):
-                yield masses.wall_mass, 0.0, math.inf
-                yield masses.web_mass, 0.0, math.inf
 
-        @classmethod
-        def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
-            """See `ChainedModel`; they follow from the inputs."""
-            return u.phi / p.ratio, u.w / p.ratio
-
-        @classmethod
-        @functools.cache
-        def direct(cls) -> type[DirectMachine]:
-            """The direct model of the same machine: torque in, motion out."""
-            words = "start of the rods"
-            rods = group(chains.RodsStart, words, default=chains.RodsStart())
-            return cls._direct_of(TurningChains, [("rods_start", chains.RodsStart, rods)], organs=chains)
-
-        @classmethod
-        def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-            """Time derivatives of the states, in declared order."""
-            q, w = cls.at_crank(p, u, x)
-            m = chains.mechanism(xp, p, u, chains.split(x), q)
-            return [v for h in chains.hold(xp, m, w) for v in h.rates(u.a / p.ratio, CLOSING)]
-
-    return ChainUnitFlexible
+def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """The limits of the machine with two bars, and masses above zero."""
+    yield from ChamberForces.requirements(xp, p)
+    for masses in (p.left, p.right):
+        yield masses.wall_mass, 0.0, math.inf
+        yield masses.web_mass, 0.0, math.inf
 
 
 ChainUnitFlexible = flexible(6, 2)

@@ -224,67 +224,70 @@ def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
     }
 
 
-class KnifeDrive(InverseMachine):
-    """The knife drive of a paper cutter: motion of the motor shaft in, torque and every reaction out."""
+def _linkage(xp: Any, p: Any, u: Any) -> Linkage:
+    """Crank, dyad and triad, with the weight, the cut, the further force on the blade and the pin losses."""
+    knife = p.knife
+    return Linkage(
+        ground={"O1": _vector(p.o1), "O2": _vector(p.o2), "O3": _vector(p.o3), "O4": _vector(p.o4)},
+        driver=Crank(Bar("crank", "O1", p.r, p.crank), "A"),
+        groups=(
+            Dyad("B", Bar("coupler", "A", p.ab, p.coupler), Bar("rocker", "O2", p.bo2, p.rocker), 1.0),
+            Triad(
+                "knife",
+                Mass(knife.m, knife.centroid.x, knife.I, knife.centroid.y),
+                (
+                    RodLeg(Bar("leg_b", "B", p.bc, p.leg_b), "C", _vector(knife.c)),
+                    RodLeg(Bar("leg_3", "O3", p.o3d, p.leg_3), "D", _vector(knife.d)),
+                    RodLeg(Bar("leg_4", "O4", p.o4e, p.leg_4), "E", _vector(knife.e)),
+                ),
+                {"blade": (knife.blade.x, knife.blade.y)},
+                Pose(p.assembly.x, p.assembly.y, p.assembly.theta),
+            ),
+        ),
+        loads={
+            "weight": Weight(p.g),
+            "cut": Cut("blade", u.cut_force, p.stack),
+            "push": Push("blade", Vec2(u.blade.fx, u.blade.fy)),
+            "pins": PinLosses(p.pin, p.joint_damping),
+        },
+    )
 
-    name, noun, cuts = "KnifeDrive", "knife drive", True
-    description = (
+
+def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """Limits with which the crank turns, and the triad closes over the whole turn, clear of its dead
+    positions."""
+    between = _vector(p.o1) - _vector(p.o2)
+    yield p.r, 0.0, longest_crank(xp, p.ab, p.bo2, xp.sqrt(between.squared()))
+    yield from triad.limits(p.derived)
+
+
+KnifeDrive = InverseMachine(
+    name="KnifeDrive",
+    text="The knife drive of a paper cutter: motion of the motor shaft in, torque and every reaction out.",
+    noun="knife drive",
+    cuts=True,
+    description=(
         "Knife drive of a paper cutter: crank, dyad and triad; from motor angle and speed to torque, load port, "
         "blade and every reaction"
-    )
-    Parameters = Parameters
-    Inputs = Inputs
-    Outputs = Outputs
-    Feed = CutForce
-    joints = JOINTS
-    pins = PINS
-    probes = staticmethod(_probes)
-
-    required = (
+    ),
+    Parameters=Parameters,
+    Inputs=Inputs,
+    Outputs=Outputs,
+    Feed=CutForce,
+    joints=JOINTS,
+    pins=PINS,
+    linkage=_linkage,
+    probes=_probes,
+    required=(
         dataclasses.replace(
             TURNS,
             context=("ab", "bo2", "o1.x", "o1.y", "o2.x", "o2.y"),
             remedy="|O1 O2| must be > |ab - bo2| and < ab + bo2 for any crank",
         ),
         *triad.requirements(("bc", "o3d", "o4e"), ("assembly.x", "assembly.y", "assembly.theta")),
-    )
-
-    @staticmethod
-    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """Crank, dyad and triad, with the weight, the cut, the further force on the blade and the pin losses."""
-        knife = p.knife
-        return Linkage(
-            ground={"O1": _vector(p.o1), "O2": _vector(p.o2), "O3": _vector(p.o3), "O4": _vector(p.o4)},
-            driver=Crank(Bar("crank", "O1", p.r, p.crank), "A"),
-            groups=(
-                Dyad("B", Bar("coupler", "A", p.ab, p.coupler), Bar("rocker", "O2", p.bo2, p.rocker), 1.0),
-                Triad(
-                    "knife",
-                    Mass(knife.m, knife.centroid.x, knife.I, knife.centroid.y),
-                    (
-                        RodLeg(Bar("leg_b", "B", p.bc, p.leg_b), "C", _vector(knife.c)),
-                        RodLeg(Bar("leg_3", "O3", p.o3d, p.leg_3), "D", _vector(knife.d)),
-                        RodLeg(Bar("leg_4", "O4", p.o4e, p.leg_4), "E", _vector(knife.e)),
-                    ),
-                    {"blade": (knife.blade.x, knife.blade.y)},
-                    Pose(p.assembly.x, p.assembly.y, p.assembly.theta),
-                ),
-            ),
-            loads={
-                "weight": Weight(p.g),
-                "cut": Cut("blade", u.cut_force, p.stack),
-                "push": Push("blade", Vec2(u.blade.fx, u.blade.fy)),
-                "pins": PinLosses(p.pin, p.joint_damping),
-            },
-        )
-
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Limits with which the crank turns, and the triad closes over the whole turn, clear of its dead
-        positions."""
-        between = _vector(p.o1) - _vector(p.o2)
-        yield p.r, 0.0, longest_crank(xp, p.ab, p.bo2, xp.sqrt(between.squared()))
-        yield from triad.limits(p.derived)
+    ),
+    requirements=_limits,
+)
 
 
 def modes(p: Any, q: float = 0.0) -> list[Pose]:

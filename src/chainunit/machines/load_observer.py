@@ -23,8 +23,7 @@ thresholds are wide and there is no alarm.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 from ..core.engines import Dual, dual, slope
 from ..core.model import FmuData, Model, Part
@@ -117,7 +116,7 @@ def balance(xp: Any, p: Any, u: Any, x: Any) -> Balance:
         )
         return ChamberForces.linkage(engine, p, machine_inputs(u, x.speed, *sides))
 
-    m = Mechanism(xp, linkage(xp, loads), u.phi / ratio, (), ChamberForces.topology())
+    m = Mechanism(xp, linkage(xp, loads), u.phi / ratio, (), ChamberForces.topology)
     s = MachineState(xp, m, w)
     inertia = p.rotor.J + s.J / (ratio * ratio)
     driving = rotor_torque(p, u) - x.torque_offset - p.rotor.d * x.speed
@@ -308,69 +307,63 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, b: Balance) -> Outputs:
     )
 
 
-class LoadObserver(Model):
-    """An observer of the feed and the processing forces of a chain unit beside its motor.
+def _rates(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    """Time derivatives of the states, in declared order."""
+    b = balance(xp, p, u, x)
+    return _filter_rates(xp, p, u, x, b, _jump(xp, p, x, b))
+
+
+def _start_states(xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
+    """The usual loads, and the measured speed."""
+    side = LoadEstimate(material_mass=p.feed.expected, processing_force=p.force.expected)
+    # the speed as if it had been averaged over 10 ms
+    variances = [xp.minimum(100.0 / p.noise.rate, 1.0), 1.0, 1.0, FIRST_FORCE, FIRST_FORCE, 1.0]
+    start = {name: variances[i] if i == j else 0.0 for name, (i, j) in zip(ENTRIES, TRIANGLE, strict=True)}
+    return States(
+        speed=u.w,
+        left=side,
+        right=side,
+        torque_offset=0.0,
+        surprise=0.0,
+        covariance=Covariance(**start),
+        quiet=Covariance(**start),
+    )
+
+
+def _internal_step(xp: Any, p: Any) -> Any:
+    """Longest internal step: 2 ms, or the time in which the filter finds loads that have jumped by their spread,
+    if this is shorter."""
+    lever = p.r * p.e / (p.h * p.ratio)
+    unknown = lever * (2.0 * p.force.spread + 2.0 * p.g * p.feed.spread) + p.offset.spread
+    jerk = unknown / (p.rotor.J * p.noise.w)
+    # of the cubic pole of a speed that an unknown acceleration drives
+    pole = xp.exp(xp.log(jerk * jerk * p.noise.rate) * (1.0 / 3.0))
+    return xp.minimum(2e-3, 1.5 / pole)
+
+
+LoadObserver = Model(
+    name="LoadObserver",
+    home=__name__,
+    text="""An observer of the feed and the processing forces of a chain unit beside its motor.
 
     Connect phi and w, and one of the signals. In a co-simulation the inputs are held over a step: estimates are late
     by half a step.
-    """
-
-    name = "LoadObserver"
+    """,
     # the torque that holds the machine nearly at rest: in the reference results no load jumps
-    fmu_data = FmuData(sizes={"w": 0.05, "current": 0.1})
-    description = (
+    fmu_data=FmuData(sizes={"w": 0.05, "current": 0.1}),
+    description=(
         "Observer of a chain unit: from motion and a measured signal of the motor to feed and processing force of "
         "each side with standard deviations, and an alarm where one side is overloaded"
-    )
-    Parameters = Parameters
-    Inputs = Inputs
-    States = States
-    parts: ClassVar[tuple[Part, ...]] = (Part(Outputs, _outputs),)
-    required = ChamberForces.required
-    terminals = (measured_terminal(torque="torque", current="current", power="power"),)
-
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The limits of the machine."""
-        yield from ChamberForces.requirements(xp, p)
-
-    @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> Balance:
-        """The balance of the shaft."""
-        return balance(xp, p, u, x)
-
-    @staticmethod
-    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order."""
-        b = balance(xp, p, u, x)
-        return _filter_rates(xp, p, u, x, b, _jump(xp, p, x, b))
-
-    @classmethod
-    def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
-        """The usual loads, and the measured speed."""
-        side = LoadEstimate(material_mass=p.feed.expected, processing_force=p.force.expected)
-        # the speed as if it had been averaged over 10 ms
-        variances = [xp.minimum(100.0 / p.noise.rate, 1.0), 1.0, 1.0, FIRST_FORCE, FIRST_FORCE, 1.0]
-        start = {
-            name: variances[i] if i == j else 0.0 for name, (i, j) in zip(ENTRIES, TRIANGLE, strict=True)
-        }
-        return States(
-            speed=u.w,
-            left=side,
-            right=side,
-            torque_offset=0.0,
-            surprise=0.0,
-            covariance=Covariance(**start),
-            quiet=Covariance(**start),
-        )
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """Longest internal step: 2 ms, or the time in which the filter finds loads that have jumped by their spread,
-        if this is shorter."""
-        lever = p.r * p.e / (p.h * p.ratio)
-        unknown = lever * (2.0 * p.force.spread + 2.0 * p.g * p.feed.spread) + p.offset.spread
-        jerk = unknown / (p.rotor.J * p.noise.w)
-        # of the cubic pole of a speed that an unknown acceleration drives
-        pole = xp.exp(xp.log(jerk * jerk * p.noise.rate) * (1.0 / 3.0))
-        return xp.minimum(2e-3, 1.5 / pole)
+    ),
+    Parameters=Parameters,
+    Inputs=Inputs,
+    States=States,
+    parts=(Part(Outputs, _outputs),),
+    required=ChamberForces.required,
+    requirements=ChamberForces.requirements,
+    terminals=(measured_terminal(torque="torque", current="current", power="power"),),
+    shared=balance,
+    derivatives=_rates,
+    start_states=_start_states,
+    internal_step=_internal_step,
+)

@@ -56,7 +56,7 @@ class Machine:
     in_place: ClassVar[str] = ""
     """Words on what the results without a run are of, where the runs have another model; else empty."""
 
-    def __init__(self, model: type[InverseMachine], parameters: Any = None, /, **values: Any) -> None:
+    def __init__(self, model: InverseMachine, parameters: Any = None, /, **values: Any) -> None:
         self.model = model
         if isinstance(parameters, model.Parameters):
             parameters = model.parameter_layout.by_name(parameters)

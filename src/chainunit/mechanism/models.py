@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any
 
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.engines import MATH
-from ..core.model import Making, Model, Part, Sketch, keep
+from ..core.model import UNSTATED, Model, Part, Sketch
 from ..core.ports import PortSlopes, ShaftMotion
 from ..core.quantities import (
     Fields,
@@ -36,9 +37,6 @@ from .end_stops import EndStops, StopAction, stop_action
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
-MACHINES: dict[str, type[InverseMachine]] = {}
-"""The machines by name: every subclass of `InverseMachine` with a name is a machine that study files may name."""
-
 
 def names_of(declared: type) -> tuple[str, ...]:
     """The names of the fields of a declaration."""
@@ -54,68 +52,74 @@ class CrankMotion(ShaftMotion):
     )
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class LinkageModel(Model):
     """A model with the mechanics of a linkage."""
 
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        if hasattr(cls, "Parameters"):
-            cls.derived_count = cls.linkage(MATH, cls.Parameters(), cls.Inputs()).derived_count
+    linkage: Callable[[Any, Any, Any], Linkage] = UNSTATED
+    """The linkage (xp, p, u) with these parameters and inputs, whose values the engine xp computes; places and
+    lengths do not depend on the inputs."""
 
-    @staticmethod
-    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """The linkage with these parameters and inputs, whose values the engine `xp` computes; places and
-        lengths do not depend on the inputs."""
-        raise NotImplementedError
+    def __post_init__(self) -> None:
+        at_start = self.linkage(MATH, self.Parameters(), self.Inputs())
+        self.follow(derived_count=at_start.derived_count, derive=self._derived)
+        super().__post_init__()
 
-    @classmethod
-    def derive(cls, xp: Any, p: Any) -> list[Any]:
+    def _derived(self, xp: Any, p: Any) -> list[Any]:
         """Values that the groups derive from the lengths."""
-        return derived_numbers(xp, cls.linkage(xp, p, cls.Inputs()))
+        return derived_numbers(xp, self.linkage(xp, p, self.Inputs()))
 
-    @classmethod
-    def state(cls, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
+    def state(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
         """The machine at crank angle `q` [rad] and speed `w` [rad/s]."""
-        derived = p.derived if cls.derived_count else ()
-        return MachineState(xp, Mechanism(xp, cls.linkage(xp, p, u), q, derived, cls.topology()), w)
+        derived = p.derived if self.derived_count else ()
+        return MachineState(xp, Mechanism(xp, self.linkage(xp, p, u), q, derived, self.topology), w)
 
-    @classmethod
-    @cache
-    def topology(cls) -> Topology:
+    @cached_property
+    def topology(self) -> Topology:
         """The names of the linkage."""
-        return cls.linkage(MATH, cls.Parameters(), cls.Inputs()).topology
+        return self.linkage(MATH, self.Parameters(), self.Inputs()).topology
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class MachineModel(Model):
     """The model of a machine as a study uses it: of a linkage, or of a foreign FMU.
 
     The work of a study on a machine depends only on the declarations here, never on the name of the machine.
     """
 
-    Feed: ClassVar[type]
+    Feed: Any = UNSTATED
     """Its loads in normal running: the inputs besides the motion of its shaft."""
-    feed_layout: ClassVar[Layout]
-    pins: ClassVar[Mapping[str, str]] = {}
+    pins: Mapping[str, str] = UNSTATED
     """Output of each bearing by its title."""
-    noun: ClassVar[str] = "machine"
+    noun: str = "machine"
     """The machine's name in texts for people."""
-    driver_noun: ClassVar[str] = USUAL_DRIVER
+    driver_noun: str = USUAL_DRIVER
     """The name, in texts for people, of the link that the motor turns."""
-    angle_counts: ClassVar[str] = "from the upward vertical, clockwise"
+    angle_counts: str = "from the upward vertical, clockwise"
     """How the angle of that link counts, in texts for people."""
-    usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
+    usual_speed: tuple[float, float] = (0.05, 25.0)
     """Usual range of the crank speed [rad/s]; beyond it, a wrong unit is likely."""
-    within: ClassVar[Mapping[str, str]] = {}
+    within: Mapping[str, str] = field(default_factory=dict)
     """By the name of a length, the name of the length that it usually does not exceed."""
-    sides: ClassVar[tuple[str, ...]] = ()
+    sides: tuple[str, ...] = ()
     """The names of its sides, each with a working organ that may be a chain. The groups of its loads and outputs on a
     side have the same name."""
-    cuts: ClassVar[bool] = False
+    cuts: bool = False
     """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
-    never_repeats: ClassVar[str] = ""
-    """The reason, in words, why no turn of its runs is like the one before; empty where steady turns are alike."""
+    never_repeats: str = ""
+    """The reason, in words, why no turn of its runs is like the one before; empty if steady turns are alike."""
+
+    def __post_init__(self) -> None:
+        self.follow(pins=MappingProxyType({}))
+        super().__post_init__()
+
+    @cached_property
+    def feed_layout(self) -> Layout:
+        """The layout of the feed."""
+        return Layout(self.Feed)
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class InverseMachine(LinkageModel, MachineModel):
     """Motion of the motor shaft in, torque, load port and every reaction out.
 
@@ -124,96 +128,87 @@ class InverseMachine(LinkageModel, MachineModel):
     has all inputs besides `ShaftMotion`, and its `pins` have the names of pin and link.
     """
 
-    Outputs: ClassVar[type]
-    joints: ClassVar[Mapping[str, Joint]] = {}
+    Outputs: Any
+    probes: Callable[[Any, Any, Any, MachineState, Any], dict[str, Any]]
+    """The machine's own outputs (xp, p, u, s, a) at the state s and the crank acceleration a. A key of `running` in
+    this result replaces the value of `running`."""
+    joints: Mapping[str, Joint] = field(default_factory=dict)
     """The joint of each reaction by the name of the output."""
-    angles: ClassVar[Mapping[str, str]] = {}
+    angles: Mapping[str, str] = field(default_factory=dict)
     """Links by the symbols of their angles; an angle counts from the downward vertical, positive towards +x."""
-    direct_name: ClassVar[str]
+    direct_name: str = UNSTATED
     """Name of the direct model; by default ``<name>Direct``."""
-    direct_description: ClassVar[str] = ""
-    by_differences: ClassVar[frozenset[str]] = frozenset()
+    direct_description: str = ""
+    by_differences: frozenset[str] = frozenset()
     """Outputs whose derivatives are taken by differences, see `chainunit.core.model.Part`."""
-    input_rates = MappingProxyType({"phi": "w", "w": "a"})
-
-    span: ClassVar[tuple[float, float]] = (0.0, 2.0 * math.pi)
+    span: tuple[float, float] = (0.0, 2.0 * math.pi)
     """Places of the driver from which to which it goes: a whole turn [rad], or its range [rad, m]."""
-    driver_port: ClassVar[DriverPort] = ROTATING
+    driver_port: DriverPort = ROTATING
     """The declarations of its driver, which turns or slides."""
-    turns: ClassVar[bool] = True
+    turns: bool = True
     """Whether its driver turns all the way round; else it goes to and fro within `span`."""
-    slides: ClassVar[bool] = False
+    slides: bool = False
     """Whether its driver slides; else it turns."""
-    end_stops: ClassVar[EndStops | None] = None
+    end_stops: EndStops | None = None
     """The usual end stops of a driver with a range, at both ends of `span`."""
 
-    def __init_subclass__(cls) -> None:
-        own = vars(cls)
-        if "Inputs" in own and "Feed" not in own:
-            cls.Feed = declared_class("Feed", (), fields_of(cls.Inputs, without=names_of(ShaftMotion)))
+    def __post_init__(self) -> None:
+        if self.Feed is UNSTATED:
+            feed = declared_class("Feed", (), fields_of(self.Inputs, without=names_of(ShaftMotion)))
             # pickle finds the class by this name
-            cls.Feed.__module__, cls.Feed.__qualname__ = cls.__module__, f"{cls.__qualname__}.Feed"
-        if "terminals" not in own:
-            cls.terminals = cls.driver_port.terminals
-        if hasattr(cls, "Feed"):
-            cls.feed_layout = Layout(cls.Feed)
-        if "joints" in own and "pins" not in own:
-            cls.pins = {f"{pin} {link}": output for output, (pin, link) in cls.joints.items()}
-        if "name" in own and "direct_name" not in own:
-            cls.direct_name = f"{cls.name}Direct"
-        # a function that makes classes may make several of one name
-        if "name" in own and not cls.made:
-            MACHINES[cls.name] = cls
-        if hasattr(cls, "Outputs") and "parts" not in own:
-            apart = cls.by_differences
-            cls.parts = (
-                Part(cls.Outputs, cls._outputs, by_differences=apart & set(Layout(cls.Outputs).names)),
-                Part(cls.driver_port.slopes, slopes, by_differences=apart & set(Layout(PortSlopes).names)),
-            )
-        super().__init_subclass__()
+            home = self.home or self.Parameters.__module__
+            feed.__module__, feed.__qualname__ = home, f"{self.name}.Feed"
+            self.follow(Feed=feed)
+        apart = self.by_differences
+        self.follow(
+            input_rates=MappingProxyType({"phi": "w", "w": "a"}),
+            terminals=self.driver_port.terminals,
+            pins={f"{pin} {link}": output for output, (pin, link) in self.joints.items()},
+            direct_name=f"{self.name}Direct",
+            parts=(
+                Part(self.Outputs, self._outputs, by_differences=apart & set(Layout(self.Outputs).names)),
+                Part(self.driver_port.slopes, slopes, by_differences=apart & set(Layout(PortSlopes).names)),
+            ),
+            shared=self._at_shaft,
+            sketch=self._sketched,
+            further_quantities=self.usual_quantities,
+        )
+        super().__post_init__()
 
-    @staticmethod
-    def probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-        """The machine's own outputs at the state `s` and the crank acceleration `a`. A key of `running` in this
-        result replaces the value of `running`."""
-        raise NotImplementedError
-
-    @classmethod
-    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
+    def _at_shaft(self, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
         """The machine at the crank angle and speed that follow from angle and speed of the motor."""
-        return cls.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
+        return self.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
-    @classmethod
-    def _outputs(cls, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+    def _outputs(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
         a = u.a / p.ratio
-        return cls.Outputs(
+        return self.Outputs(
             tau=s.torque(a) / p.ratio,
             tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
             dJ_dphi=s.inertia_slope / (p.ratio * p.ratio * p.ratio),
             phi0=u.phi,
             w0=u.w,
-            **running(s, a) | cls.probes(xp, p, u, s, a),
+            **running(s, a) | self.probes(xp, p, u, s, a),
         )
 
-    @classmethod
-    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch:
-        """See `chainunit.core.model.Model.sketch`; the driver is at a sixth of its `span`."""
-        from .sketch import sketch_of  # here, as FMUs do without it
+    def _sketched(self, start: Mapping[str, float] | None = None) -> Sketch:
+        """The machine as lines; the driver is at 1/(2 pi) of its `span`."""
+        from .sketch import sketch_of
 
-        low, high = cls.span
-        layout, given = cls.parameter_layout, start or {}
-        p = cls.check(layout.instance([given.get(v.name, v.quantity.start) for v in layout.variables]))
-        return sketch_of(cls.state(MATH, p, cls.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
+        low, high = self.span
+        layout, given = self.parameter_layout, start or {}
+        p = self.with_derived(
+            MATH, layout.instance([given.get(v.name, v.quantity.start) for v in layout.variables])
+        )
+        return sketch_of(self.state(MATH, p, self.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
-    @classmethod
-    def further_quantities(
-        cls, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
+    def usual_quantities(
+        self, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
     ) -> list[tuple[Variable, Any]]:
         """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; the places of all
         pins, ``x(A)`` and ``y(A)``; and the angle of the line of each sliding block, ``line(ram)``. A machine whose
         outputs depend on states has no places here."""
-        unit = cls.driver_port.unit("N.m")
+        unit = self.driver_port.unit("N.m")
         columns = [
             (Variable("crank_torque", "effort at the driver", Quantity(unit, "")), outputs["tau"] * p.ratio)
         ]
@@ -224,8 +219,8 @@ class InverseMachine(LinkageModel, MachineModel):
                 columns.append(
                     (Variable(f"force({pin})", f"size of the force {pin}", Quantity("N", "")), size)
                 )
-        if cls.States is None:
-            m = cls.shared(xp, p, u, x).m
+        if self.States is None:
+            m = self.shared(xp, p, u, x).m
             for pin, motion in m.pins.items():
                 for axis in "xy":
                     place = Variable(f"{axis}({pin})", f"place {axis} of the pin {pin}", Quantity("m", ""))
@@ -235,56 +230,46 @@ class InverseMachine(LinkageModel, MachineModel):
                 columns.append((line, xp.atan2(slide.d.y, slide.d.x)))
         return columns
 
-    @classmethod
-    @cache
-    def direct(cls) -> type[DirectMachine]:
+    @cache  # noqa: B019 - models live as long as the program
+    def direct(self) -> DirectMachine:
         """The direct model of the same machine: torque in, motion out.
 
         It has the parameters of the machine, the inertia on its shaft and the start. Its inputs are the torque and
         the loads. It has the outputs of the machine without `tau` and load port, and those of `DriverPort.answer`.
         """
-        stops = cls.end_stops
+        stops = self.end_stops
         if stops is None:
-            return cls._direct_of(DirectMachine)
+            return self._direct_of(DirectMachine)
         more = ("end_stops", type(stops), group(type(stops), "end stops of the driver", default=stops))
-        return cls._direct_of(DirectMachine, [more])
+        return self._direct_of(DirectMachine, [more])
 
-    @classmethod
-    def _direct_of(
-        cls, base: type[DirectMachine], parameters: Fields = (), **more: Any
-    ) -> type[DirectMachine]:
-        """The direct model as a subclass of `base`, with more `parameters` and attributes."""
-        outputs = fields_of(cls.Outputs, without=("tau", *names_of(cls.driver_port.values)))
+    def _direct_of(self, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> DirectMachine:
+        """The direct model of the kind `base`, with more `parameters` and attributes."""
+        outputs = fields_of(self.Outputs, without=("tau", *names_of(self.driver_port.values)))
         # where the start declares the same name, the machine's own declaration counts
-        own = [field for field in fields_of(cls.Parameters) if field[0] in names_of(cls.driver_port.start)]
-        port = cls.driver_port
-        states = _of_driver(port.states, cls.driver_noun)
-        members = {
-            "__module__": cls.__module__,
-            "__doc__": f"The direct model of {cls.__name__}: {port.words.effort} in, motion out.",
-            "name": cls.direct_name,
-            "description": cls.direct_description
-            or words_on_motion(f"{cls.name} that moves by itself", port),
-            "made": Making(direct_model, (cls,)),
-            "inverse": cls,
-            "fmu_data": cls.fmu_data,
-            "repeated": cls.repeated,
-            "constant": cls.constant,
-            "terminals": port.flanges,
-            "Parameters": declared_class(
-                "DirectParameters", (port.start, port.added, cls.Parameters), [*own, *parameters]
+        own = [field for field in fields_of(self.Parameters) if field[0] in names_of(self.driver_port.start)]
+        port = self.driver_port
+        states = _of_driver(port.states, self.driver_noun)
+        return base(
+            name=self.direct_name,
+            text=f"The direct model of {self.name}: {port.words.effort} in, motion out.",
+            description=self.direct_description or words_on_motion(f"{self.name} that moves by itself", port),
+            made=(direct_model, (self,)),
+            inverse=self,
+            fmu_data=self.fmu_data,
+            repeated=self.repeated,
+            constant=self.constant,
+            terminals=port.flanges,
+            Parameters=declared_class(
+                "DirectParameters", (port.start, port.added, self.Parameters), [*own, *parameters]
             ),
-            "States": declared_class("States", (states,), fields_of(cls.States)) if cls.States else states,
-            "Inputs": declared_class(
-                "DirectInputs", (port.effort,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
+            States=declared_class("States", (states,), fields_of(self.States)) if self.States else states,
+            Inputs=declared_class(
+                "DirectInputs", (port.effort,), fields_of(self.Inputs, without=names_of(ShaftMotion))
             ),
-            "Outputs": declared_class("DirectOutputs", (), [*outputs, *fields_of(port.answer)]),
+            Outputs=declared_class("DirectOutputs", (), [*outputs, *fields_of(port.answer)]),
             **more,
-        }
-        model = type(f"Direct{cls.__name__}", (base,), members)
-        if cls.made:
-            keep(model, "Parameters", "Inputs", *(["States"] if states is not port.states else []))
-        return model
+        )
 
 
 def words_on_motion(subject: str, port: DriverPort) -> str:
@@ -299,10 +284,10 @@ def _of_driver(declared: type, noun: str) -> type:
     if noun == USUAL_DRIVER or not any("{driver}" in v.template for v in Layout(declared).variables):
         return declared
     fields: list[tuple[str, Any, Any]] = []
-    for name, of, field in fields_of(declared):
-        q = field.metadata["quantity"]
+    for name, of, slot in fields_of(declared):
+        q = slot.metadata["quantity"]
         own = dataclasses.replace(q, template=of_driver(q.template, noun))
-        fields.append((name, of, dataclasses.field(default=field.default, metadata={"quantity": own})))
+        fields.append((name, of, dataclasses.field(default=slot.default, metadata={"quantity": own})))
     made: type = declared_class(declared.__name__, (), fields)
     made.__doc__, made.__module__ = declared.__doc__, __name__
     return made
@@ -326,99 +311,86 @@ def slopes(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> PortSlopes:
     return PortSlopes(tau_bias_dphi=by_angle * per_turn, tau_bias_dw=by_speed * per_turn)
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class DirectMachine(LinkageModel):
     """Torque of the motor in, motion and every reaction out, see `InverseMachine.direct`. `inverse` is the inverse
     model of the same machine."""
 
-    inverse: ClassVar[type[InverseMachine]]
-    Outputs: ClassVar[type]
-    States = RotatingStates
+    inverse: InverseMachine
+    Outputs: Any
 
-    def __init_subclass__(cls) -> None:
-        if not hasattr(cls, "inverse"):  # a common base of several models
-            return
-        cls.required = (*cls.inverse.required, cls.inverse.driver_port.inertia)
-        cls.parts = (Part(cls.Outputs, cls._outputs),)
-        super().__init_subclass__()
+    def __post_init__(self) -> None:
+        inverse = self.inverse
+        self.follow(
+            linkage=inverse.linkage,
+            required=(*inverse.required, inverse.driver_port.inertia),
+            requirements=self._limits,
+            parts=(Part(self.Outputs, self._outputs),),
+            sketch=inverse.sketch,
+            initial_states=_initial_states,
+            controlled=True,
+            internal_step=_internal_step,
+            tolerance=_tolerance,
+            constrained_states=lambda xp, p, u, x: [x.phi, x.w],
+            shared=self._at_shaft,
+            derivatives=self._rates,
+        )
+        super().__post_init__()
 
-    @classmethod
-    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch:
-        """That of the inverse model."""
-        return cls.inverse.sketch(start)
-
-    @classmethod
-    def linkage(cls, xp: Any, p: Any, u: Any) -> Linkage:
-        """The linkage of the inverse model."""
-        return cls.inverse.linkage(xp, p, u)
-
-    @classmethod
-    def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+    def _limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of the inverse model, and those of an inertia that never vanishes."""
-        yield from cls.inverse.requirements(xp, p)
-        yield p.J_added * p.ratio * p.ratio + cls.linkage(xp, p, cls.Inputs()).driver.inertia, 0.0, math.inf
+        yield from self.inverse.requirements(xp, p)
+        yield p.J_added * p.ratio * p.ratio + self.linkage(xp, p, self.Inputs()).driver.inertia, 0.0, math.inf
 
-    @classmethod
-    def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:
+    def start_from(self, outputs: Mapping[str, float]) -> dict[str, float]:
         """Start parameters with which the direct model continues a motion of the inverse model; `outputs` gives the
         outputs and states of the inverse model at that instant by name."""
         return {"phi_start": outputs["phi0"], "w_start": outputs["w0"]}
 
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """The start angle and speed."""
-        return RotatingStates(phi=p.phi_start, w=p.w_start)
-
-    controlled = True
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """Longest internal step: 5 ms, so that no step skips the start of a cut or the contact with a stop."""
-        return 5e-3
-
-    @staticmethod
-    def tolerance(xp: Any, p: Any) -> Any:
-        """Tight relative tolerance. The motion is slow, but smoothed friction near rest and a blade that a stack
-        stops act within microseconds; and a free motion does not reduce its errors, so that local errors must be
-        small."""
-        return 1e-9
-
-    @staticmethod
-    def constrained_states(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """The states themselves: they have no constraints."""
-        return [x.phi, x.w]
-
-    @classmethod
-    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
+    def _at_shaft(self, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
         """The machine at the crank angle and speed that follow from angle and speed of the motor."""
-        return cls.state(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
+        return self.state(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
 
-    @classmethod
-    def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
-        stops = cls._stops(xp, p, x)
-        return [x.w, acceleration(p, u, cls.shared(xp, p, u, x), stops.force if stops else 0.0)]
+        stops = self._stops(xp, p, x)
+        return [x.w, acceleration(p, u, self.shared(xp, p, u, x), stops.force if stops else 0.0)]
 
-    @classmethod
-    def _stops(cls, xp: Any, p: Any, x: Any) -> StopAction | None:
+    def _stops(self, xp: Any, p: Any, x: Any) -> StopAction | None:
         """The action of the end stops on a driver with a range; None for one that turns round."""
-        if cls.inverse.end_stops is None:
+        if self.inverse.end_stops is None:
             return None
-        return stop_action(xp, p.end_stops, cls.inverse.span, x.phi / p.ratio, x.w / p.ratio)
+        return stop_action(xp, p.end_stops, self.inverse.span, x.phi / p.ratio, x.w / p.ratio)
 
-    @classmethod
-    def _outputs(cls, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
-        stops = cls._stops(xp, p, x)
+    def _outputs(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+        stops = self._stops(xp, p, x)
         a = acceleration(p, u, s, stops.force if stops else 0.0)
         at_crank = a / p.ratio
-        fields = running(s, at_crank) | cls.inverse.probes(xp, p, u, s, at_crank)
+        fields = running(s, at_crank) | self.inverse.probes(xp, p, u, s, at_crank)
         # the motor also drives the inertia on its own shaft
         fields["kinetic_energy"] += 0.5 * p.J_added * (x.w * x.w)
         fields["power"] = u.tau * x.w
         if stops is not None:
-            fields[cls.inverse.driver_port.stop] = stops.force
+            fields[self.inverse.driver_port.stop] = stops.force
             fields["potential_energy"] += stops.energy
             fields["dissipated_power"] += stops.lost * s.w
-        return cls.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)
+        return self.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)
+
+
+def _initial_states(xp: Any, p: Any) -> Any:
+    """The start angle and speed."""
+    return RotatingStates(phi=p.phi_start, w=p.w_start)
+
+
+def _internal_step(xp: Any, p: Any) -> Any:
+    """Longest internal step: 5 ms, so that no step skips the start of a cut or the contact with a stop."""
+    return 5e-3
+
+
+def _tolerance(xp: Any, p: Any) -> Any:
+    """Tight relative tolerance. The motion is slow, but smoothed friction near rest and a blade that a stack stops
+    act within microseconds; and a free motion does not reduce its errors, so that local errors must be small."""
+    return 1e-9
 
 
 def acceleration(p: Any, u: Any, s: MachineState, stop: Any = 0.0) -> Any:
@@ -427,6 +399,6 @@ def acceleration(p: Any, u: Any, s: MachineState, stop: Any = 0.0) -> Any:
     return (u.tau - (s.bias + stop) / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
 
 
-def direct_model(machine: type[InverseMachine]) -> type[DirectMachine]:
+def direct_model(machine: InverseMachine) -> DirectMachine:
     """The direct model of a machine."""
     return machine.direct()

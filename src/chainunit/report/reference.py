@@ -176,7 +176,7 @@ def _remarks() -> Iterator[Block]:
     yield Table(tuple(rows), heads("code", "severity", "sentences", "remedy", "numbers"), numeric=False)
 
 
-def _variables(model: type[Model]) -> Iterator[Block]:
+def _variables(model: Model) -> Iterator[Block]:
     """The table of the variables of an FMU of that model."""
     interface: Any = Interface(model, {})
     rows = []

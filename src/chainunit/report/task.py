@@ -16,7 +16,7 @@ from ..core.errors import InputError, RunError, WriteError
 from ..core.files import claim, clear
 from ..study import provenance
 from ..study.config import Config
-from ..study.registry import command_modules
+from ..study.registry import modules
 from ..work.progress import TaskProgress
 from . import files, html
 from .blocks import Report
@@ -35,7 +35,7 @@ _OF_BASE = {"study": ResultKind("a study", key="answers"), "linkage": ResultKind
 
 def result_kinds() -> Mapping[str, ResultKind]:
     """The kinds of results that commands leave in a folder, by command: of the base and of the capabilities."""
-    return _OF_BASE | {name: kind for module in command_modules() for name, kind in module.KINDS.items()}
+    return _OF_BASE | {name: kind for module in modules("command") for name, kind in module.KINDS.items()}
 
 
 def no_check(question: Any, **options: Any) -> None:

@@ -45,7 +45,7 @@ def driver_bearing(drive: Drive) -> str:
     if drive.foreign_machine:
         return ""
     model = drive.simulated_machine.model
-    ((bearing, *_),) = model.topology().groups[0].joints
+    ((bearing, *_),) = model.topology.groups[0].joints
     titles = {model.joints.get(output): title for title, output in model.pins.items()}
     return titles.get(bearing, "")
 

@@ -1,12 +1,14 @@
 """Capabilities, as a study knows them: each is one question that the program answers beside the base of a study.
 
-A capability is one folder of `chainunit.capabilities` and a name in its list; nothing outside of the folder imports
-from it. It brings tables of the study file with their rules, parts of the drive, and analyses with their findings.
-Its section of the report and its commands are those of `chainunit.report.capability.Capability`.
+A capability is one folder with an entry point of the group ``chainunit.capabilities``, in this package or in another;
+nothing outside of the folder imports from it. It brings tables of the study file with their rules, parts of the
+drive, and analyses with their findings. Its section of the report and its commands are those of
+`chainunit.report.capability.Capability`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,7 +60,11 @@ class StudyCapability:
     its method `plan` gave for the study."""
 
     name: ClassVar[str]
-    """name of its folder, and of its plan in `Config.plans`"""
+    """name of its entry point, and of its plan in `Config.plans`"""
+
+    order: ClassVar[float] = math.inf
+    """its place among the others: tables, results and sections come in ascending order, parts of the line from the
+    motor to the machine"""
 
     tables: ClassVar[Mapping[str, FileSection]] = {}
     """its tables of the study file, by name"""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 
 from ..core.messages import unit_behind
-from ..drives.motors import MOTORS
+from ..models import MOTORS
 from ..reading.tables import toml
 from ..reading.toml_lines import Statement, statements
 from .keys import NAME, Key, KeyTable, entry_tables, key_tables

@@ -296,7 +296,7 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
         return _config(form, parts, events, contents)
 
 
-def _usual_lengths(machine: type[MachineModel], form: Any) -> dict[str, tuple[float, float]]:
+def _usual_lengths(machine: MachineModel, form: Any) -> dict[str, tuple[float, float]]:
     """The usual sizes of lengths that another length of the file limits; see `InverseMachine.within`."""
     low, high = USUAL["m"]
     return {
@@ -448,7 +448,7 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
 
 def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
-    make: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
+    make: Any = ForeignMachine if isinstance(parts.machine, ForeignModel) else machine_of
     if of_papers:
         with refusal_prefix("ratios: ", "ratios"):
             return of_ratios(lambda lengths: make(parts.machine, given | lengths), filled(Ratios, of_papers))
@@ -467,7 +467,7 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
         raise InputError(line, key=key) from error
 
 
-def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[str, float]) -> str:
+def _taken_over(error: InputError, machine: MachineModel, given: Mapping[str, float]) -> str:
     """Words to follow a refusal: the lengths behind it that neither file nor example give."""
     names = error.names if isinstance(error, GeometryError) else ()
     declared = Layout(machine.Parameters).by_name(machine.Parameters())

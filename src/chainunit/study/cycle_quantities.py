@@ -117,7 +117,7 @@ _WORDS = {name: each.words for name, each in REDUCTIONS.items()} | {RANGE: "larg
 _FORM = re.compile(r"(\w+)\((.+)\)")
 
 
-def cycle_quantity(name: str, model: type[Model]) -> CycleQuantity:
+def cycle_quantity(name: str, model: Model) -> CycleQuantity:
     """The quantity of that name for the machines of a model.
 
     Raises
@@ -147,7 +147,7 @@ def cycle_quantity(name: str, model: type[Model]) -> CycleQuantity:
     return CycleQuantity(name, variable.unit, words, one, _only, reduction=reduction)
 
 
-def _named(name: str, model: type[Model]) -> CycleQuantity:
+def _named(name: str, model: Model) -> CycleQuantity:
     of = partial(CycleQuantity, name, *NAMED[name], reduction=name)
     if name == "installed_power":
         return of((Integrand("tau", "rms"), Integrand("tau", "peak")), _installed_power)

@@ -45,7 +45,7 @@ class Drive:
     """A `motor` with its `parameters` that turns a `machine`; `follows` says whether it follows the reference
     `w_ref`."""
 
-    motor: type[Motor]
+    motor: Motor
     parameters: Any
     machine: Machine
     follows: bool = True

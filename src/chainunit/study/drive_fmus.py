@@ -41,7 +41,7 @@ def export_machine(drive: Drive, folder: Path, backend: Backend | None = None) -
     return file
 
 
-def coasting_model(drive: Drive) -> type[DirectMachine]:
+def coasting_model(drive: Drive) -> DirectMachine:
     """The model of the machine that turns without its motor."""
     return drive.simulated_machine.model.direct()
 

@@ -19,9 +19,7 @@ def asks_for_equilibrium(at: object) -> TypeGuard[str]:
     return isinstance(at, str) and at.strip().partition(":")[0].strip() == "equilibrium"
 
 
-def equilibrium_point(
-    model: type[InverseMachine], values: Mapping[str, float], at: str
-) -> tuple[int, Equilibrium]:
+def equilibrium_point(model: InverseMachine, values: Mapping[str, float], at: str) -> tuple[int, Equilibrium]:
     """The number of an equilibrium of a machine and the equilibrium: by default the stable one with the least
     potential, the first one where it has none.
 
@@ -51,7 +49,7 @@ def equilibrium_point(
     return number, own
 
 
-def _number(at: str, found: Equilibria, model: type[InverseMachine]) -> int:
+def _number(at: str, found: Equilibria, model: InverseMachine) -> int:
     match = _FORM.fullmatch(at.strip())
     text = match[1] if match else at
     if text is None:
@@ -77,7 +75,7 @@ def _others(found: Equilibria) -> str:
     return f'{by_number}a place, "phi=.., w=0"'
 
 
-def _listed(found: Equilibria, model: type[InverseMachine]) -> str:
+def _listed(found: Equilibria, model: InverseMachine) -> str:
     """The equilibria in words."""
     if not found.places:
         return "it has no equilibrium"
@@ -86,7 +84,7 @@ def _listed(found: Equilibria, model: type[InverseMachine]) -> str:
     )
 
 
-def place_words(model: type[InverseMachine], each: Equilibrium) -> str:
+def place_words(model: InverseMachine, each: Equilibrium) -> str:
     """Kind and place of an equilibrium in words."""
     unit = "m" if model.slides else "rad"
     on = "on its stop" if each.kind == STOP else each.kind

@@ -39,7 +39,7 @@ LONGEST_NAME = 40
 _NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}")
 
 
-def inputs_of(machine: type[MachineModel]) -> str:
+def inputs_of(machine: MachineModel) -> str:
     """Words on the inputs of a machine, and on the event that lets one of them rise."""
     names = Layout(machine.Feed).names
     if not names:
@@ -47,7 +47,7 @@ def inputs_of(machine: type[MachineModel]) -> str:
     return f'its inputs: {", ".join(names)} (type = "surge" with input = "{names[0]}" lets one rise)'
 
 
-def read_events(tables: Sequence[Any], machine: type[MachineModel] | None = None) -> dict[str, Event]:
+def read_events(tables: Sequence[Any], machine: MachineModel | None = None) -> dict[str, Event]:
     """Events by the names of their runs, in the order of the tables; of the `machine`, where it is known.
 
     Raises

@@ -10,8 +10,7 @@ from typing import Any
 
 from ..core.errors import Faults, InputError, each_refusal, refusal_prefix, shown
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue, offer
-from ..drives.motors import MOTORS
-from ..models import MACHINES
+from ..models import MACHINES, MOTORS
 from ..reading.tables import read_table
 from ..reading.text import chosen_units
 from .checks import lower_limits

@@ -5,15 +5,15 @@ from __future__ import annotations
 import keyword
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
 
-from ..core.quantities import Layout, Value, base_units, declared_class, group, quantity
+from ..core.quantities import Value, base_units, declared_class, group, quantity
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
 from ..system import Connector, CoSimulation, FmuComponent, System, foreign_component
@@ -21,25 +21,24 @@ from ..system import Connector, CoSimulation, FmuComponent, System, foreign_comp
 _GEAR = Connector("ratio", "parameter", "1", {}, 1.0, "gear ratio, motor turns per crank turn", 1e-4, 1e4)
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ForeignModel(MachineModel):
     """The model of a machine that is a foreign FMU: its parameters, and as `Feed` its inputs other than the
     shaft.
 
     An FMU with a parameter `ratio` includes the gear, and its shaft is the motor's. Otherwise its shaft is
-    the crank, and a gear stands before it where one is needed.
+    the crank, and a gear stands before it if one is needed.
     """
 
-    component: ClassVar[FmuComponent]
-    parts = ()
-    usual_speed = (0.05, 1000.0)
+    component: FmuComponent
+    usual_speed: tuple[float, float] = (0.05, 1000.0)
 
-    @classmethod
-    def has_gear(cls) -> bool:
+    def has_gear(self) -> bool:
         """Whether the FMU includes the gear."""
-        return "ratio" in cls.component.connectors
+        return "ratio" in self.component.connectors
 
 
-def foreign_model(file: Path, names: Mapping[str, str]) -> type[ForeignModel]:
+def foreign_model(file: Path, names: Mapping[str, str]) -> ForeignModel:
     """The machine in an FMU; `names` gives the FMU's names by ours, where they differ.
 
     Raises
@@ -54,16 +53,15 @@ def foreign_model(file: Path, names: Mapping[str, str]) -> type[ForeignModel]:
     if ratio := component.connectors.get("ratio"):
         parameters[0] = replace(ratio, most=_GEAR.most, least=_GEAR.least)
     feed = _declared("Feed", [c for c in own if c.causality == "input" and c.name not in shaft])
-    members = {
-        "name": component.title,
-        "description": component.description or component.title,
-        "component": component,
-        "Parameters": _declared("Parameters", parameters),
-        "Inputs": feed,
-        "Feed": feed,
-        "feed_layout": Layout(feed),
-    }
-    return type("ForeignModel", (ForeignModel,), members)
+    return ForeignModel(
+        name=component.title,
+        description=component.description or component.title,
+        component=component,
+        Parameters=_declared("Parameters", parameters),
+        Inputs=feed,
+        Feed=feed,
+        made=(foreign_model, (file, names)),
+    )
 
 
 def declared_parameters(component: FmuComponent) -> type:

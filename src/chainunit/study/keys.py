@@ -18,9 +18,8 @@ from ..core.quantities import Layout, Variable, variables, written
 from ..core.units import shortest_text
 from ..drives.catalogue import KINDS as CATALOGUES
 from ..drives.catalogue_rows import LEFT_OUT, TEXTS
-from ..drives.motors import MOTORS
 from ..machines.paper_ratios import Ratios
-from ..models import MACHINES
+from ..models import MACHINES, MOTORS
 from ..reading.lists import TableList
 from ..reading.tables import instance
 from ..reading.text import CHOICES as UNITS

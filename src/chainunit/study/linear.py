@@ -13,7 +13,7 @@ from ..core.errors import InputError, RunError, check_kind, near_name, refusal_p
 from ..core.model import Model
 from ..core.quantities import Quantity, Variable
 from ..mechanism.models import DirectMachine, InverseMachine
-from ..models import model_named
+from ..models import is_study_file, model_named
 from ..reading.tables import to_number
 from ..system.compiled_simulation import CompiledSystem
 from ..system.linear import LinearModel, place
@@ -26,7 +26,7 @@ from .drive import Drive
 from .equilibrium_point import asks_for_equilibrium, equilibrium_point, place_words
 from .event import Event
 from .operation import OperatingConditions
-from .package import drive_to_export, is_study_file, model_and_start
+from .package import drive_to_export, model_and_start
 from .readings import crank_angle
 from .rig import Rig
 from .start_up import start_up
@@ -45,7 +45,7 @@ _USUAL_WAY_SPEED = 0.1
 class LinearPoint(NamedTuple):
     """A model with the values of a point of it, by name, and the point in words."""
 
-    model: type[Model]
+    model: Model
     parameters: Any
     inputs: dict[str, float]
     states: dict[str, float]
@@ -123,7 +123,7 @@ def linear_point(
     if is_file:
         machine = model_named(name)
         if asks_for_equilibrium(at):
-            assert issubclass(machine, InverseMachine)
+            assert isinstance(machine, InverseMachine)
             point = _at_equilibrium(machine if inverse else machine.direct(), {}, at)
             return point._replace(title=machine.noun)
         return _point_of_linkage(machine, at, inverse)
@@ -137,7 +137,7 @@ def linear_point(
 # -- models and linkages
 
 
-def _at_values(model: type[Model], start: Mapping[str, float], at: At) -> LinearPoint:
+def _at_values(model: Model, start: Mapping[str, float], at: At) -> LinearPoint:
     """The point of a model with these start values, and with the values of `at`."""
     given = _values(model, at)
     names = set(model.parameter_layout.names)
@@ -151,16 +151,16 @@ def _at_values(model: type[Model], start: Mapping[str, float], at: At) -> Linear
         x = model.begin(p, model.input_layout.from_names(inputs))
         states = {k: float(v) for k, v in model.state_layout.by_name(x).items()}
         states |= {k: v for k, v in given.items() if k in states}
-    if issubclass(model, DirectMachine) and "tau" not in given:
+    if isinstance(model, DirectMachine) and "tau" not in given:
         inputs["tau"] = holding_torque(model, p, inputs, states)
     words = _in_words(model, given)
     return LinearPoint(model, p, inputs, states, words or "start of the model")
 
 
-def _at_equilibrium(model: type[Model], start: Mapping[str, float], at: str) -> LinearPoint:
+def _at_equilibrium(model: Model, start: Mapping[str, float], at: str) -> LinearPoint:
     """The point of a machine at rest in an equilibrium, with these start values."""
-    inverse = model.inverse if issubclass(model, DirectMachine) else model
-    if not issubclass(inverse, InverseMachine) or inverse.States is not None:
+    inverse = model.inverse if isinstance(model, DirectMachine) else model
+    if not isinstance(inverse, InverseMachine) or inverse.States is not None:
         raise InputError(
             f"at = {shown(at)}: {model.name} has no equilibria that are known; they are of linkages and machines "
             "without states of their own; give states and inputs, NAME=VALUE, .."
@@ -173,7 +173,7 @@ def _at_equilibrium(model: type[Model], start: Mapping[str, float], at: str) -> 
 
 
 def holding_torque(
-    model: type[DirectMachine], p: Any, inputs: Mapping[str, float], states: Mapping[str, float]
+    model: DirectMachine, p: Any, inputs: Mapping[str, float], states: Mapping[str, float]
 ) -> float:
     """The torque on the shaft at which its speed is constant at this point [N m], of a driver that slides the force
     [N]: a = (tau - tau_held)/(J_added + J)."""
@@ -204,17 +204,17 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
     return point._replace(title=machine.noun)
 
 
-def _in_words(model: type[Model], given: Mapping[str, float]) -> str:
+def _in_words(model: Model, given: Mapping[str, float]) -> str:
     """The values that a point gives to states and inputs, with their units."""
     units = {v.name: v.unit for v in _states_and_inputs(model)}
     return ", ".join(f"{name} = {x:g} {units[name]}".removesuffix(" 1") for name, x in given.items())
 
 
-def _states_and_inputs(model: type[Model]) -> tuple[Variable, ...]:
+def _states_and_inputs(model: Model) -> tuple[Variable, ...]:
     return *(model.state_layout.variables if model.state_layout else ()), *model.input_layout.variables
 
 
-def _values(model: type[Model], at: At) -> dict[str, float]:
+def _values(model: Model, at: At) -> dict[str, float]:
     """The values that a point gives to states and inputs."""
     if at is None:
         return {}

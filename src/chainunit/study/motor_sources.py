@@ -13,7 +13,7 @@ import numpy as np
 from ..core.errors import InputError, refusal_prefix
 from ..drives.catalogue import CatalogueMotor
 from ..drives.induction_motor import InductionMotor
-from ..drives.motor import Motor
+from ..drives.motor import FOREIGN, Motor
 from ..machines.machine import Machine
 from ..reading.tables import given_values, read_table, schema
 from ..system import FmuComponent, foreign_component
@@ -28,7 +28,7 @@ from .registry import registered
 class MotorSource(ABC):
     """A motor as the study file states it."""
 
-    kind: type[Motor]
+    kind: Motor
     """its model"""
     plate: CatalogueMotor | None
     """the motor of the catalogue, if it is one"""
@@ -57,7 +57,7 @@ class MotorSource(ABC):
 class OwnMotor(MotorSource):
     """A motor whose `parameters` the file gives."""
 
-    kind: type[Motor]
+    kind: Motor
     parameters: Any
     plate: None = None
 
@@ -78,7 +78,7 @@ class NamedMotor(MotorSource):
     """A motor of the catalogue."""
 
     plate: CatalogueMotor
-    kind: type[Motor] = InductionMotor
+    kind: Motor = InductionMotor
 
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
         """See `MotorSource`."""
@@ -99,7 +99,7 @@ class ForeignMotor(MotorSource):
     """the FMU's names by ours, where they differ"""
     parameters: Mapping[str, Any] = field(default_factory=dict)
     """values of its parameters, as the file has them"""
-    kind: type[Motor] = Motor
+    kind: Motor = FOREIGN
     plate: None = None
 
     @property
@@ -125,7 +125,7 @@ class ForeignMotor(MotorSource):
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
         """See `MotorSource`; a study with an added inertia is refused."""
         motor, fed = self.component, tables.feed_forward
-        return Drive(Motor, None, machine, "w_ref" in motor.connectors, feed_forward=fed, foreign=motor)
+        return Drive(FOREIGN, None, machine, "w_ref" in motor.connectors, feed_forward=fed, foreign=motor)
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """Nothing follows."""

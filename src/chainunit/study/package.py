@@ -9,7 +9,6 @@ from typing import Any
 
 from ..core.errors import InputError, RunError, printable
 from ..core.files import scratch
-from ..core.inputs import TOML, file_text
 from ..core.model import About, Model
 from ..core.quantities import Layout
 from ..drives.motor import Motor
@@ -20,8 +19,7 @@ from ..machines.chain_organs import USUAL
 from ..machines.flexible import ChainedModel, with_rods
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
-from ..models import model_named
-from ..reading.tables import toml
+from ..models import is_study_file, model_named
 from ..reading.text import number
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
@@ -51,7 +49,7 @@ def study_system(drive: Drive, operation: OperatingConditions) -> System:
     return replace(drive.graph, start=start)
 
 
-def start_of(drive: Drive, operation: OperatingConditions, model: type[Model]) -> dict[str, float]:
+def start_of(drive: Drive, operation: OperatingConditions, model: Model) -> dict[str, float]:
     """Start values of the parameters and inputs of the `model`, by name, with the values of the drive of a study.
 
     Raises
@@ -64,26 +62,15 @@ def start_of(drive: Drive, operation: OperatingConditions, model: type[Model]) -
             if (part := drive.line.part(kind.name)) is None:
                 raise InputError(f"the study has no [{kind.name}]; add the table, or export without config")
             return part.component.start
-    if not issubclass(model, Motor):
+    if not isinstance(model, Motor):
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
-        own = drive.simulated_machine if issubclass(model, ChainedModel) else drive.driven_machine
+        own = drive.simulated_machine if isinstance(model, ChainedModel) else drive.driven_machine
         return _machine(operation, model, own)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
     return model.parameter_layout.by_name(drive.fmu_parameters)
-
-
-def is_study_file(name: str) -> bool:
-    """Whether the name is that of a study file: a file in TOML without the tables of a linkage."""
-    if not name.lower().endswith(".toml"):
-        return False
-    try:
-        data = toml(file_text(Path(name), TOML))
-    except InputError:
-        return False  # whoever reads the file says what is wrong
-    return not {"links", "ground", "driver", "joints"} & set(data)
 
 
 def model_and_start(
@@ -94,7 +81,7 @@ def model_and_start(
     direct: bool = False,
     backend: Backend | None = None,
     progress: Callable[[str], None] = lambda what: None,
-) -> tuple[type[Model], dict[str, float]]:
+) -> tuple[Model, dict[str, float]]:
     """The model that `chainunit export NAME` writes, and its start values by name.
 
     Parameters
@@ -114,11 +101,13 @@ def model_and_start(
     if config and is_study_file(name):
         drive = drive_to_export(config, backend, progress)
         return whole_system(drive, config.operation, config.title, config.file.labels)
+    if config is None:
+        return model_named(name, direct, rods), {}
     model = model_named(name, direct)
-    start = start_of(drive_to_export(config, backend, progress), config.operation, model) if config else {}
+    start = start_of(drive_to_export(config, backend, progress), config.operation, model)
     if name == "ChainUnitFlexible":
         if rods is None:
-            machine = config and config.machine.simulated
+            machine = config.machine.simulated
             rods = sum(machine.rods) if isinstance(machine, ChainedUnit) else USUAL
         model = with_rods(rods, start)
     return model, start
@@ -126,7 +115,7 @@ def model_and_start(
 
 def whole_system(
     drive: Drive, operation: OperatingConditions, title: str, labels: Mapping[str, str]
-) -> tuple[type[Model], dict[str, float]]:
+) -> tuple[Model, dict[str, float]]:
     """The one model of the whole system of a study with that title and the `labels` of its report, and its start
     values by name: parameters, the speed reference and the loads of normal running.
 
@@ -184,19 +173,19 @@ def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
     return [f"{on_limit(limit.topic, limit.speed)} {end}" for limit in passed]
 
 
-def _is_of(model: type[Model], drive: Drive) -> bool:
+def _is_of(model: Model, drive: Drive) -> bool:
     """Whether the model is the machine of the drive, its direct model, or its model with chains."""
     if drive.foreign_machine:
         return False
     own = drive.driven_machine.model
-    chains = bool(own.sides) and issubclass(model, ChainedModel)
+    chains = bool(own.sides) and isinstance(model, ChainedModel)
     return model is own or chains or model is own.direct()
 
 
-def _machine(operation: OperatingConditions, model: type[Model], machine: Machine) -> dict[str, float]:
+def _machine(operation: OperatingConditions, model: Model, machine: Machine) -> dict[str, float]:
     """Start values of the machine with its feed and gear, at the speed of the study."""
     speed = operation.crank_speed * machine.ratio
-    direct = issubclass(model, DirectMachine)
+    direct = isinstance(model, DirectMachine)
     motion = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
     return machine.by_name | Layout(type(operation.feed)).by_name(operation.feed) | motion
 

@@ -15,11 +15,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..core.inputs import TOML, file_text
-from ..drives.motor import Motor
-from ..drives.motors import MOTORS
+from ..drives.motor import FOREIGN, Motor
 from ..machines.linkages.file import linkage_in
 from ..mechanism.models import MachineModel
-from ..models import MACHINES
+from ..models import MACHINES, MOTORS
 from ..reading.tables import (
     Title,
     UnusualValue,
@@ -72,9 +71,9 @@ EXAMPLES = {
 class Parts:
     """The kinds of machine and motor that the table [system] names, and the example that goes with the machine."""
 
-    machine: type[MachineModel]
-    motor: type[Motor]
-    """model of the motor; `Motor` itself if the motor is a foreign FMU"""
+    machine: MachineModel
+    motor: Motor
+    """model of the motor; `FOREIGN` if the motor is a foreign FMU"""
     designation: str = ""
     """designation of a motor in the catalogue; empty for another motor"""
     file: str = ""
@@ -118,7 +117,7 @@ class Parts:
 
 
 @lru_cache(maxsize=32)
-def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
+def _form(machine: MachineModel, motor: Motor) -> type[BaseModel]:
     """The form of a file with that machine and motor. It takes longer to make than a file takes to read."""
     tables: dict[str, type[BaseModel]] = {
         name: section.form.model(section.declaration, name, f"{name}.", **section.keys)
@@ -152,7 +151,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     faults = Faults()
     table = read_table(SystemTable, named_table(data, "system"), "system.")
     motor = table.motor
-    machine: type[MachineModel] = MACHINES["ChamberForces"]
+    machine: MachineModel = MACHINES["ChamberForces"]
     unusual: tuple[UnusualValue, ...] = ()
     with faults.collected(), refusal_prefix("system.motor = ", "system.motor"):
         if _is_fmu(motor):
@@ -166,7 +165,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     if not motor:
         return parts
     if _is_fmu(motor):
-        return dataclasses.replace(parts, motor=Motor, file=motor)
+        return dataclasses.replace(parts, motor=FOREIGN, file=motor)
     if motor in MOTORS:
         return dataclasses.replace(parts, motor=MOTORS[motor])
     return dataclasses.replace(parts, motor=MOTORS["InductionMotor"], designation=motor)
@@ -177,7 +176,7 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(part.motor_table and part.motor_table in data for part in registered())
 
 
-def _machine_model(table: Any, source: str) -> tuple[type[MachineModel], tuple[UnusualValue, ...]]:
+def _machine_model(table: Any, source: str) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
     """The machine that the table [system] names, and the unusual values of its linkage file."""
     if table.machine.lower().endswith(LINKAGE):
         with refusal_prefix("system.machine: ", "system.machine"):

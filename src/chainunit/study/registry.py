@@ -1,44 +1,59 @@
-"""The registered capabilities and parts of the line, as the modules of a study find them: by their names, as they
-stand above the study, or import from it."""
+"""The registered capabilities and parts of the line, as the modules of a study find them: by their entry points, as
+they stand above the study, in another package, or import from the study."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
+from importlib.machinery import PathFinder
+from importlib.util import find_spec
+from types import ModuleType
 from typing import Any
 
-_PACKAGE = __package__.rpartition(".")[0]
+from ..core.register import Register, entries
+
+CAPABILITIES = "chainunit.capabilities"
+"""Group of the entry points of capabilities; each is a folder with the module `capability`, or with its contents, and
+with the modules `command` and `study_method` if it has these."""
 
 
-def _all_of(home: str, attribute: str) -> tuple[Any, ...]:
-    return tuple(_registered(f"{home}.{name}", attribute) for name in import_module(home).NAMES)
-
-
-def _registered(module: str, attribute: str) -> Any:
-    """The part or capability of a module, or of `capability` in that folder, where the folder itself is imported by
-    the command line and must be light."""
-    home = import_module(module)
-    return getattr(home if hasattr(home, attribute) else import_module(f"{module}.capability"), attribute)
+def _in_order(things: Iterator[Any]) -> tuple[Any, ...]:
+    return tuple(sorted(things, key=lambda thing: (thing.order, thing.name)))
 
 
 @cache
 def parts_of_line() -> tuple[Any, ...]:
     """All parts of the line from the motor to the machine, each a `chainunit.study.line.part.PartOfLine`."""
-    return _all_of(f"{__package__}.line", "PART")
+    return _in_order(iter(Register[Any]("chainunit.line").values()))
 
 
 @cache
 def capabilities() -> tuple[Any, ...]:
     """All capabilities in their order, each a `chainunit.study.capability.StudyCapability`."""
-    return _all_of(f"{_PACKAGE}.capabilities", "CAPABILITY")
+    return _in_order(_capability(folder) for folder in Register[ModuleType](CAPABILITIES).values())
 
 
-def command_modules() -> Iterator[Any]:
-    """The modules of the commands of the capabilities, without the rest of their folders: a command answers at
-    once."""
-    modules: Iterator[Any] = import_module(f"{_PACKAGE}.capabilities").modules("command")
-    return modules
+def _capability(folder: ModuleType) -> Any:
+    """The capability of a folder: in the folder itself, or in its module `capability`, if the folder has a command
+    and must be light."""
+    if hasattr(folder, "CAPABILITY"):
+        return folder.CAPABILITY
+    return import_module(f"{folder.__name__}.capability").CAPABILITY
+
+
+def modules(name: str) -> Iterator[ModuleType]:
+    """The module of this name of each capability that has one: ``command``, whose ``COMMANDS`` typer takes, with the
+    kinds of results that they leave (``KINDS``, by command); and ``study_method``, with a method of
+    `chainunit.Study` (``METHOD``) and the class of its result (``RESULT``). Nothing else of a folder is imported, so
+    that the command line answers at once."""
+    for entry in entries(CAPABILITIES).values():
+        module = f"{entry.value}.{name}"
+        folder = find_spec(entry.value)
+        # of the places of the folder: a search by its name would import it
+        places = folder.submodule_search_locations if folder is not None else None
+        if places is not None and PathFinder.find_spec(module, places) is not None:
+            yield import_module(module)
 
 
 @cache

@@ -9,9 +9,8 @@ from functools import cache
 from typing import Any
 
 from ..core.errors import InputError, shown
-from ..drives.motors import MOTORS
 from ..machines.paper_ratios import Ratios, lengths
-from ..models import MACHINES
+from ..models import MACHINES, MOTORS
 from ..reading.tables import filled
 from .conditions import (
     NEVER,
@@ -52,8 +51,8 @@ class Rule:
 def refusals(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
     """A refusal for each rule that a file breaks, whose machine and motor are `parts`."""
     names = {
-        "machine": "an FMU" if issubclass(parts.machine, ForeignModel) else parts.machine.name,
-        "name": "machine" if issubclass(parts.machine, ForeignModel) else parts.machine.name,
+        "machine": "an FMU" if isinstance(parts.machine, ForeignModel) else parts.machine.name,
+        "name": "machine" if isinstance(parts.machine, ForeignModel) else parts.machine.name,
         "motor": shown(parts.named_motor),
         "type": "" if parts.file else parts.motor.name,
     }

@@ -8,9 +8,9 @@ from typing import Any
 from ..core.errors import InputError, near_name
 from ..core.messages import unit_behind
 from ..core.quantities import Layout
-from ..drives.motors import MOTORS
 from ..machines.chain_unit import SideLoads
 from ..mechanism.models import MachineModel
+from ..models import MOTORS
 from ..system.signals import Profile
 from .event import Event
 from .event_table import inputs_of
@@ -22,7 +22,7 @@ MOST_STEPS = 1e6
 
 
 def loads_beyond(
-    model: type[MachineModel],
+    model: MachineModel,
     feed: Any,
     events: Mapping[str, Event],
     plans: Mapping[str, Any],

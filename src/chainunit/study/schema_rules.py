@@ -6,8 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..drives.catalogue import catalogue
-from ..drives.motors import MOTORS
-from ..models import MACHINES
+from ..models import MACHINES, MOTORS
 from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
 from .parts import FMU, LINKAGE

@@ -231,7 +231,7 @@ _KIND_OF_MOTOR = (
 )
 
 
-def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:
+def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
     own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
     places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}

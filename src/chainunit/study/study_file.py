@@ -51,7 +51,7 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
     return tables
 
 
-def _place(model: type[MachineModel], name: str) -> int:
+def _place(model: MachineModel, name: str) -> int:
     """The place of a parameter of the machine in its declaration; others stay behind them."""
     names = model.parameter_layout.names
     own = name.removeprefix("machine.")

@@ -20,7 +20,7 @@ from ..core.errors import InputError, printable, shown
 from ..core.integrators import MAX_STEPS
 from ..core.model import About, Model, Terminal
 from ..core.ports import MEASURED
-from ..core.system_description import RESERVED, SOLVER, reference
+from ..core.system_description import RESERVED, SOLVER
 from ..core.system_model import system_model
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
@@ -58,7 +58,7 @@ def compiled(
         where a component is an FMU, whose equations are not known; for an algebraic loop, also of the start; and for
         a name that a component of a compiled system cannot have.
     """
-    models: dict[str, type[Model]] = {}
+    models: dict[str, Model] = {}
     for own, component in system.components.items():
         if not isinstance(component, ModelComponent):
             raise InputError(
@@ -76,7 +76,7 @@ def compiled(
         )
     description = _description(system, models, name, printable(title))
     description |= {"about": about and asdict(about), "experiment": dict(experiment or {})}
-    model = system_model(description)
+    model = system_model(description, models)
     values = system.values
     layout = model.parameter_layout
     limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}
@@ -116,13 +116,13 @@ def export_compiled(
     )
 
 
-def input_starts(system: System, model: type[Model]) -> dict[str, float]:
+def input_starts(system: System, model: Model) -> dict[str, float]:
     """The start values of the inputs of a compiled system, where the system gives one."""
     values = system.values
     return {full: values[full] for full in model.input_layout.names if full in values}
 
 
-def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
+def _description(system: System, models: Mapping[str, Model], name: str, title: str) -> dict[str, Any]:
     """The description of a system that a `chainunit.core.system_description.SystemDescription` takes."""
     exact = hold_loads(system).connections
     influences = {each: _influences(model) for each, model in models.items()}
@@ -149,7 +149,6 @@ def _description(system: System, models: Mapping[str, type[Model]], name: str, t
     return {
         "name": name,
         "title": f"{title}: {kinds}" if title else f"System of {kinds}",
-        "components": [[each, reference(model)] for each, model in models.items()],
         "connections": [list(connection) for connection in connections],
         "left_out": sorted(left_out - extra),
         "terminals": free,
@@ -221,7 +220,7 @@ class _Influences:
 
 
 @lru_cache(maxsize=64)
-def _influences(model: type[Model]) -> _Influences:
+def _influences(model: Model) -> _Influences:
     interface = Interface(model, {})
     n_states, n_outputs = len(interface.states), len(interface.others)
 
@@ -256,7 +255,7 @@ class _Plan:
     def __init__(
         self,
         connections: list[Connection],
-        models: Mapping[str, type[Model]],
+        models: Mapping[str, Model],
         influences: Mapping[str, _Influences],
     ) -> None:
         self._models, self._of = models, influences

@@ -51,7 +51,7 @@ class ModelComponent:
     `file` is its FMU, or None before the export;
     the start values in the file do not count."""
 
-    model: type[Model]
+    model: Model
     parameters: Any
     file: Path | None = None
 

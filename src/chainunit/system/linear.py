@@ -206,7 +206,7 @@ _MOST = 60
 
 
 def linearize(
-    model: type[Model],
+    model: Model,
     parameters: Any = None,
     inputs: Mapping[str, float] | None = None,
     states: Mapping[str, float] | None = None,
@@ -268,7 +268,7 @@ def linearize(
     )
 
 
-def _states(model: type[Model], p: Any, u: Any, states: Mapping[str, float]) -> list[float]:
+def _states(model: Model, p: Any, u: Any, states: Mapping[str, float]) -> list[float]:
     """The states in the declared order; a state that is not given has its value at the start of the model."""
     layout = model.state_layout
     if layout is None:
@@ -284,7 +284,7 @@ class _Derivatives:
     """The equations of a model with their derivatives, as functions of CasADi. Rows are the derivatives of the
     states, the states and the outputs; columns are the states and the inputs."""
 
-    def __init__(self, model: type[Model]) -> None:
+    def __init__(self, model: Model) -> None:
         import casadi
 
         traced = trace(model)
@@ -389,5 +389,5 @@ def _size(v: Variable, at: float) -> float:
 
 
 @lru_cache(maxsize=8)
-def _derivatives(model: type[Model]) -> _Derivatives:
+def _derivatives(model: Model) -> _Derivatives:
     return _Derivatives(model)

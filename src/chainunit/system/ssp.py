@@ -123,7 +123,7 @@ class _Part:
     """A component in the package: its model or the file of a foreign FMU, its variables, and their names in the FMU
     where they differ."""
 
-    of: type[Model] | Path
+    of: Model | Path
     title: str
     description: str
     connectors: Sequence[Connector]

@@ -20,6 +20,7 @@ class PinLifeCapability(Capability):
     """The capability, with the table [pin_life]."""
 
     name = "pin_life"
+    order = 145
     tables = {  # noqa: RUF012
         "pin_life": FileSection(
             PinLifeTable,

@@ -16,7 +16,7 @@ from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import steady
-from chainunit.drives.motor import Motor
+from chainunit.drives.motor import FOREIGN
 from chainunit.drives.terminal_signals import terminal_signals
 from chainunit.machines.load_observer import FARTHEST, Inputs, rotor_torque
 from chainunit.study import config
@@ -250,7 +250,7 @@ def test_signals_are_those_of_the_observer():
     k = DcMotor.Parameters().armature.k
     assert terminal_signals(DcMotor, DcMotor.Parameters(), 1.0, 1.0).per_current == k
     with pytest.raises(TypeError, match="the torque on its rotor is not known"):
-        terminal_signals(Motor, None, 1.0, 1.0)
+        terminal_signals(FOREIGN, None, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ class BladeCapability(Capability):
     """The capability; it has no table, and comes with every machine that cuts."""
 
     name = "blade"
+    order = 60
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The turn with the cut."""

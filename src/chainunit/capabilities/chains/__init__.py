@@ -28,6 +28,7 @@ class ChainsCapability(Capability):
     """The capability, with the key organ and the table [chain]."""
 
     name = "chains"
+    order = 10
     choices = {  # noqa: RUF012
         "organ": (
             Literal["two-bar", "chain"],

@@ -23,7 +23,7 @@ import numpy as np
 from ...core.errors import InterruptedRunError, RunError
 from ...core.native.compilers import COMPILERS
 from ...core.quantities import Layout
-from ...drives.motor import Motor
+from ...drives.motor import FOREIGN
 from ...fmu.backends import Backend
 from ...machines.api import ChainedUnit, ChainUnitMachine, ChainUnitOfChains
 from ...machines.chain_unit import SIDES, Feed
@@ -189,7 +189,7 @@ def turns_of_starts(
 ) -> list[Cycle]:
     """The machine with chains over all turns of all starts, of shape (turns, points), at that `speed` of the crank
     [rad/s] with each of the `feeds`. The FMU is written to `folder`."""
-    drive, outputs = Drive(Motor, None, machine), ("tau", "J")
+    drive, outputs = Drive(FOREIGN, None, machine), ("tau", "J")
     starts, turns = int(chain.starts), int(chain.turns)
     cycles = []
     with closing(Fmu(export_machine(drive, folder, backend))) as fmu:

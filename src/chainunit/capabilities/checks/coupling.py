@@ -23,7 +23,7 @@ from ...study.remark import note, warning
 from ...study.torques import gear_torque
 from ...study.window import mean
 from .coupling_choice import CHOSEN, CouplingCandidate, tried, with_row
-from .row import CheckRow, NotChecked, Rule
+from .row import CheckRow, CheckRule, NotChecked
 from .runs import largest
 from .tables import FlexibleCouplingTable
 
@@ -157,21 +157,21 @@ def coupling_check(
 
 _IMPACT = "TL = mean; SZ = factors.start; St = factors.temperature"
 _RULES = {
-    "rated_torque": Rule(
+    "rated_torque": CheckRule(
         "rated", "rated torque", _CLAUSE, "TKN >= T St, T: RMS of steady running", "T = rms; St = factors.temperature"
     ),
-    "peak_torque": Rule(
+    "peak_torque": CheckRule(
         "peak", "peak torque ({run})", _CLAUSE, "TKmax >= (TL + (T - TL) SA SZ) St",
         f"T = largest; SA = factors.surge; {_IMPACT}",
     ),
-    "alternating_torque": Rule(
+    "alternating_torque": CheckRule(
         "alternating", "alternating torque", _CLAUSE, "TKW >= half range of sum V(f) Sf(f) T(f), times St",
         "rigid = swinging.rigid; elastic = swinging.elastic; fe = swinging.natural_frequency; "
         "St = factors.temperature",
     ),
 }  # fmt: skip
 """By the key of the limit."""
-_PASSAGE = Rule(
+_PASSAGE = CheckRule(
     "passage", "passage through resonance", _CLAUSE, "TKmax >= (TL + Ti VR SZ) St",
     f"Ti = swinging.passed; VR = factors.resonance; {_IMPACT}",
 )  # fmt: skip
@@ -267,7 +267,7 @@ def speed_row(of: CouplingCheck, table: FlexibleCouplingTable) -> CheckRow | Not
     if not table.largest_speed:
         return NotChecked("coupling, speed", "add [flexible_coupling] with largest_speed, by its maker")
     formula = "largest |w| of all runs <= permitted"
-    rule = Rule("speed", "speed", "Limit of the maker of the coupling", formula)
+    rule = CheckRule("speed", "speed", "Limit of the maker of the coupling", formula)
     return rule.row("coupling", "checks.flexible_coupling", of.duty, table.largest_speed)
 
 

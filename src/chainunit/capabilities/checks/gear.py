@@ -28,7 +28,7 @@ from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_torque
 from ...study.verdict import START
 from ...study.window import mean
-from .row import CheckRow, NotChecked, Rule
+from .row import CheckRow, CheckRule, NotChecked
 from .runs import largest
 from .tables import GearRatingTable, MotorShaftTable
 
@@ -38,24 +38,24 @@ if TYPE_CHECKING:
 _MAKER = "Rating of the maker of the gear"
 _TEQ = {True: "Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p)", False: "Teq: largest |T| of running"}
 _RUNNING = {
-    has_exponent: Rule(
+    has_exponent: CheckRule(
         "running", "torque of running", "ISO 6336-6:2019, annex on KA from a load spectrum",
         f"Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T|, both of steady "
         "running", "TN = rated_torque; p = exponent; KA = application_factor",
     )
     for has_exponent, teq in _TEQ.items()
 }  # fmt: skip
-_LARGEST = Rule(
+_LARGEST = CheckRule(
     "largest", "largest torque of the output ({run})", _MAKER, "T <= peak factor x TN",
     "TN = rated_torque; permitted = torque_limit",
 )  # fmt: skip
 _RATINGS = {
-    "thermal_power": Rule("power", "mean power", _MAKER, "mean of |P| <= thermal rating"),
-    "overhung_load": Rule("radial", "overhung load", _MAKER, "largest |F| of the bearing <= permitted"),
-    "largest_speed": Rule("speed", "speed of the input shaft", _MAKER, "largest |w| of all runs"),
+    "thermal_power": CheckRule("power", "mean power", _MAKER, "mean of |P| <= thermal rating"),
+    "overhung_load": CheckRule("radial", "overhung load", _MAKER, "largest |F| of the bearing <= permitted"),
+    "largest_speed": CheckRule("speed", "speed of the input shaft", _MAKER, "largest |w| of all runs"),
 }
 """By the key of the rating."""
-_EVENTS = Rule(
+_EVENTS = CheckRule(
     "largest_radial", "overhung load of all runs", _MAKER, "largest |F| of the bearing <= permitted in events"
 )
 _UNTURNED = "no pin of the machine turns with the output shaft"

@@ -13,16 +13,16 @@ import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
-from .row import CheckRow, NotChecked, Rule
+from .row import CheckRow, CheckRule, NotChecked
 
 _MAKER = "Limits of the maker of the bearing"
 _RULES = (
-    Rule(
+    CheckRule(
         "pressure", "pressure ({run})", "Specific load of ISO 7902-1; limit of the maker of the bearing",
         "p = F/(d b), F: largest force of all runs", "F = largest_force; d = diameter; b = width",
     ),
-    Rule("speed", "sliding speed", _MAKER, "v = d/2 |dphi/dt|, largest of steady running", "d = diameter"),
-    Rule(
+    CheckRule("speed", "sliding speed", _MAKER, "v = d/2 |dphi/dt|, largest of steady running", "d = diameter"),
+    CheckRule(
         "pv", "pressure times speed", _MAKER, "mean of F/(d b) d/2 |dphi/dt| over the time of steady running",
         "d = diameter; b = width",
     ),

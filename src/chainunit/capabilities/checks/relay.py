@@ -32,14 +32,14 @@ from ...study.relay import (
 from ...study.starts import StartFindings
 from ...study.verdict import STEADY
 from .plan import RelayPlan
-from .row import CheckRow, NotChecked, Rule
+from .row import CheckRow, CheckRule, NotChecked
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
 _STALL = f"{_CLAUSE}; locked-rotor time of the maker of the motor"
-_RUNNING = Rule(
+_RUNNING = CheckRule(
     "before", "running", "IEC 60947-4-1, limits of operation",
     f"RMS current of steady running <= {HOLDS_AT:g} Ir, at which the relay must not trip", "Ir = setting",
 )  # fmt: skip

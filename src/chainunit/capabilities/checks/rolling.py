@@ -19,11 +19,11 @@ from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...reading.text import number
 from ...study.bearings import EXPONENT, mean_load
-from .row import CheckRow, NotChecked, Rule
+from .row import CheckRow, CheckRule, NotChecked
 
 _ISO_281 = {"ball": "ISO 281:2007, 5.3", "roller": "ISO 281:2007, 7.3"}
 _LIFE = {
-    kind: Rule(
+    kind: CheckRule(
         "life", "rating life", _ISO_281[kind],
         f"L = a (C/P)^p 10^6 turns, p = {p}; P = (sum F^p |dphi| / sum |dphi|)^(1/p)",
         "a = life_factor; C = C; P = load; mean |dphi/dt| = speed", at_least=True,
@@ -31,17 +31,17 @@ _LIFE = {
     for kind, p in (("ball", "3"), ("roller", "10/3"))
 }  # fmt: skip
 _LOAD = {
-    kind: Rule(
+    kind: CheckRule(
         "load", "equivalent load", _ISO_281[kind],
         "P <= 0.5 C, and P <= C0: beyond it the formula of the life does not hold", "P = load; C = C; C0 = C0",
     )
     for kind in _ISO_281
 }  # fmt: skip
-_STATIC = Rule(
+_STATIC = CheckRule(
     "static_safety", "static safety ({run})", "ISO 76:2006, static safety factor",
     "S0 = C0/F, F: largest force of all runs", "C0 = C0; F = largest_force", at_least=True,
 )  # fmt: skip
-_SWING = Rule(
+_SWING = CheckRule(
     "swing", "swing", "Rumbarger and Jones 1968; Harris, Rolling Bearing Analysis",
     "theta >= 4 pi/(Z (1 - gamma)): below it false brinelling threatens, and the rating life does not hold",
     "least = critical_swing", at_least=True,

@@ -56,7 +56,7 @@ class NotChecked:
 
 
 @dataclasses.dataclass(frozen=True)
-class Rule:
+class CheckRule:
     """A check as data. `value` is the name of its number among those of a part; `letters` have by symbol of the
     `formula` the place of its number, from the place of the part on: "F = largest_force; d = diameter". Those of
     numbers that the part does not have are left out."""

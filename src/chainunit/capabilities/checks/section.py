@@ -19,7 +19,7 @@ from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, pin_force
 from ...study.readings import crank_torque, machine_series
 from ...study.record import StudyRecord
-from .row import CheckRow, NotChecked, Rule
+from .row import CheckRow, CheckRule, NotChecked
 from .runs import largest
 from .section_plan import SectionPlan
 from .section_strength import (
@@ -32,13 +32,13 @@ from .section_strength import (
 )
 from .tables import SectionTable
 
-_FATIGUE = Rule(
+_FATIGUE = CheckRule(
     "fatigue_safety", "safety against fatigue", "DIN 743-1:2012, safety against fatigue",
     "S = 1/sqrt((szda/szdADK + sba/sbADK)^2 + (tta/ttADK)^2)",
     "sba = bending; szda = tension; tta = torsion; sbADK = permitted_bending; szdADK = permitted_tension; "
     "ttADK = permitted_torsion", at_least=True,
 )  # fmt: skip
-_YIELD = Rule(
+_YIELD = CheckRule(
     "yield_safety", "safety against yield ({run})", "DIN 743-1:2012, safety against yield",
     "S = 1/sqrt((szd/szdFK + sb/sbFK)^2 + (tt/ttFK)^2), largest stresses of all runs",
     "sb = largest_bending; szd = largest_tension; tt = largest_torsion; sbFK = strength.yield_bending; "

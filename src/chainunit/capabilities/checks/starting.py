@@ -13,7 +13,7 @@ from ...study.permitted_starts import PermittedStarts, permitted_starts, startin
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
-from .row import CheckRow, NotChecked, Rule
+from .row import CheckRow, CheckRule, NotChecked
 from .tables import StartingTable
 
 _WHAT = "starts per hour by the rule of makers of motors"
@@ -44,9 +44,9 @@ def find(
 def starting_rows(of: PermittedStarts, is_chosen: bool = False) -> Iterator[CheckRow]:
     """The row of the starts; those of a motor that `is_chosen` are limited by the criteria of the choice, too."""
     choice = "; at most as many as the choice of the motor permits, by the heat of its winding"
-    rule = Rule(
+    rule = CheckRule(
         "per_hour", "starts per hour",
-        "Rule of makers of motors, Z = Z0 KJ KM KP (SEW-Eurodrive, Project planning for AC motors)",
+        "CheckRule of makers of motors, Z = Z0 KJ KM KP (SEW-Eurodrive, Project planning for AC motors)",
         f"Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM{choice if is_chosen else ''}",
         "Z0 = bare; ML = counter_torque; MH = motor_torque; I = current; IN = rated_current; FI = inertia_factor",
     )  # fmt: skip

@@ -9,6 +9,7 @@ class ComparisonCapability(Capability):
     """The capability, which reads results and no study file: it has a command alone."""
 
     name = "comparison"
+    order = 150
 
 
 CAPABILITY = ComparisonCapability()

@@ -20,6 +20,7 @@ class EnergyCapability(Capability):
     """The capability, with the table [usage]."""
 
     name = "energy"
+    order = 40
     tables = {  # noqa: RUF012
         "usage": FileSection(
             Usage,

@@ -32,6 +32,7 @@ class FlywheelCapability(Capability):
     """The capability, with the table [flywheel]."""
 
     name = "flywheels"
+    order = 80
     tables = {  # noqa: RUF012
         "flywheel": FileSection(
             FlywheelTable,

@@ -9,6 +9,7 @@ class HandoverCapability(Capability):
     """The capability, which reads results and no study file: it has a command alone."""
 
     name = "handover"
+    order = 170
 
 
 CAPABILITY = HandoverCapability()

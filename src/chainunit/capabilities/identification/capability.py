@@ -23,6 +23,7 @@ class IdentificationCapability(Capability):
     """The capability, with the table [identify]."""
 
     name = "identification"
+    order = 120
     tables = {  # noqa: RUF012
         "identify": FileSection(
             IdentifyTable,

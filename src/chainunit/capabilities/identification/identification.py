@@ -354,7 +354,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     columns = {name for run in runs for name in run.recording.columns}
     if (
         motor is not None
-        and issubclass(motor.kind, InductionMotor)
+        and motor.kind is InductionMotor
         and "motor.i" in columns
         and "motor.power" not in columns
     ):

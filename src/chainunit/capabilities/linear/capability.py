@@ -9,6 +9,7 @@ class LinearCapability(Capability):
     """The capability, which adds nothing to a study: it has a command alone."""
 
     name = "linear"
+    order = 160
 
 
 CAPABILITY = LinearCapability()

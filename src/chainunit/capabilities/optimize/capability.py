@@ -17,6 +17,7 @@ class OptimizeCapability(Capability):
     """The capability, with the table [optimize]."""
 
     name = "optimize"
+    order = 110
     tables = {  # noqa: RUF012
         "optimize": FileSection(
             Optimize,

@@ -74,7 +74,7 @@ FIELDS: Mapping[str, Any] = {
 def read_wishes(
     table: Optimize,
     form: Any,
-    model: type[MachineModel],
+    model: MachineModel,
     machine: Machine | None,
     feed: Any,
     crank_speed: float,
@@ -139,7 +139,7 @@ def wishes_of(plans: Mapping[str, Any]) -> Wishes:
 
 
 def _free(
-    tables: Mapping[str, Any], model: type[MachineModel], of_catalogue: bool, faults: Faults
+    tables: Mapping[str, Any], model: MachineModel, of_catalogue: bool, faults: Faults
 ) -> dict[str, tuple[float, float]]:
     variables = {v.name: v for v in model.parameter_layout.variables}
 
@@ -186,7 +186,7 @@ def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, 
     return low, high, unit_behind(variable.unit)
 
 
-def _limit(entry: Entry, name: str, model: type[MachineModel]) -> TurnLimit:
+def _limit(entry: Entry, name: str, model: MachineModel) -> TurnLimit:
     with refusal_prefix("optimize.limits: ", entry.place):
         q = cycle_quantity(name, model)
     variable = Variable(name, q.description, Quantity(q.unit, q.description))

@@ -30,6 +30,7 @@ class RandomOverloads(Capability):
     """The capability, with the table [monte_carlo]."""
 
     name = "random_overloads"
+    order = 70
     tables = {  # noqa: RUF012
         "monte_carlo": FileSection(
             MonteCarlo,

@@ -17,6 +17,7 @@ class SidesCapability(Capability):
     """The capability; it has no table, and comes with every machine that has organs on its sides."""
 
     name = "sides"
+    order = 50
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Overload factors, and the torques over the speed."""

@@ -34,6 +34,7 @@ class SizingCapability(Capability):
     """The capability, with the table [sizing]."""
 
     name = "sizing"
+    order = 20
     motor_table = "sizing"
     tables = {  # noqa: RUF012
         "sizing": FileSection(

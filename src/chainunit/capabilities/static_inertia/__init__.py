@@ -42,7 +42,7 @@ class StaticInertiaAnalysis(Analysis):
     def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the motor is chosen, and the machine has turns and an inertia of its angle alone."""
         machine, model = drive.machine, drive.machine.model
-        has_inertia = issubclass(model, InverseMachine) and model.States is None and model.turns
+        has_inertia = isinstance(model, InverseMachine) and model.States is None and model.turns
         is_whole = machine.simulated is machine and not drive.foreign_titles
         return bool(plans["static_inertia"]) and has_inertia and is_whole
 
@@ -64,6 +64,7 @@ class StaticInertiaCapability(Capability):
     """The capability; it comes with each choice of a motor."""
 
     name = "static_inertia"
+    order = 30
 
     def plan(self, reading: FileReading) -> bool:
         """Whether the study chooses the motor."""

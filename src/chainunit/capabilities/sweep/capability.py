@@ -18,6 +18,7 @@ class SweepCapability(Capability):
     """The capability, with the table [sweep]."""
 
     name = "sweep"
+    order = 140
     tables = {  # noqa: RUF012
         "sweep": FileSection(
             SweepTable,

@@ -21,7 +21,6 @@ from ...batch.evaluate import ReasonKind, StateReason, check_engine, reasons_of
 from ...core.brief import briefly_shown
 from ...core.errors import InputError
 from ...core.quantities import Layout, Quantity, Variable
-from ...core.system_description import reference
 from ...machines.machine import Machine
 from ...reading.results import InUnit
 from ...study.block_runs import BlockRuns, Cause
@@ -137,7 +136,7 @@ class SweepTask:
         plan = self.plan
         relevant: dict[str, Any] = {
             "chainunit": __version__,
-            "model": reference(self.machine.model),
+            "model": self.machine.model.identity,
             "machine": self.machine.by_name,
             "feed": Layout(type(self.feed)).by_name(self.feed),
             "crank_speed": self.crank_speed,

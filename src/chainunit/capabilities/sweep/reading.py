@@ -57,7 +57,7 @@ class Sweepable:
 
 
 def read_plan(
-    form: Any, table: SweepTable, model: type[MachineModel], quantities: Sweepable, fixed: Mapping[str, str]
+    form: Any, table: SweepTable, model: MachineModel, quantities: Sweepable, fixed: Mapping[str, str]
 ) -> SweepPlan:
     """The plan of a checked table [sweep]: its `form` with what the file gives, and its declared values `table`.
 
@@ -113,7 +113,7 @@ def _best_is(form: Any, best: str) -> str:
     return str(form.best_is)
 
 
-def _check_results(form: Any, model: type[MachineModel]) -> None:
+def _check_results(form: Any, model: MachineModel) -> None:
     """Refuse names that are no quantities and no measures."""
     faults = Faults()
     for name in dict.fromkeys(form.quantities):

@@ -22,6 +22,7 @@ class TorsionCapability(Capability):
     """The capability, with the table [torsion]."""
 
     name = "torsion"
+    order = 90
     tables = {  # noqa: RUF012
         "torsion": FileSection(
             TorsionTable,

@@ -9,6 +9,7 @@ class VouchingCapability(Capability):
     """The capability, which adds nothing to a study: it has commands alone."""
 
     name = "vouching"
+    order = 180
 
 
 CAPABILITY = VouchingCapability()

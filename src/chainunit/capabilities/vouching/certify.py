@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element
 
-from ... import __version__, machines
+from ... import __version__
 from ...core.errors import InputError, RunError, printable
 from ...core.inputs import ARCHIVE, file_bytes
 from ...core.model import Model
@@ -18,7 +16,7 @@ from ...fmu.description import Interface, Signal
 from ...fmu.pack import interface_of, xml_bytes
 from ...fmu.reference import REFERENCE, RELATED, related_files
 from ...fmu.script import Names, name_in_fmu
-from ...mechanism.models import MACHINES
+from ...models import MODELS
 from . import experiments as ex
 from .archive import archives_in, contents, signed
 from .integrity import EVIDENCE
@@ -53,7 +51,7 @@ def is_of_this_version(members: Mapping[str, bytes]) -> bool:
 
 
 def certified(
-    members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None
+    members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: Model | None
 ) -> tuple[bytes, list[str]]:
     """The certified file with these members, an FMU or an SSP package, and sentences on what it carries.
 
@@ -97,7 +95,7 @@ def _related(members: Mapping[str, bytes]) -> bytes:
 
 
 def _evidence(
-    members: Mapping[str, bytes], name: str, model: type[Model] | None
+    members: Mapping[str, bytes], name: str, model: Model | None
 ) -> tuple[dict[str, Any], list[str]]:
     """The content of evidence.json of an FMU, and the same in sentences."""
     with unpacked(members, name) as fmu:
@@ -122,18 +120,7 @@ def _evidence(
     return evidence, sentences
 
 
-def packaged_model(name: str) -> type[Model] | None:
-    """The packaged model of that name, or None. For a machine no module after its own is imported: all take long."""
-    for module in iter_modules(machines.__path__):
-        import_module(f"{machines.__name__}.{module.name}")
-        if name in MACHINES:
-            return MACHINES[name]
-    from ...models import MODELS
-
-    return MODELS.get(name)
-
-
-def interface_in(fmu: UnpackedFmu, model: type[Model] | None = None) -> Interface | None:
+def interface_in(fmu: UnpackedFmu, model: Model | None = None) -> Interface | None:
     """The interface of the model with the start values of the FMU, whose variables get the names of the model; None
     for a model that this package does not know.
 
@@ -148,7 +135,7 @@ def interface_in(fmu: UnpackedFmu, model: type[Model] | None = None) -> Interfac
 
         rods = sum(name.startswith(name_in_fmu("left.theta_", names)) for name in fmu.variables)
         model = with_rods(rods, fmu.start("parameter"))
-    if (model := model or packaged_model(fmu.name)) is None:
+    if (model := model or MODELS.get(fmu.name)) is None:
         return None
     if names == "flat":
         fmu.rename({s.name: name_in_fmu(s.name, names) for s in Interface(model, {}).signals})

@@ -59,7 +59,7 @@ def verify(
     ] = None,
     no_run: Annotated[
         bool,
-        typer.Option("--no-run", help="Check bytes and equations alone; no code of the FMU is run."),
+        typer.Option("--no-run", help="Inspection bytes and equations alone; no code of the FMU is run."),
     ] = False,
     of: _Of = None,
 ) -> None:
@@ -90,7 +90,8 @@ def _model(file: Path | None, progress: Any) -> Any:
     """The model of a study file or linkage file."""
     if file is None:
         return None
-    from ...study.package import is_study_file, model_and_start
+    from ...models import is_study_file
+    from ...study.package import model_and_start
 
     loaded = study_file(file) if is_study_file(str(file)) else None
     return model_and_start(str(file), loaded, progress=progress)[0]

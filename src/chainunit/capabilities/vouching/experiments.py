@@ -205,7 +205,7 @@ def _turn(interface: Interface, inputs: dict[str, float], gear: float, k: int) -
 
 
 def outputs_at(
-    model: type[Model], parameters: Mapping[str, float], inputs: Mapping[str, float]
+    model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float]
 ) -> dict[str, float] | None:
     """The states and outputs at the start by the equations in Python; None if there is no machine."""
     try:

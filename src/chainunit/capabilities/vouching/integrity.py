@@ -29,7 +29,7 @@ class Finding(NamedTuple):
 
 
 @dataclass
-class Check:
+class Inspection:
     """What a check found so far; the members can be trusted if all of it holds."""
 
     members: Mapping[str, bytes] = field(default_factory=dict)
@@ -47,10 +47,12 @@ class Check:
         self.findings.append(Finding(holds, topic, sentence, left_open))
 
 
-def check_bytes(data: bytes, name: str, key: bytes | None = None, whose: str = "the expected key") -> Check:
+def check_bytes(
+    data: bytes, name: str, key: bytes | None = None, whose: str = "the expected key"
+) -> Inspection:
     """Check the bytes of a file of that `name`; never an error, whatever they are. `key` is the public key that must
     have signed: that of whom the receiver expects the signature, or as the text `whose` says."""
-    check, faults = Check(), list[str]()
+    check, faults = Inspection(), list[str]()
     try:
         check.members = contents(data, name)
     except InputError as error:
@@ -63,7 +65,7 @@ def check_bytes(data: bytes, name: str, key: bytes | None = None, whose: str = "
     return check
 
 
-def _check_signature(check: Check, data: bytes, key: bytes | None, whose: str, is_read: bool) -> None:
+def _check_signature(check: Inspection, data: bytes, key: bytes | None, whose: str, is_read: bool) -> None:
     holds, sentence, left = False, "the file is not signed; chainunit vouch certify FILE signs one", ""
     if signature := signature_of(data):
         message, public, number = signature

@@ -14,10 +14,11 @@ from ...core.errors import InputError, RunError, printable, shown
 from ...core.inputs import ARCHIVE, file_bytes, json_of, refuse_large_archive
 from ...core.model import Model
 from ...fmu.description import Interface
+from ...models import MODELS
 from . import certify
 from . import experiments as ex
 from .archive import LOCAL, archives_in, contents
-from .integrity import EVIDENCE, Check, Finding, check_bytes
+from .integrity import EVIDENCE, Finding, Inspection, check_bytes
 from .runs import NoLibraryError, UnpackedFmu, make_runnable, unpacked
 
 NOT_RUN = "experiments"
@@ -25,9 +26,7 @@ NOT_RUN = "experiments"
 _UNRUN = "experiments were not run"
 
 
-def verify(
-    file: Path, key: bytes | None, model: type[Model] | None = None, *, run: bool = True
-) -> list[Finding]:
+def verify(file: Path, key: bytes | None, model: Model | None = None, *, run: bool = True) -> list[Finding]:
     """Check a certified file line by line.
 
     Parameters
@@ -51,7 +50,7 @@ def verify(
     return check.findings
 
 
-def _judge(check: Check, name: str, model: type[Model] | None, unrun: str) -> None:
+def _judge(check: Inspection, name: str, model: Model | None, unrun: str) -> None:
     """Add the lines after those on the bytes, if these hold; `unrun` tells why no code of the file runs, empty if it
     may."""
     if not check.holds:
@@ -76,7 +75,7 @@ def _judge(check: Check, name: str, model: type[Model] | None, unrun: str) -> No
         check.add(False, "evidence", f"{EVIDENCE}: is not of the form that this version writes")
 
 
-def _judge_system(check: Check, name: str, unrun: str) -> None:
+def _judge_system(check: Inspection, name: str, unrun: str) -> None:
     """The FMUs of an SSP package that are certified themselves; the key must be that of the package."""
     if not (archives := archives_in(check.members)):
         check.add(None, "FMUs", "the package has none", "nothing in it was judged")
@@ -92,10 +91,12 @@ def _judge_system(check: Check, name: str, unrun: str) -> None:
 
 
 def _judge_fmu(
-    check: Check, fmu: UnpackedFmu, stated: Mapping[str, Any], model: type[Model] | None, unrun: str
+    check: Inspection, fmu: UnpackedFmu, stated: Mapping[str, Any], model: Model | None, unrun: str
 ) -> None:
     """Add a line for each part. Code of the FMU runs only if all else holds, and `unrun` gives no reason."""
-    tables, interface = ex.tables_in(fmu), certify.interface_in(fmu, model)
+    # the names of the model come with it, and the tables have them
+    interface = certify.interface_in(fmu, model)
+    tables = ex.tables_in(fmu)
     experiments, limit = ex.Experiments(tables), ex.tolerance(interface)
     if interface is None:
         remedy = "name its file by --of"
@@ -125,7 +126,7 @@ def _faults(
 ) -> list[str]:
     """What is wrong with the evidence: it must state the deviation in each experiment, as a number within the limit
     here. A model that is no packaged one may have been unknown where the FMU was certified, without points."""
-    faults, is_packaged = [], certify.packaged_model(name) is not None
+    faults, is_packaged = [], name in MODELS
     if stated["model"] != name:
         faults.append(f"model = {shown(stated['model'])}: must be that of the FMU, {shown(name)}")
     topics = {"reference experiment"} if has_reference else set()
@@ -139,7 +140,7 @@ def _faults(
     return faults
 
 
-def _run(check: Check, fmu: UnpackedFmu, experiments: ex.Experiments, limit: float) -> None:
+def _run(check: Inspection, fmu: UnpackedFmu, experiments: ex.Experiments, limit: float) -> None:
     try:
         if sentence := make_runnable(fmu):
             check.add(None, "library", sentence, "its own library was not run")

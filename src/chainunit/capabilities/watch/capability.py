@@ -35,6 +35,7 @@ class WatchCapability(Capability):
     """The capability, with the tables [watch] and [observer]."""
 
     name = "watch"
+    order = 130
     tables = {  # noqa: RUF012
         "watch": FileSection(
             WatchTable,

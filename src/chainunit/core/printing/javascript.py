@@ -92,7 +92,7 @@ def program(models: Mapping[str, str]) -> str:
     return f'(() => {{\n"use strict";\n{_HEAD}{_elementary()}{numbers}{steps}return {{\n{rows}\n}};\n}})()'
 
 
-def model_text(model: type[Model], columns: Sequence[str] | None = None, derives: bool = True) -> str:
+def model_text(model: Model, columns: Sequence[str] | None = None, derives: bool = True) -> str:
     """The text of a model, deterministic to the byte.
 
     Parameters

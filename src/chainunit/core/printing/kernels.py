@@ -32,12 +32,12 @@ class ModelFunction:
     frequency: str
 
 
-def frequent_outputs(model: type[Model]) -> set[str]:
+def frequent_outputs(model: Model) -> set[str]:
     """The outputs that are read at every step: the members of the terminals."""
     return {name for terminal in model.terminals for name in terminal.members.values()}
 
 
-def output_groups(model: type[Model]) -> list[list[int]]:
+def output_groups(model: Model) -> list[list[int]]:
     """Outputs that are evaluated together, as places among the declared outputs: last all discrete ones."""
     lists: list[list[int]] = []
     terminal_outputs, discrete, at = frequent_outputs(model), [], 0
@@ -56,7 +56,7 @@ def output_groups(model: type[Model]) -> list[list[int]]:
     return [*lists, discrete] if discrete else lists
 
 
-def difference_groups(model: type[Model]) -> set[int]:
+def difference_groups(model: Model) -> set[int]:
     """The groups without code for their derivatives, see `chainunit.core.model.Part`."""
     places = [name for part in model.parts for name in part.layout.names]
     names = {name for part in model.parts for name in part.by_differences}
@@ -112,7 +112,7 @@ def kernels(
         yield one("derive", "p", derived)
 
 
-def groups_without_slopes(model: type[Model]) -> set[int]:
+def groups_without_slopes(model: Model) -> set[int]:
     """The groups of outputs whose derivatives ``forward`` does not have: those by differences, and discrete ones."""
     places = [v for part in model.parts for v in part.layout.variables]
     groups = output_groups(model)

@@ -1,6 +1,4 @@
-"""Text of a function in Python from its statements, each ``aN=expression`` after those whose names it has. Python FMUs
-carry this file.
-"""
+"""Functions in Python from statements ``aN=expression``, each after those that it needs. Python FMUs carry it."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ _NAME = re.compile(r"\ba\d+\b")
 
 
 def function_text(head: str, statements: Sequence[str], results: Sequence[str]) -> str:
-    """The function that begins with `head` and gives a tuple of these expressions, by the statements that they need."""
+    """The function with this `head` that gives a tuple of these results, from the statements that they need."""
     uses = Counter(_NAME.findall(" ".join(results)))
     needed = []
     for name, _, expression in (statement.partition("=") for statement in reversed(statements)):

@@ -66,7 +66,7 @@ _VERSIONS = {
 
 
 def export(
-    model: type[Model],
+    model: Model,
     file: Path,
     start: dict[str, float] | None = None,
     *,

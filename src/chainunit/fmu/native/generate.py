@@ -30,7 +30,7 @@ def kernels(interface: Interface) -> tuple[str, int]:
 
 
 @lru_cache(maxsize=16)
-def _kernels(model: type[Model]) -> tuple[str, int]:
+def _kernels(model: Model) -> tuple[str, int]:
     programs = list(_programs(shared_interface(model)))
     table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
     text = "\n".join([_BEFORE_KERNELS, *(program.text for program in programs), _TABLE, *table, "};", ""])

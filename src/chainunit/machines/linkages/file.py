@@ -59,7 +59,7 @@ _DRIVES = ("gear", "belt", "chain", "cam", "rack", "rolling")
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 
 
-def read_linkage(file: Path) -> type[InverseMachine]:
+def read_linkage(file: Path) -> InverseMachine:
     """The model of the machine in a linkage file.
 
     Raises
@@ -78,7 +78,7 @@ def read_linkage(file: Path) -> type[InverseMachine]:
     return machine
 
 
-def linkage_in(file: Path) -> tuple[type[InverseMachine], tuple[UnusualValue, ...]]:
+def linkage_in(file: Path) -> tuple[InverseMachine, tuple[UnusualValue, ...]]:
     """The model of the machine in a linkage file, and the values of the file that are of an unusual size.
 
     Raises

@@ -11,14 +11,16 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any, cast
 
-from ...core.engines import MATH
-from ...core.errors import GeometryError, InputError
+import numpy as np
+
+from ...core.engines import MATH, numpy_
+from ...core.errors import InputError
 from ...core.messages import unit_behind
-from ...core.model import About, FmuData, Making, Requirement, keep
+from ...core.model import About, FmuData, Requirement
 from ...core.planar import ZERO
 from ...core.quantities import Value, declared_class, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
@@ -29,7 +31,6 @@ from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
 from ...mechanism.expressions import expression, value_of
 from ...mechanism.extremes import MotionExtreme
-from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, words_on_motion
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
@@ -60,7 +61,7 @@ _FIXED_RATIO = (
 )
 
 
-def machine_of(data: Mapping[str, Any]) -> type[InverseMachine]:
+def machine_of(data: Mapping[str, Any]) -> InverseMachine:
     """The model of a description; equal descriptions have one model.
 
     Raises
@@ -72,9 +73,23 @@ def machine_of(data: Mapping[str, Any]) -> type[InverseMachine]:
 
 
 @cache
-def _machine_of(text: str) -> type[InverseMachine]:
+def _machine_of(text: str) -> InverseMachine:
     # of the text: the entries have one order, whatever that of the file is
     return LinkageDescription(json.loads(text)).model()
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FileMachine(InverseMachine):
+    """The model of a linkage file."""
+
+    described_by: LinkageDescription
+
+
+def _places_without(effect: Any, q: Any) -> Any:
+    """The numbers of the places `q` at which a load has no value, or an infinite one, ascending."""
+    numbers = [x for w in effect.wrenches for x in (w.force.x, w.force.y, w.moment)]
+    finite = [np.broadcast_to(np.isfinite(x), q.shape) for x in numbers]
+    return np.flatnonzero(~np.all(finite, axis=0))
 
 
 class LinkageDescription(LinkageOutputs):
@@ -254,26 +269,23 @@ class LinkageDescription(LinkageOutputs):
         InputError
             in one line, for the first such load.
         """
-        linkage = self.linkage(MATH, p, self.Inputs())
-        loads = {each["name"]: linkage.loads[name_of_load(each)] for each in self.data["loads"]}
+        xp, q = numpy_(), np.array(self.places())
+        linkage = self.linkage(xp, p, self.Inputs())
+        loads = {load["name"]: linkage.loads[name_of_load(load)] for load in self.data["loads"]}
         laws = {name: law for name, law in loads.items() if isinstance(law, ForceLaw | TorqueLaw)}
-        for q in self.places() if laws else ():
-            m = Mechanism(MATH, linkage, q, getattr(p, "derived", ()))
-            for name, law in laws.items():
-                try:
-                    effect = law.effect(MATH, m, speed, {})
-                    numbers = [
-                        x for each in effect.wrenches for x in (each.force.x, each.force.y, each.moment)
-                    ]
-                except (ArithmeticError, ValueError):
-                    numbers = [math.nan]
-                if not all(map(math.isfinite, numbers)):
-                    unit = "m/s" if self.way.linear else "rad/s"
-                    key = f"loads.{name}.{'torque' if isinstance(law, TorqueLaw) else 'force'}"
-                    raise InputError(
-                        f"has no value, or an infinite one, at {self.way.words(q)} and a speed of {speed:.6g} {unit}",
-                        key=key,
-                    )
+        if not laws:
+            return
+        with np.errstate(all="ignore"):
+            m = Mechanism(xp, linkage, q, getattr(p, "derived", ()))
+            faults = {name: _places_without(law.effect(xp, m, speed, {}), q) for name, law in laws.items()}
+        first = min(faults, key=lambda name: faults[name][:1].tolist() or [len(q)])
+        if faults[first].size:
+            unit = "m/s" if self.way.linear else "rad/s"
+            key = f"loads.{first}.{'torque' if isinstance(laws[first], TorqueLaw) else 'force'}"
+            place = self.way.words(float(q[faults[first][0]]))
+            raise InputError(
+                f"has no value, or an infinite one, at {place} and a speed of {speed:.6g} {unit}", key=key
+            )
 
     def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
         """The angle of a link for a load; None where the load does not depend on it."""
@@ -357,9 +369,9 @@ class LinkageDescription(LinkageOutputs):
         force = force or 1.0
         return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 
-    def model(self) -> type[InverseMachine]:
+    def model(self) -> InverseMachine:
         """The model."""
-        data, described = self.data, self
+        data = self.data
         parts = self.parts(MATH, self.Parameters(), self.Inputs())
         bearings = {self.variable("joint", name): parts.receivers[name][0] for name in self.structure.joints}
         titles = {name: self.variable("joint", name) for name in self.structure.joints}
@@ -384,58 +396,37 @@ class LinkageDescription(LinkageOutputs):
             for each in of
         ) + tuple(requirement_of_width(*each, given) for each in self.widths)
 
-        class FileMachine(InverseMachine):
-            __doc__ = f"{data['title'] or data['name']}."
-            name = data["name"]
-            noun = data["title"] or data["name"]
-            driver_noun = data["driver"]["link"]
-            description = data["title"] or f"linkage {data['name']}"
-            direct_description = words_on_motion(f"{noun}, moving by itself", described.port)
-            made = Making(machine_of, (data,))
-            fmu_data = FmuData(described.notes, About(**data.get("about", {})))
-            repeated = repeated_outputs(described.structure, described.variable)
-            constant = constant_outputs(described.structure, described.variable)
-            driver_port = described.port
-            span = described.span
-            turns, slides = described.way.turns, described.way.linear
-            end_stops = described.end_stops()
-            angle_counts = described.angle_counts
-            Parameters = described.Parameters
-            Inputs = described.Inputs
-            Outputs = described.outputs
-            joints = bearings
-            pins = titles
-            usual_speed = (0.05, 200.0)
-            described_by = described
-
-            @staticmethod
-            def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-                """The linkage with its loads, with the parameters `p` and the inputs `u`."""
-                return described.linkage(xp, p, u)
-
-            @classmethod
-            def check(cls, p: Any) -> Any:
-                """See `Model.check`; a refusal says where the linkage does not close."""
-                try:
-                    return super().check(p)
-                except GeometryError as error:
-                    where = described.obstacle(p)
-                    raise (GeometryError(where) if where else error) from None
-
-            @staticmethod
-            def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-                """Each group closes, clear of its dead positions."""
-                yield from described.limits(xp, p)
-
-            @staticmethod
-            def probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-                """The machine's outputs at the state `s` and the driver's acceleration `a` [rad/s2, m/s2]."""
-                return described.probes(xp, p, u, s, a)
-
-        FileMachine.required = required
-        FileMachine.__name__ = FileMachine.__qualname__ = data["name"]
-        keep(FileMachine, "Parameters", "Inputs", "Feed")
-        return FileMachine
+        title = data["title"] or data["name"]
+        return FileMachine(
+            name=data["name"],
+            text=f"{title}.",
+            noun=title,
+            driver_noun=data["driver"]["link"],
+            description=data["title"] or f"linkage {data['name']}",
+            direct_description=words_on_motion(f"{title}, moving by itself", self.port),
+            made=(machine_of, (data,)),
+            fmu_data=FmuData(self.notes, About(**data.get("about", {}))),
+            repeated=repeated_outputs(self.structure, self.variable),
+            constant=constant_outputs(self.structure, self.variable),
+            driver_port=self.port,
+            span=self.span,
+            turns=self.way.turns,
+            slides=self.way.linear,
+            end_stops=self.end_stops(),
+            angle_counts=self.angle_counts,
+            Parameters=self.Parameters,
+            Inputs=self.Inputs,
+            Outputs=self.outputs,
+            joints=bearings,
+            pins=titles,
+            usual_speed=(0.05, 200.0),
+            described_by=self,
+            linkage=self.linkage,
+            probes=self.probes,
+            required=required,
+            requirements=self.limits,
+            obstacle=self.obstacle,
+        )
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad, with

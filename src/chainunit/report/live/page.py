@@ -8,11 +8,11 @@ from ... import __version__
 from ...core.errors import InputError
 from ...machines.linkages.file import read_linkage
 from ...machines.machine import Machine
+from ...models import is_study_file
 from ...study.choice import choose
 from ...study.config import Config
 from ...study.config import load as load_study
 from ...study.linkage_turn import speed_of_driver
-from ...study.package import is_study_file
 from .. import blocks as b
 from ..lines import line
 from ..live_block import Live, LiveMachine

@@ -92,6 +92,7 @@ class DrivelinePart(PartOfLine):
     """The part, with the table [driveline]."""
 
     name = "driveline"
+    order = 10
     model = CardanDriveline
     tables = {  # noqa: RUF012
         "driveline": FileSection(

@@ -19,7 +19,7 @@ class PartOfLine(StudyCapability):
     """A part between motor and machine: the base of the one that each module of `chainunit.study.line` has by the
     name ``PART``. Beside a component it may have what a capability has: rules, checks, analyses."""
 
-    model: ClassVar[type[Model]]
+    model: ClassVar[Model]
     """its model, which becomes an FMU; with the terminals `driven` and `machine` on the side of the machine"""
 
     def placed(self, plan: Any, drive: Drive, turn: Cycle) -> PlacedPart | None:

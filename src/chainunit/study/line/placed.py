@@ -17,7 +17,7 @@ class PlacedPart:
     port of the part behind it and shows one to the part before it."""
 
     name: str
-    model: type[Model]
+    model: Model
     parameters: Any
     ratio: float = 1.0
     """turns of its shaft on the motor's side per turn of that on the machine's side"""
