@@ -166,7 +166,7 @@ def test_a_motor_whose_gear_misses_the_speed_starts_all_the_same(tmp_path):
     """Behind a gear for three quarters of the speed: the verdict speaks of the speed alone."""
     text = KNIFE.replace("1.5 kW, 90L", "3 kW, 100L").replace("efficiency = 1", "ratio = 49")
     study, verdict, warnings = studied(text, tmp_path)
-    assert not study.reaches and "speed-missed" in warnings
+    assert not study.reaches and {"speed-missed", "speed-by-slip"} & set(warnings)
     assert 0.7 < study.answers["steady"].speed_mean / study.config.run.crank_speed < 0.8
     check = motor_limits(study)["start"]
     assert 0.0 < check.utilisation < 1.0 and check.value == study.start.start_time

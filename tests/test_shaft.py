@@ -230,7 +230,7 @@ def test_the_report_shows_it(study, tmp_path):
     assert {
         "findings.shaft.jam_left.amplification",
         "findings.driveline.k_least",
-        "given.driveline.alpha1",
+        "findings.driveline.alpha1",
         "given.driveline.exponent",
         "findings.rigid_line.natural_frequency",
         "findings.rigid_line.driver_frequency",

@@ -12,13 +12,14 @@ import typing
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple, dataclass_transform
+from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
 from ..core.brief import briefly_shown
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import group, quantity
 from .text import array_entry, entry
 
+T = TypeVar("T")
 OWN = "own"
 """Unit of a part whose unit and kind are the fields `unit` and `kind` of the same result; it may have no kind."""
 
@@ -105,11 +106,11 @@ class _Derived(property):
 
 def derived(
     unit: str = "", kind: str = "", *, name: str = "", titled: bool = False, optional: bool = False
-) -> Callable[[Callable[[Any], Any]], Any]:
+) -> Callable[[Callable[[Any], T]], T]:
     """A decorator for a property that is in the data of a result, see `ResultPart`. Its docstring is the
-    description."""
+    description. A type checker takes the property for an attribute of the type that it gives."""
 
-    def declared(function: Callable[[Any], Any]) -> Any:
+    def declared(function: Callable[[Any], T]) -> Any:
         own = _Derived(function)
         words = " ".join((function.__doc__ or "").split()).removesuffix(".")
         words = words[:1].lower() + words[1:]

@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeAlias
 
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import Layout
-from ..reading.result_entries import PARTS, ResultEntries
+from ..reading.result_entries import PARTS
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
 from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
@@ -356,10 +356,8 @@ class Source:
         """Given values: the quantities that an instance or class declares and the result has at `path` (by default
         at `name`). A range gives two values, its ends."""
         path = path or name
-        if isinstance(self.result, ResultEntries) and PARTS[0] in self.result:
-            # findings may have the name of the table to which they belong
-            path = f"{PARTS[0]}.{path}"
-        entries = at(self.result, path)
+        # findings may have the name of the table to which they belong, and the numbers that follow from its values
+        entries = at(self.result, f"{PARTS[0]}.{path}" if PARTS[0] in self.result else path)
         cls = declaration if isinstance(declaration, type) else type(declaration)
         for v in Layout(cls).variables:
             if v.name in entries:

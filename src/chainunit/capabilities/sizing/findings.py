@@ -146,7 +146,7 @@ class SizingFindings(Findings):
             as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
             self.answer,
-            lambda study: self.sized(study).sentence,
+            lambda study: SizingFindings.of_study(study).sized(study).sentence,
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,

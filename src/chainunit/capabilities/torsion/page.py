@@ -61,7 +61,7 @@ def _numbers(analysis: LineAnalysis) -> Iterator[tuple[Line, Line]]:
     if analysis.operating.exists[0]:
         yield (
             "Floquet multiplier in normal running, per half turn (stable below 1)",
-            number(x.operation.motion.largest_multiplier[0], 4),
+            number(x.operation.motion.multiplier[0], 4),
         )
     else:
         yield "steady motion in normal running", "not found"
@@ -87,7 +87,10 @@ def _ranges(analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
             title = f"speed at which order {n} meets the natural frequency, {_OVER_BOTH}"
             yield title, *ends(*x.crossing_speeds[f"speed = k/{n}"])
     if analysis.operating.exists[0]:
-        for shaft, least, largest in ((2, motion.least2, motion.peak2), (3, motion.least3, motion.peak3)):
+        for shaft, least, largest in (
+            (2, motion.least2, motion.largest2),
+            (3, motion.least3, motion.largest3),
+        ):
             yield f"torque of shaft {shaft} in normal running", *ends(least[0], largest[0])
     for low, high in x.resonance.unstable:
         yield "speed at which the line is unstable", *ends(low, high)

@@ -1,0 +1,102 @@
+"""A cited result: the pieces that a page gets by attributes are those at the places of the result."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import chainunit
+from chainunit.core.quantities import Value, declaration, quantity
+from chainunit.reading.results import OWN, InUnit, as_data, derived, part, result
+from chainunit.report import blocks as b
+from chainunit.report.cited import as_name, cited, number, table
+from chainunit.report.lines import Name
+
+
+@declaration
+class Numbers:
+    speed: Value = quantity("rad/s", "speed", kind="speed")
+
+
+@result
+class Inner:
+    unit: str
+    kind: str = "percent"
+    size: float = part("size", unit=OWN, default=0.25)
+    name: str = part("name", default="web")
+
+
+@result
+class Outer:
+    numbers: Numbers = part(inline=True)
+    inner: list[Inner] = part("inner results", name="parts")
+    by_name: Mapping[str, InUnit] = part("numbers by name")
+    course: Any = quantity("N.m", "course")
+    ranges: list[tuple[float, float]] = quantity("s", "ranges")
+    share: float | None = quantity("1", "share")
+    none: Inner | None = part("nothing", default=None)
+    holds: bool = part("whether", default=True)
+    hidden: str = "hidden"
+
+    @derived("N")
+    def force(self) -> float:
+        """A force."""
+        return 3.0
+
+
+def outer():
+    inner = [Inner("1"), Inner("m", "millimetres", 2.0, "wall")]
+    course = np.array([1.0, np.nan])
+    return Outer(Numbers(speed=5.0), inner, {"a.b": InUnit(np.float64(7.0), "kg")}, course, [(1.0, 2.0)], None)
+
+
+def test_each_piece_is_that_of_its_place():
+    x, s = cited(outer()), b.Source(as_data(outer()))
+    assert number(x.numbers.speed) == s.number("speed") and number(x.force) == s.number("force")
+    for k in (0, 1):
+        assert number(x.inner[k].size) == s.number(f"parts.{k}.size")
+        assert x.inner[k].name == s.words(f"parts.{k}.name")
+    assert number(x.by_name["a.b"]) == s.number("by_name.a.b")
+    assert [number(each) for each in x.course] == [s.number("course", k) for k in (0, 1)]
+    assert [number(each) for each in x.ranges[0]] == [s.number("ranges", 0, k) for k in (0, 1)]
+    assert number(x.share, 4, none="-") == s.number("share", digits=4, none="-")
+    assert x.none is None and x.holds is True and x.hidden == "hidden"
+    assert number(cited(outer(), "findings.own").force).path == "findings.own.force"
+
+
+def test_a_name_that_is_none_and_a_text_that_is_no_number_are_refused():
+    x = cited(outer())
+    with pytest.raises(AttributeError, match="spead"):
+        print(x.numbers.spead)
+    with pytest.raises(AssertionError):
+        number(x.inner[0].name)
+    assert as_name(x.inner[0].name) == Name("web")
+
+
+def test_a_table_has_a_row_for_each_item():
+    x = cited(outer())
+    columns = (
+        ("name", lambda each: each.name),
+        (b.Column("size", form="long"), lambda each: number(each.size, 2)),
+    )
+    (whole,) = table(x.inner, *columns, title="Parts")
+    assert [column.form for column in whole.columns] == ["both", "long"] and whole.title == "Parts"
+    assert whole.rows[1].cells == (x.inner[1].name, number(x.inner[1].size, 2))
+    assert list(table([], *columns)) == []
+
+
+PATH = re.compile(r'\.(?:number|value)\(\s*f?"[a-z_]+(?:\.[a-z_0-9{}]+)+"')
+UNDECLARED = {"comparison/page.py": 1, "report/linkage_report.py": 3, "report/linkage_rest.py": 2}
+"""Reports on results that nobody declares: two results beside each other, and numbers in the unit of the driver."""
+
+
+def test_a_report_takes_no_number_of_a_declared_result_by_a_string_path():
+    for folder in ("report", "capabilities"):
+        for file in sorted((Path(chainunit.__file__).parent / folder).rglob("*.py")):
+            count = next((n for name, n in UNDECLARED.items() if file.as_posix().endswith(name)), 0)
+            assert len(PATH.findall(file.read_text("utf-8"))) == count, file
