@@ -705,6 +705,9 @@ def test_a_model_under_another_name_is_not_judged_by_itself(tmp_path, members, o
     renamed = text(b'modelName="ChamberForces"', b'modelName="Mine"')(evidence(model="Mine")(renamed))
     status, words = conclusion(list(checked(tmp_path, signed(renamed, other)).values()))
     assert (status, words) == (OPEN, "holds, but was not compared with its equations: name its file by --of")
+    fewer = text(b'name="frame.moment"', b'name="frame.other"')(renamed)
+    line = checked(tmp_path, signed(fewer, other))["evidence"]
+    assert line.holds is False and "frame.moment: is no variable of the FMU" in line.sentence
 
 
 def test_without_a_key_no_code_of_the_file_runs(made, tmp_path, members, other, monkeypatch):
