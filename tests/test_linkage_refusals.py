@@ -79,7 +79,7 @@ def test_a_least_value_by_rounding_is_the_least(tmp_path):
     """Friction is smoothed below a speed that is never zero."""
     file = tmp_path / "mine.toml"
     file.write_text(changed([("[start]", "[guides]\nfriction = 0.1\nv_smooth = 0\n[start]")]), "utf-8")
-    assert read_linkage(file)().Parameters().guides.v_smooth > 0.0
+    assert read_linkage(file).Parameters().guides.v_smooth > 0.0
 
 
 def test_names_of_parameters_may_hold_units(tmp_path):

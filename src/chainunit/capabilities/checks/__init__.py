@@ -32,6 +32,7 @@ class CheckCapability(Capability):
     """The capability, with a table for each kind of part that is checked."""
 
     name = "checks"
+    order = 100
     tables = {  # noqa: RUF012
         "bearing": of_named(BEARINGS),
         "section": of_named(SECTIONS),
