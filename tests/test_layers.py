@@ -79,6 +79,7 @@ BY_NAME = {
     "core.register",
     "study.registry",  # the modules in the folder of a capability
     "core.model",  # a model that pickle takes by its place
+    "study.remarks",  # the modules of capabilities, whose remarks the reference lists
 }
 """The modules that import others by name."""
 

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..drives.catalogue import CatalogueMotor
 from .drive import Drive
 from .drive_tables import DriveTables
 from .torques import DutyPeak
-
-if TYPE_CHECKING:
-    from .record import StudyRecord
 
 
 @dataclass(frozen=True)
@@ -32,8 +29,8 @@ class DriveProposal:
     """the question that it answers about the machine {noun}"""
     reason: str
     """the choice and its reason, in words"""
-    sentence: Callable[[StudyRecord], str]
-    """the sentence on the drive of a study with these runs"""
+    sentence: Callable[[Any], str]
+    """the sentence on the drive of a study by its `StudyRecord`"""
     insufficient: str = ""
     """the sentence on a study in which no drive fits, so that all is run with the nearest; empty where one fits"""
     keys: Mapping[str, str] = field(default_factory=dict)
