@@ -52,7 +52,9 @@ class Outer:
 def outer():
     inner = [Inner("1"), Inner("m", "millimetres", 2.0, "wall")]
     course = np.array([1.0, np.nan])
-    return Outer(Numbers(speed=5.0), inner, {"a.b": InUnit(np.float64(7.0), "kg")}, course, [(1.0, 2.0)], None)
+    return Outer(
+        Numbers(speed=5.0), inner, {"a.b": InUnit(np.float64(7.0), "kg")}, course, [(1.0, 2.0)], None
+    )
 
 
 def test_each_piece_is_that_of_its_place():

@@ -27,7 +27,7 @@ MOST_LINES, MOST_LETTERS = 12, 2000
 ANGLE = "crank angle from the upward vertical, clockwise [deg]"
 
 pytestmark = [
-    pytest.mark.second,
+    pytest.mark.slow,
     pytest.mark.filterwarnings("default"),
     pytest.mark.skipif(compiler() is None, reason="no C compiler"),
 ]
@@ -236,7 +236,6 @@ def test_a_plot_of_the_user_keeps_its_backend(study):
     study("matplotlib.use('Agg')")
 
 
-@pytest.mark.slow
 def test_other_doors_of_a_study(study):
     check_words(study("other = study.compare(study.with_values({'machine.r': '170 mm'}))\nother"))
     assert "steady.crank_torque_peak" in other_answers(study)
@@ -331,7 +330,6 @@ def test_a_sweep(notebook):
     check_figure(notebook("swept.figures['curves']"), "machine.r [m]")
 
 
-@pytest.mark.slow
 def test_a_search(notebook):
     result = notebook(
         "best = Study(optimize={'objectives': ['peak(crank_torque)'], 'starts': 1,\n"
@@ -367,7 +365,6 @@ def test_a_watched_recording(notebook):
     assert len(notebook("seen.alarms")) == 1
 
 
-@pytest.mark.slow
 def test_an_identified_machine(notebook):
     first, _, rest = MILL.partition("[[identify.run]]")
     sensors = (

@@ -14,7 +14,7 @@ import logging
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
@@ -119,8 +119,11 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     return files | {RELATED: xml_bytes(root)}
 
 
-def reference_tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]]]]:
-    """Head and rows of each file of reference results by the ending of its name, from the equations in Python.
+def reference_tables(
+    interface: Interface, *, traced: bool = True
+) -> dict[str, tuple[list[str], list[list[float]]]]:
+    """Head and rows of each file of reference results by the ending of its name, from the equations: `traced`, or in
+    Python, which is slower, and takes no casadi for a model without states.
 
     Raises
     ------
@@ -128,7 +131,7 @@ def reference_tables(interface: Interface) -> dict[str, tuple[list[str], list[li
         where the states run away or are too fast for the integrator, or a linkage does not close.
     """
     starts = tuple((s.variable.name, s.start) for s in interface.signals if s.start is not None)
-    return _tables(interface.model, cast(Hashable, interface.script), starts)
+    return _tables(interface.model, cast(Hashable, interface.script), starts, traced)
 
 
 def related_files(content: bytes | None = None) -> Element:
@@ -147,7 +150,7 @@ def related_files(content: bytes | None = None) -> Element:
 
 @lru_cache(maxsize=32)
 def _tables(
-    model: Model, script: type[Script], starts: tuple[tuple[str, float], ...]
+    model: Model, script: type[Script], starts: tuple[tuple[str, float], ...], traced: bool
 ) -> dict[str, tuple[list[str], list[list[float]]]]:
     """Head and rows of each file, which are the same for each version of FMI.
 
@@ -162,10 +165,10 @@ def _tables(
     layout = model.state_layout
     tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
 
+    outputs_at = (_traced_outputs if traced else _outputs)(interface, p)
+
     def outputs(t: float, u: Sequence[float], x: Sequence[float]) -> list[float]:
-        states = layout.instance(list(x)) if layout else None
-        parts = model.evaluate(MATH, p, model.input_layout.instance(list(u)), states)
-        values = [v for part, out in zip(model.parts, parts, strict=True) for v in part.layout.values(out)]
+        values = outputs_at(u, x)
         if not np.isfinite(values).all():
             raise ArithmeticError(f"an output is no finite number at t = {t:g} s")
         return [t, *x, *values]
@@ -191,6 +194,35 @@ def _tables(
             u[place] = model.input_layout.variables[place].quantity.within_bounds(moved)
     heads = {kind: ["time", *(s.name for s in interface.signals_of(kind))] for kind in ("input", "output")}
     return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
+
+
+_Outputs: TypeAlias = Callable[[Sequence[float], Sequence[float]], list[float]]
+"""A function of inputs and states that gives all outputs."""
+
+
+def _outputs(interface: Interface, p: Any) -> _Outputs:
+    """The outputs with the parameters `p`, by the equations in Python."""
+    model, layout = interface.model, interface.model.state_layout
+
+    def values(u: Sequence[float], x: Sequence[float]) -> list[float]:
+        states = layout.instance(list(x)) if layout else None
+        parts = model.evaluate(MATH, p, model.input_layout.instance(list(u)), states)
+        return [v for part, out in zip(model.parts, parts, strict=True) for v in part.layout.values(out)]
+
+    return values
+
+
+def _traced_outputs(interface: Interface, p: Any) -> _Outputs:
+    """The outputs with the parameters `p`, by the traced equations."""
+    import casadi
+
+    trace = interface.trace
+    equations = casadi.Function(
+        "outputs", trace.symbols, [casadi.densify(casadi.vertcat(*map(casadi.SX, trace.outputs)))]
+    )
+    parameters, derived = interface.model.parameter_layout.values(p), getattr(p, "derived", [])
+    # a zero without a sign
+    return lambda u, x: [float(v) + 0.0 for v in equations(parameters, u, x, derived).full().ravel()]
 
 
 def _march(interface: Interface, p: Any) -> Any:

@@ -59,7 +59,7 @@ def by_equations(interface: Interface) -> Experiments:
     """
     reference = None
     with contextlib.suppress(ArithmeticError, ValueError):
-        tables = reference_tables(interface)
+        tables = reference_tables(interface, traced=False)
         reference = tuple(_time_table(*tables[end]) for end in (INPUTS, STEPPED, READ))
     return Experiments(reference, chosen_points(interface))
 
