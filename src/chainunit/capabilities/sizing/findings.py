@@ -181,7 +181,9 @@ class SizingFindings(Findings):
             words = f"{decides.words}{decides.rule} takes one that permits {number(order.rated, 'N.m')} in running"
             listed = replace(listed, open=[f"The gear is too weak: {words}; {remedy}.", *listed.open])
         if best.motor.is_packaged:
-            words = "The motor is one of the packaged table, which is typical data: nobody sells it."
+            words = (
+                "The motor is one of the packaged table: typical values of no maker. Ask for offers to them."
+            )
             listed = replace(listed, open=[words, *listed.open])
         return listed
 

@@ -85,7 +85,7 @@ def _parts(drive: SizedDrive, x: SizedDrive) -> Iterator[b.Block]:
     """The parts to order from catalogues, with what these leave open."""
     if drive.parts is None or x.parts is None:
         words = (
-            "Order numbers: none, as motor and gear are typical data that nobody sells; order by these values, or "
+            "Order numbers: none, as motor and gear are typical values of no maker. Ask for offers to them, or "
             "give catalogues of makers (catalogue = [...])."
         )
         yield b.Text(words, "note", "long")

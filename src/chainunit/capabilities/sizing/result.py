@@ -239,7 +239,9 @@ class SizedDrive:
         ratio = number(best.ratio, "1", digits=4, full=False)
         parts = [
             f"{motor}: {best.designation}, ratio {ratio}{aside(best.gear_words)}",
-            f"flywheel on the motor shaft {best.flywheel_words}" if best.disc else "no flywheel",
+            f"flywheel on the motor shaft {best.flywheel_words}"
+            if best.disc
+            else "no flywheel on the motor shaft",
         ]
         if isinstance(protection, MotorProtection):
             setting = protection.relay_current
