@@ -50,17 +50,17 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {kind: getattr(np, name) for kind, n
 def run(operations: Operations, arguments: Mapping[Entry, Any]) -> list[list[Any]]:
     """The results by group; `arguments` are arrays whose shapes broadcast, by entry. A value is forgotten after
     its last use."""
-    last = {k: n for n, each in enumerate(operations.items) for k in each.operands}
+    last = {k: n for n, operation in enumerate(operations.items) for k in operation.operands}
     keep = {place for group in operations.results for place in group}
     values: dict[int, Any] = {}
-    for n, each in enumerate(operations.items):
-        if each.kind == NUMBER:
-            values[n] = np.float64(each.value)
-        elif each.kind == ARGUMENT:
-            values[n] = arguments[each.entry]
+    for n, operation in enumerate(operations.items):
+        if operation.kind == NUMBER:
+            values[n] = np.float64(operation.value)
+        elif operation.kind == ARGUMENT:
+            values[n] = arguments[operation.entry]
         else:
-            values[n] = _FUNCTIONS[each.kind](*(values[k] for k in each.operands))
-            for k in each.operands:
+            values[n] = _FUNCTIONS[operation.kind](*(values[k] for k in operation.operands))
+            for k in operation.operands:
                 if last[k] == n and k not in keep:
                     values.pop(k, None)
     return [[values[place] for place in group] for group in operations.results]

@@ -47,7 +47,7 @@ class Equations:
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of parameters, inputs and states."""
         layouts = (self.model.parameter_layout, self.model.input_layout, self.model.state_layout)
-        p, u, x = (len(of.names) if of else 0 for of in layouts)
+        p, u, x = (len(layout.names) if layout else 0 for layout in layouts)
         return p, u, x
 
     def place(self, entry: tuple[int, int]) -> int:
@@ -63,7 +63,7 @@ def columns_of(model: Model) -> tuple[Variable, ...]:
 def arguments_of(model: Model) -> tuple[Variable, ...]:
     """All parameters, inputs and states of a model in declared order."""
     layouts = (model.parameter_layout, model.input_layout, model.state_layout)
-    return tuple(v for of in layouts if of for v in of.variables)
+    return tuple(v for layout in layouts if layout for v in layout.variables)
 
 
 def names_of(variables: Iterable[Variable]) -> list[str]:

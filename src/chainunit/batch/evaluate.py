@@ -63,7 +63,10 @@ def reasons_of(model: Model) -> list[StateReason]:
     """The reasons of a model by their codes; those of values outside their bounds follow them."""
     return [
         StateReason(ReasonKind.NONE),
-        *(StateReason(ReasonKind.REQUIREMENT, each.subject, each.why) for each in model.required),
+        *(
+            StateReason(ReasonKind.REQUIREMENT, requirement.subject, requirement.why)
+            for requirement in model.required
+        ),
         StateReason(ReasonKind.POSITION),
     ]
 
@@ -133,17 +136,19 @@ def evaluate(
             raise InputError("reduce: needs the dimension `over`, and takes the place of `outputs` and `by`")
         outputs = list(reduce)
     names = texts_in("outputs", outputs) if outputs is not None else tuple(v.name for v in outputs_of(model))
-    own = equations(model, names, texts_in("by", by))
-    reduced = _reduced(reduce or {}, own.results)
-    grid = Grid(own, values, parameters, over, engine, reduced)
+    traced = equations(model, names, texts_in("by", by))
+    reduced = _reduced(reduce or {}, traced.results)
+    grid = Grid(traced, values, parameters, over, engine, reduced)
     try:
         memory = grid.memory(out)
         grid.compute(memory, workers or os.cpu_count() or 1)
         return grid.dataset(memory, on_host)
     except MemoryError as error:
-        size = 8e-9 * math.prod(grid.sizes.values()) * len(own.results)
-        words = f"{size:.3g} GB of results: more than there is memory; evaluate fewer states, or reduce them"
-        raise RunError(words) from error
+        size = 8e-9 * math.prod(grid.sizes.values()) * len(traced.results)
+        message = (
+            f"{size:.3g} GB of results: more than there is memory; evaluate fewer states, or reduce them"
+        )
+        raise RunError(message) from error
 
 
 def check_engine(engine: str) -> None:
@@ -232,13 +237,13 @@ class Grid:
         model = equations.model
         self._equations, self._engine, self._reduced = equations, engine, reduced
         places = find(texts_in("values", values), names_of(equations.arguments), "parameter, input or state")
-        given = {
+        variations = {
             name: _array(equations.arguments[k], x)
             for k, (name, x) in zip(places, values.items(), strict=True)
         }
         self.sizes: dict[str, int] = {}
         self._coords: dict[str, Any] = {}
-        for name, x in given.items():
+        for name, x in variations.items():
             if engine != "cuda" and on_device(x.data):
                 raise InputError(f"{name}: is on the GPU; take engine 'cuda', or give its values of numpy")
             for dim, size in x.sizes.items():
@@ -247,7 +252,7 @@ class Grid:
                         f"{name}: has {size} values over {dim}, another one has {self.sizes[str(dim)]}"
                     )
             self._coords |= {str(k): c for k, c in x.coords.items()}
-        self._name_places(given)
+        self._name_places(variations)
         if over is not None and over not in self.sizes:
             raise InputError(
                 f"over = {over!r}: no such dimension; there are {', '.join(self.sizes) or 'none'}"
@@ -261,16 +266,18 @@ class Grid:
             base |= model.parameter_layout.by_name(parameters)
         items = equations.operations.items
         self._needed = {
-            equations.arguments[equations.place(each.entry)].name for each in items if each.kind == ARGUMENT
+            equations.arguments[equations.place(operation.entry)].name
+            for operation in items
+            if operation.kind == ARGUMENT
         }
         self._bounds: list[tuple[str, Any]] = []
-        self._arguments = [self._flat(v, given.get(v.name), base[v.name]) for v in equations.arguments]
+        self._arguments = [self._flat(v, variations.get(v.name), base[v.name]) for v in equations.arguments]
 
-    def _name_places(self, given: Mapping[str, xr.DataArray]) -> None:
+    def _name_places(self, variations: Mapping[str, xr.DataArray]) -> None:
         """Give each dimension along which one argument alone varies, and which has no coordinate, the values of this
         argument as its coordinate."""
         for dim in set(self.sizes) - set(self._coords):
-            along = [x for x in given.values() if dim in x.dims]
+            along = [x for x in variations.values() if dim in x.dims]
             if len(along) == 1 and along[0].ndim == 1:
                 self._coords[dim] = along[0].variable
 
@@ -359,7 +366,7 @@ class Grid:
 
     def compute(self, memory: Memory, workers: int) -> None:
         """Fill the memory with results and reasons."""
-        own, (outer, inner), reduced = self._equations, self.size, self._reduced
+        traced, (outer, inner), reduced = self._equations, self.size, self._reduced
         if not outer:
             return
         entries = self._entries()
@@ -377,9 +384,9 @@ class Grid:
             states = memory
             if reduced:
                 states = Memory(
-                    np.empty((len(own.results), outer, inner)), np.zeros((outer, inner), np.int16)
+                    np.empty((len(traced.results), outer, inner)), np.zeros((outer, inner), np.int16)
                 )
-            arrays.by_numpy(own.operations, entries, states.results, states.reason, own.not_finite)
+            arrays.by_numpy(traced.operations, entries, states.results, states.reason, traced.not_finite)
             if reduced:
                 self._reduce(states, memory)
         self._refuse(memory)

@@ -117,8 +117,8 @@ class NativeKernel:
 
         pieces = _pieces(outer, inner, workers, divide=reason.ndim > 1)
         if workers == 1 or len(pieces) == 1:
-            for each in pieces:
-                piece(each)
+            for result in pieces:
+                piece(result)
         else:
             list(threads(workers).map(piece, pieces))
 
@@ -188,5 +188,5 @@ def native_kernel(
     RunError
         where the compiler fails.
     """
-    own = compiler()
-    return None if own is None else NativeKernel(equations, varying, reductions, own)
+    local_compiler = compiler()
+    return None if local_compiler is None else NativeKernel(equations, varying, reductions, local_compiler)

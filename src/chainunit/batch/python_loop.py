@@ -106,13 +106,13 @@ class PythonLoop:
         state = np.array(x, float)
         evaluated = {function: _Evaluation(function, (p, u, state)) for function in self._functions}
 
-        def at(function: Any, t: float, states: Sequence[float]) -> list[float]:
+        def values_at(function: Any, t: float, states: Sequence[float]) -> list[float]:
             for k, row in moving:
                 u[self._driven[k]] = _signal_at(row, t)
             state[:] = states
             return evaluated[function]()
 
-        now, pace, rows = [float(each) for each in x], 0.0, out.shape[-1]
+        now, pace, rows = [float(start) for start in x], 0.0, out.shape[-1]
         for n in range(rows):
             if n:
                 following = min(ends[0] + n * step, stop)
@@ -120,12 +120,12 @@ class PythonLoop:
                     return n
                 try:
                     now, pace = self._advanced(
-                        at, now, time, following - time, pace, longest, tolerance, most
+                        values_at, now, time, following - time, pace, longest, tolerance, most
                     )
                 except ArithmeticError:
                     now = [math.nan] * len(now)
                 time = following
-            out[:, n] = at(self._results, time, now)
+            out[:, n] = values_at(self._results, time, now)
             x[:] = now
             if not (np.isfinite(out[:, n]).all() and np.isfinite(x).all()):
                 return -(n + 1)
@@ -135,7 +135,7 @@ class PythonLoop:
 
     def _advanced(
         self,
-        at: Any,
+        values_at: Any,
         x: list[float],
         time: float,
         size: float,
@@ -147,13 +147,13 @@ class PythonLoop:
         """The states after a step of this size [s], and the next step of the integrator."""
 
         def rates(since: float, states: Sequence[float]) -> list[float]:
-            return at(self._rates, time + since, states)
+            return values_at(self._rates, time + since, states)
 
         if not self._controlled:
             return integrators.rk4(rates, x, size, longest, most), 0.0
 
         def close(since: float, states: Sequence[float]) -> list[float]:
-            return at(self._closed, time + since, states)
+            return values_at(self._closed, time + since, states)
 
         return integrators.controlled(rates, close, x, size, pace, longest, tolerance, self._nominal, most)
 

@@ -54,10 +54,13 @@ def profile_rows(signal: Any, changes: int) -> list[float]:
     ValueError
         for a profile with more changes.
     """
-    own = getattr(signal, "changes", ())
-    if len(own) > changes:
-        raise ValueError(f"a profile with {len(own)} changes, where {changes} are the most")
-    rows = [float(getattr(signal, "start", signal)), *(float(x) for change in own for x in change)]
+    changes_of_signal = getattr(signal, "changes", ())
+    if len(changes_of_signal) > changes:
+        raise ValueError(f"a profile with {len(changes_of_signal)} changes, where {changes} are the most")
+    rows = [
+        float(getattr(signal, "start", signal)),
+        *(float(x) for change in changes_of_signal for x in change),
+    ]
     while len(rows) < 1 + 3 * changes:
         rows += [math.inf, 1.0, rows[-1]]
     return rows
@@ -69,7 +72,8 @@ def signal_table(
     """The signals of runs by the names of the `driven` inputs, with the values `otherwise` of signals that a run does
     not change, as `Transients.run` takes them: shape (inputs, 1 + 3*changes, runs)."""
     rows = [
-        [profile_rows(own.get(name, otherwise.get(name, 0.0)), changes) for own in signals] for name in driven
+        [profile_rows(run_signals.get(name, otherwise.get(name, 0.0)), changes) for run_signals in signals]
+        for name in driven
     ]
     return np.moveaxis(np.reshape(rows, (len(driven), len(signals), 1 + 3 * changes)), 1, -1)
 
@@ -169,8 +173,8 @@ class Transients:
         self._changes, self._by = changes, tuple(by)
         chosen = self.outputs, self._varying, self._driven, self._guarded
         self._loop: _NativeLoop | PythonLoop
-        if own := compiler():
-            self._loop = _compiled(model, *chosen, self._by, changes, own)
+        if local_compiler := compiler():
+            self._loop = _compiled(model, *chosen, self._by, changes, local_compiler)
         elif by:
             raise InputError(f"no C compiler ({COMPILERS}) found")
         else:
@@ -265,9 +269,9 @@ class Transients:
     def _uniform(self, parameters: Any, inputs: Mapping[str, float]) -> Any:
         """The uniform arguments in the order of the code."""
         model = self.model
-        own = {v.name: v.quantity.start for v in arguments_of(model)}
-        own |= model.parameter_layout.by_name(parameters) | dict(inputs)
-        return np.array([own[name] for name in self._loop.names] or [0.0], float)
+        values = {v.name: v.quantity.start for v in arguments_of(model)}
+        values |= model.parameter_layout.by_name(parameters) | dict(inputs)
+        return np.array([values[name] for name in self._loop.names] or [0.0], float)
 
 
 @lru_cache(maxsize=32)
@@ -286,7 +290,7 @@ def _compiled(
     assert model.state_layout is not None
     sides = 2 if by else 1
     states = model.state_layout.variables * sides
-    given = len(varying) + len(by)
+    count = len(varying) + len(by)
     entries = [
         *((0, k) for k in find(varying, model.parameter_layout.names, "parameter")),
         *((3, k) for k in range(len(by))),
@@ -300,10 +304,10 @@ def _compiled(
     put = []
     for column, entry in enumerate(code.columns):
         k = places[entry]
-        if k < given:
+        if k < count:
             put.append(f"a[{column}] = b->given[{k}];")
-        elif k < given + len(driven):
-            offset = (k - given) * (1 + 3 * changes)
+        elif k < count + len(driven):
+            offset = (k - count) * (1 + 3 * changes)
             put.append(f"a[{column}] = signal_at(b->signal + {offset} * b->runs, b->runs, t);")
         else:
             put.append(f"a[{column}] = x[{entry[1]}];")
@@ -314,7 +318,7 @@ def _compiled(
     defines = {
         "STATES": len(states),
         "ROWS": len(outputs) * sides,
-        "PARAMS": given,
+        "PARAMS": count,
         "COLUMNS": len(code.columns),
         "ROOM": code.room,
         "CHANGES": changes,
@@ -376,9 +380,9 @@ def _equations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> t
     groups = t.explicit([rates, rows, met])
     if not by:
         return [p, u, x], groups
-    known = [*model.parameter_layout.names, *model.input_layout.names]
-    direction, changes = casadi.SX.zeros(len(known)), casadi.SX.sym("d", len(by))
-    for k, place in enumerate(find(by, known, "parameter or input")):
+    names = [*model.parameter_layout.names, *model.input_layout.names]
+    direction, changes = casadi.SX.zeros(len(names)), casadi.SX.sym("d", len(by))
+    for k, place in enumerate(find(by, names, "parameter or input")):
         direction[place] = changes[k]
     slopes = casadi.SX.sym("dx", x.numel())
     point, direction = casadi.vertcat(p, u, x), casadi.vertcat(direction, slopes)

@@ -29,7 +29,7 @@ class ShortTraceback(BaseException):
         inside = next(
             (k for k, frame in enumerate(frames) if frame.filename.startswith(package)), len(frames)
         )
-        place = [f"line {each.lineno}: {each.line}" for each in frames[:inside][-1:] if each.line]
+        place = [f"line {frame.lineno}: {frame.line}" for frame in frames[:inside][-1:] if frame.line]
         lines = str(self).splitlines() or [""]
         more = [f"... and {len(lines) - _LINES} more"] if len(lines) > _LINES else []
         head = f"{type(self).__name__}: "
@@ -147,8 +147,8 @@ class Faults:
             raise InputError.joined(self.errors)
 
 
-def check_kind(name: str, value: Any, kind: Any, words: str = "") -> None:
-    """Refuse a `value` of a script that is not of its kind; `words` say what it must be.
+def check_kind(name: str, value: Any, kind: Any, description: str = "") -> None:
+    """Refuse a `value` of a script that is not of its kind; `description` says what it must be.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def check_kind(name: str, value: Any, kind: Any, words: str = "") -> None:
         in one line.
     """
     if not isinstance(value, kind):
-        raise InputError(f"{name} = {shown(value)}: must be {words or kind.__qualname__}", name)
+        raise InputError(f"{name} = {shown(value)}: must be {description or kind.__qualname__}", name)
 
 
 def texts_in(name: str, value: Any) -> tuple[str, ...]:
@@ -173,24 +173,24 @@ def texts_in(name: str, value: Any) -> tuple[str, ...]:
     return listed
 
 
-def near_name(given: str, known: Iterable[str]) -> str:
-    """Words to add to the refusal of a name that is similar to one of the `known` names or begins it, or of several
+def near_name(text: str, allowed: Iterable[str]) -> str:
+    """Words to add to the refusal of a name that is similar to one of the `allowed` names or begins it, or of several
     words one of which is such a name; else empty."""
-    names = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=0.75)
-    near = near or [name for name in names if name.startswith(f"{given.lower()}_")]
-    near = near or [word for word in given.lower().split() if word in names and " " in given]
+    names = {name.lower(): name for name in allowed}
+    near = difflib.get_close_matches(text.lower(), names, n=1, cutoff=0.75)
+    near = near or [name for name in names if name.startswith(f"{text.lower()}_")]
+    near = near or [word for word in text.lower().split() if word in names and " " in text]
     return f'; was "{names[near[0]]}" meant?' if near else ""
 
 
-def meant(given: str, known: Iterable[str]) -> str:
+def meant(text: str, allowed: Iterable[str]) -> str:
     """Words to add to a refusal that goes on behind: with a question where a name is similar, else a semicolon."""
-    return near_name(given, known) or ";"
+    return near_name(text, allowed) or ";"
 
 
-def one_of(given: object, known: Collection[str]) -> str:
-    """Words on the allowed names: all of them, and the one that is similar to the `given` name."""
-    return f"one of {', '.join(known)}{near_name(str(given), known)}"
+def one_of(value: object, allowed: Collection[str]) -> str:
+    """Words on the allowed names: all of them, and the one that is similar to the name `value`."""
+    return f"one of {', '.join(allowed)}{near_name(str(value), allowed)}"
 
 
 _JOINERS = "\u200c\u200d"  # some scripts and signs need these characters inside a word
@@ -216,27 +216,27 @@ _LETTERS, _ENTRIES, _DEPTH = 60, 4, 2
 tables."""
 
 
-def shown(given: Any, depth: int = 0) -> str:
+def shown(value: Any, depth: int = 0) -> str:
     """A value from outside for citation in a refusal: in one short line, as TOML writes it."""
-    if isinstance(given, str):
-        quoted = printable(json.dumps(given[:_LETTERS], ensure_ascii=False), 8 * _LETTERS)
-        rest = len(given) - _LETTERS
+    if isinstance(value, str):
+        quoted = printable(json.dumps(value[:_LETTERS], ensure_ascii=False), 8 * _LETTERS)
+        rest = len(value) - _LETTERS
         return quoted if rest <= 0 else f"{quoted}... ({rest} more characters)"
-    if isinstance(given, bool):
-        return "true" if given else "false"
-    if isinstance(given, Mapping | list | tuple) and given and depth > _DEPTH:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping | list | tuple) and value and depth > _DEPTH:
         # before anything inside is written out: it may be nested without end
-        return "{ ... }" if isinstance(given, Mapping) else "[...]"
-    if isinstance(given, Mapping):
-        entries = [f"{_bare(str(name))} = {shown(x, depth + 1)}" for name, x in _first(given.items())]
-        return _bracketed("{ ", entries, len(given), " }")
-    if isinstance(given, list | tuple):
-        return _bracketed("[", [shown(x, depth + 1) for x in _first(given)], len(given), "]")
-    if hasattr(given, "tolist"):  # of numpy
-        return shown(given.tolist(), depth)
-    if isinstance(given, date | time):
-        return given.isoformat()
-    return printable(_brief(given), 100)
+        return "{ ... }" if isinstance(value, Mapping) else "[...]"
+    if isinstance(value, Mapping):
+        entries = [f"{_bare(str(name))} = {shown(x, depth + 1)}" for name, x in _first(value.items())]
+        return _bracketed("{ ", entries, len(value), " }")
+    if isinstance(value, list | tuple):
+        return _bracketed("[", [shown(x, depth + 1) for x in _first(value)], len(value), "]")
+    if hasattr(value, "tolist"):  # of numpy
+        return shown(value.tolist(), depth)
+    if isinstance(value, date | time):
+        return value.isoformat()
+    return printable(_brief(value), 100)
 
 
 def _first(entries: Iterable[Any]) -> Iterator[Any]:
@@ -256,10 +256,10 @@ def _bare(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name) else shown(name)
 
 
-def _brief(given: Any) -> str:
+def _brief(value: Any) -> str:
     """The shortened text of a number, or of a value that no file can have."""
     try:
-        text = repr(given)
+        text = repr(value)
     except ValueError:  # Python writes no integer of more than 4300 digits
-        return f"a number of about {round(0.30103 * int(given).bit_length())} digits"
+        return f"a number of about {round(0.30103 * int(value).bit_length())} digits"
     return text if len(text) <= _LETTERS else f"{text[:20]}...{text[-10:]}"

@@ -199,7 +199,9 @@ class FileList:
 
 def _list_of(file: Path) -> FileList | None:
     """The list of the claimed folder in which a file lies."""
-    return next((each for each in reversed(_lists) if file.absolute().is_relative_to(each.folder)), None)
+    return next(
+        (listing for listing in reversed(_lists) if file.absolute().is_relative_to(listing.folder)), None
+    )
 
 
 def clear(folder: Path, *names: str) -> None:

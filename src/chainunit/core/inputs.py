@@ -104,9 +104,9 @@ class TooLargeError(InputError):
     """A file or its unpacked content is larger than the limit."""
 
 
-def _too_large(place: str, most: int, of: str = "") -> InputError:
+def _too_large(place: str, most: int, subject: str = "") -> InputError:
     return TooLargeError(
-        f"{place}: {of or 'the file'} has more than {most // MIB} MiB, the most that is read"
+        f"{place}: {subject or 'the file'} has more than {most // MIB} MiB, the most that is read"
     )
 
 
@@ -341,13 +341,13 @@ def _size_of_directory(stream: Any) -> int:
     size = stream.seek(0, io.SEEK_END)
     begin = stream.seek(max(0, size - 2**16 - _END - 20))
     tail = stream.read()
-    at = tail.rfind(_END_MARK)
-    if at < 0 or len(tail) < at + _END:
+    offset = tail.rfind(_END_MARK)
+    if offset < 0 or len(tail) < offset + _END:
         return 0
-    of_directory = int(struct.unpack_from("<I", tail, at + 12)[0])
-    if at >= 20 and tail[at - 20 : at - 16] == _LOCATOR_MARK:
-        (place,) = struct.unpack_from("<Q", tail, at - 12)
-        stream.seek(place if place < begin + at else 0)
+    of_directory = int(struct.unpack_from("<I", tail, offset + 12)[0])
+    if offset >= 20 and tail[offset - 20 : offset - 16] == _LOCATOR_MARK:
+        (place,) = struct.unpack_from("<Q", tail, offset - 12)
+        stream.seek(place if place < begin + offset else 0)
         record = stream.read(56)
         if record.startswith(_END_64_MARK) and len(record) == 56:
             of_directory = max(of_directory % (2**32 - 1), struct.unpack_from("<Q", record, 40)[0])
@@ -366,7 +366,7 @@ def dataset(file: Path, group: str) -> xr.Dataset:
 
     try:
         with xr.open_dataset(regular(file), group=group) as lazy:
-            if sum(each.nbytes for each in lazy.variables.values()) > UNPACKED:
+            if sum(variable.nbytes for variable in lazy.variables.values()) > UNPACKED:
                 raise _too_large(str(file), UNPACKED, "its content")
             return lazy.load()
     except InputError:

@@ -141,18 +141,18 @@ def controlled(
         left = step - since
         h = left if pace >= left else 0.5 * left if pace > 0.5 * left else pace
         k: list[Sequence[float]] = []
-        at: list[float] = now
+        point: list[float] = now
         error = 0.0
         try:
             for node, weights in zip(NODES, STAGES, strict=True):
-                at = [
+                point = [
                     v + h * sum(a * r[i] for a, r in zip(weights, k, strict=True)) for i, v in enumerate(now)
                 ]
-                k.append(rates(since + h * node, at))
-            usable = all(map(math.isfinite, (*at, *k[-1])))
+                k.append(rates(since + h * node, point))
+            usable = all(map(math.isfinite, (*point, *k[-1])))
         except (ArithmeticError, ValueError):
             usable = False
-        for i, (v, after, size) in enumerate(zip(now, at, nominal, strict=True) if usable else ()):
+        for i, (v, after, size) in enumerate(zip(now, point, nominal, strict=True) if usable else ()):
             deviation = abs(h * sum(e * r[i] for e, r in zip(ERRORS, k, strict=True)))
             error = max(error, deviation / (tolerance * max(abs(v), abs(after), size)))
         last_resort = h <= SHORTEST * longest
@@ -160,7 +160,7 @@ def controlled(
             raise ArithmeticError("the states left all bounds")
         if usable and (error <= 1.0 or last_resort):
             since = step if h >= left else since + h
-            now = list(close(since, at))
+            now = list(close(since, point))
         growth = MOST_GROWTH if error < NO_ERROR else SAFETY * error**ERROR_POWER
         following = h * (min(max(growth, LEAST_GROWTH), MOST_GROWTH) if usable else LEAST_GROWTH)
         if usable and error <= 1.0 and h < pace:

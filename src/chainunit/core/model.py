@@ -319,16 +319,16 @@ class Model:
         try:
             self._meets(p, self.required, self.requirements(MATH, p))
         except GeometryError:
-            if self.obstacle is not None and (words := self.obstacle(p)):
-                raise GeometryError(words) from None
+            if self.obstacle is not None and (reason := self.obstacle(p)):
+                raise GeometryError(reason) from None
             raise
         return p
 
     def _meets(self, p: Any, requirements: tuple[Requirement, ...], limits: Limits) -> None:
         for requirement, (value, low, high) in zip(requirements, limits, strict=True):
             if not low < value < high:
-                words = requirement.refusal(value, low, high, self.parameter_layout.by_name(p))
-                error = GeometryError(words)
+                complaint = requirement.refusal(value, low, high, self.parameter_layout.by_name(p))
+                error = GeometryError(complaint)
                 error.names = (requirement.subject, *requirement.context, *requirement.depends)
                 raise error
 

@@ -119,15 +119,15 @@ def flange(flow: str, prefix: str = "", name: str = "flange") -> Terminal:
 
 def flanges(flow: str) -> tuple[Terminal, Terminal]:
     """The terminals of the shaft: the package's own, and the one that tools with Modelica's library know."""
-    own = flange(flow)
-    return own, _as_modelica(own, "flange_a")
+    terminal = flange(flow)
+    return terminal, _as_modelica(terminal, "flange_a")
 
 
 def driven_flanges() -> tuple[Terminal, Terminal]:
     """The same of the second shaft of a part between motor and machine, which drives the machine; its variables
     carry ``driven.``."""
-    own = flange("outflow", "driven.", "driven")
-    return own, _as_modelica(own, "flange_b")
+    terminal = flange("outflow", "driven.", "driven")
+    return terminal, _as_modelica(terminal, "flange_b")
 
 
 def line_terminals() -> tuple[Terminal, ...]:
@@ -136,11 +136,11 @@ def line_terminals() -> tuple[Terminal, ...]:
     return *flanges("inflow"), load_terminal(), *driven_flanges(), load_terminal("load.", "machine")
 
 
-def _as_modelica(own: Terminal, name: str) -> Terminal:
+def _as_modelica(terminal: Terminal, name: str) -> Terminal:
     """The terminal of a shaft as Modelica's flange: of angle and torque alone. Every one is of the kind Flange_a,
     as tools join terminals of equal kinds, and Modelica's Flange_a and Flange_b differ in their icon alone."""
-    members = {member: own.members[member] for member in ("phi", "tau")}
-    return Terminal(name, ROTATIONAL, f"{own.description}, as Modelica's", members, own.flows)
+    members = {member: terminal.members[member] for member in ("phi", "tau")}
+    return Terminal(name, ROTATIONAL, f"{terminal.description}, as Modelica's", members, terminal.flows)
 
 
 def measured_terminal(**signals: str) -> Terminal:
@@ -154,14 +154,14 @@ def way_terminals(load: bool) -> tuple[Terminal, ...]:
     """The terminals of a driver that slides: our own, the one that tools with Modelica's library know, and with
     `load` its load port. None of them fits a shaft."""
     members = {member: member for member in ("phi", "w", "a", "tau")}
-    words = "the driver and its force"
-    own = Terminal("flange", f"{OWN}.linear_flange", words, members, {"tau": "inflow"})
+    title = "the driver and its force"
+    terminal = Terminal("flange", f"{OWN}.linear_flange", title, members, {"tau": "inflow"})
     outside = Terminal(
-        "flange_a", TRANSLATIONAL, f"{words}, as Modelica's", {"s": "phi", "f": "tau"}, {"f": "inflow"}
+        "flange_a", TRANSLATIONAL, f"{title}, as Modelica's", {"s": "phi", "f": "tau"}, {"f": "inflow"}
     )
     port = {member: member for member in Layout(LoadPort).names}
-    words = "the load port: a load as the driver sees it"
-    return own, outside, *([Terminal("load", f"{OWN}.linear_load", words, port)] if load else [])
+    title = "the load port: a load as the driver sees it"
+    return terminal, outside, *([Terminal("load", f"{OWN}.linear_load", title, port)] if load else [])
 
 
 def load_terminal(prefix: str = "", name: str = "load") -> Terminal:

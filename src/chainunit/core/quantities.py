@@ -399,8 +399,8 @@ def variables(cls: type, prefix: str = "", context: str = "", default: Any = Non
             yield Variable(name, context + q.template, q)
         else:
             inner = field.metadata["default"] if default is None else getattr(default, field.name)
-            words = f"{context}{field.metadata['group']}: "
-            yield from variables(field.metadata["of"], name + ".", words, inner)
+            heading = f"{context}{field.metadata['group']}: "
+            yield from variables(field.metadata["of"], name + ".", heading, inner)
 
 
 def variable_of(cls: type, name: str) -> Variable:

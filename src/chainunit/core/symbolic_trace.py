@@ -50,8 +50,8 @@ class Trace:
 
         met = self.model.constrained_states(casadi_(), self.p, self.u, self.x)
         return all(
-            casadi.is_equal(casadi.SX(x), own)
-            for x, own in zip(met, casadi.vertsplit(self.symbols[2]), strict=True)
+            casadi.is_equal(casadi.SX(x), symbol)
+            for x, symbol in zip(met, casadi.vertsplit(self.symbols[2]), strict=True)
         )
 
     def outputs_at(self, x: Any) -> list[Any]:
@@ -95,7 +95,7 @@ def trace(model: Model) -> Trace:
     import casadi
 
     layouts = (model.parameter_layout, model.input_layout, model.state_layout)
-    sizes = [len(of.names) if of else 0 for of in layouts]
+    sizes = [len(layout.names) if layout else 0 for layout in layouts]
     symbols = [casadi.SX.sym(name, size) for name, size in zip("pux", sizes, strict=True)]
     symbols.append(casadi.SX.sym("k", model.derived_count))
     p = model.parameter_layout.instance(casadi.vertsplit(symbols[0]))

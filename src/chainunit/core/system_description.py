@@ -87,10 +87,14 @@ class SystemDescription:
         self.start: Sequence[tuple[str, Sequence[str] | None]] = data["start"]
         self.has_states = any(model.state_layout for model in self.models.values())
         left_out = {*data["left_out"]}
-        common = {f"{name}.{own}": own for name in self.models for own in SOLVER if self.has_states}
-        own = [(_SOLVER, SystemSolver, group(SystemSolver, "internal integrator", default=SystemSolver()))]
+        common = {
+            f"{name}.{setting}": setting for name in self.models for setting in SOLVER if self.has_states
+        }
+        settings = [
+            (_SOLVER, SystemSolver, group(SystemSolver, "internal integrator", default=SystemSolver()))
+        ]
         self.Parameters = self._declared(
-            "Parameters", lambda model: model.Parameters, common, own if self.has_states else ()
+            "Parameters", lambda model: model.Parameters, common, settings if self.has_states else ()
         )
         inputs = left_out | set(self.sources)
         self.Inputs = self._declared("Inputs", lambda model: model.Inputs, inputs)
@@ -115,8 +119,8 @@ class SystemDescription:
             inner = pruned(declared, {*leave_out}, f"{component}.") if declared else None
             if inner is not None:
                 variables = Layout(inner).variables
-                known = all(v.quantity.start is not None for v in variables)
-                default = Layout(inner).from_names({}) if known else None
+                has_starts = all(v.quantity.start is not None for v in variables)
+                default = Layout(inner).from_names({}) if has_starts else None
                 fields.append((component, inner, group(inner, component, default=default)))
         return declared_class(name, (), [*fields, *further_fields])
 
@@ -131,20 +135,20 @@ class SystemDescription:
                 declared = pruned(part.layout.cls, others, f"{component}.")
                 inner += [declared] if declared else []
             if inner:
-                of = declared_class("Further", tuple(inner))
-                fields.append((component, of, group(of, component)))
+                further = declared_class("Further", tuple(inner))
+                fields.append((component, further, group(further, component)))
         return declared_class("FurtherOutputs", (), fields) if fields else None
 
     def _member(self, name: str, model: Model, inputs: Iterable[str], common: Mapping[str, str]) -> Member:
         def getter(full: str) -> Any:
             return attrgetter(full)
 
-        own = [f"{name}.{each}" for each in model.parameter_layout.names]
-        taken = [f"{name}.{each}" for each in model.input_layout.names]
+        parameters = [f"{name}.{parameter}" for parameter in model.parameter_layout.names]
+        taken = [f"{name}.{variable}" for variable in model.input_layout.names]
         return Member(
             name,
             model,
-            [getter(common.get(full, full)) for full in own],
+            [getter(common.get(full, full)) for full in parameters],
             [None if full in {*inputs} else getter(full) for full in taken],
             [self.sources.get(full) for full in taken],
             {
@@ -181,18 +185,18 @@ class SystemDescription:
 
     def _full(self, name: str, subject: str) -> str:
         """The subject of a refusal with its component: a full name, or words."""
-        known = (*self.models[name].parameter_layout.names, *self.models[name].input_layout.names)
-        return f"{name}.{subject}" if subject in known else f"{name}: {subject}"
+        variables = (*self.models[name].parameter_layout.names, *self.models[name].input_layout.names)
+        return f"{name}.{subject}" if subject in variables else f"{name}: {subject}"
 
     def terminals(self) -> tuple[Terminal, ...]:
         """The free terminals, by full name."""
         terminals = []
         for full in self.data["terminals"]:
-            name, _, own = full.partition(".")
-            (terminal,) = (each for each in self.models[name].terminals if each.name == own)
+            name, _, port = full.partition(".")
+            (terminal,) = (candidate for candidate in self.models[name].terminals if candidate.name == port)
             members = {member: f"{name}.{variable}" for member, variable in terminal.members.items()}
-            words = f"{name}: {terminal.description}"
-            terminals.append(replace(terminal, name=full, description=words, members=members))
+            description = f"{name}: {terminal.description}"
+            terminals.append(replace(terminal, name=full, description=description, members=members))
         return tuple(terminals)
 
     def input_rates(self) -> dict[str, str]:
@@ -235,9 +239,11 @@ class SystemPoint:
     not yet known has its declared start value. The order sees to it that no output that is read depends on it.
     """
 
-    def __init__(self, of: SystemDescription, xp: Any, p: Any, u: Any, states: Mapping[str, Any]) -> None:
-        self._of, self._xp, self._u = of, xp, u
-        self.p = of.parameters(p)
+    def __init__(
+        self, description: SystemDescription, xp: Any, p: Any, u: Any, states: Mapping[str, Any]
+    ) -> None:
+        self._of, self._xp, self._u = description, xp, u
+        self.p = description.parameters(p)
         self._states = dict(states)
         self._known: dict[str, Any] = {}
         self._final: dict[str, tuple[Any, Any, dict[int, Any]]] = {}
@@ -282,7 +288,9 @@ class SystemPoint:
         for name, outputs in steps:
             missing = [output for output in outputs if self._source(f"{name}.{output}") is None]
             if missing:
-                self._known |= {f"{name}.{each}": value for each, value in self.outputs(name, missing)}
+                self._known |= {
+                    f"{name}.{variable}": value for variable, value in self.outputs(name, missing)
+                }
 
     def outputs(self, name: str, wanted: Iterable[str]) -> Iterator[tuple[str, Any]]:
         """These outputs of a component, with the inputs that are known so far."""

@@ -57,37 +57,37 @@ class SystemModel(Model):
         values: list[Any] = []
         # the copy has the values of the original
         vars(ready).pop("of_components", None)
-        own = self.system.parameters(ready)
+        parameters = self.system.parameters(ready)
         for name, model in self._components():
-            given = None if derived is None else derived[first : first + model.derived_count]
-            own[name] = model.with_derived(xp, own[name], given)
-            values += own[name].derived if model.derived_count else []
+            numbers = None if derived is None else derived[first : first + model.derived_count]
+            parameters[name] = model.with_derived(xp, parameters[name], numbers)
+            values += parameters[name].derived if model.derived_count else []
             first += model.derived_count
         object.__setattr__(ready, "derived", values)
         return ready
 
     def _derived(self, xp: Any, p: Any) -> list[Any]:
         """The derived values of all components."""
-        own = self.system.parameters(p)
-        return [v for name, model in self._components() for v in model.derive(xp, own[name])]
+        parameters = self.system.parameters(p)
+        return [v for name, model in self._components() for v in model.derive(xp, parameters[name])]
 
     def check(self, p: Any) -> Any:
         """See `Model.check`; where a model has more to say on its geometry, the refusal says it."""
         try:
             return super().check(p)
         except GeometryError as error:
-            own = self.system.parameters(p)
+            parameters = self.system.parameters(p)
             for name, model in self._components():
                 if model.obstacle is not None:
                     with refusal_prefix(f"{name}: "):
-                        model.check(own[name])
+                        model.check(parameters[name])
             raise error from None
 
     def _limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of all components."""
-        own = self.system.parameters(p)
+        parameters = self.system.parameters(p)
         for name, model in self._components():
-            yield from model.requirements(xp, own[name])
+            yield from model.requirements(xp, parameters[name])
 
     # -- the start
 
@@ -120,7 +120,9 @@ class SystemModel(Model):
 
     def _start_guess(self, xp: Any, p: Any, u: Any) -> list[Any]:
         """First guess of the unknowns of the start, of all components in order."""
-        return self._begin(xp, p, u, lambda model, own, entries: model.start_guess(xp, own, entries))[0]
+        return self._begin(
+            xp, p, u, lambda model, parameters, entries: model.start_guess(xp, parameters, entries)
+        )[0]
 
     def _improved_start(self, xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
         """The unknowns of the start after one more round, of all components in order."""
@@ -136,10 +138,10 @@ class SystemModel(Model):
         """States at the start with the inputs `u`, from the unknowns `z` of all components."""
         before = iter(z)
 
-        def given(model: Model, parameters: Any, entries: Any) -> list[Any]:
+        def taken(model: Model, parameters: Any, entries: Any) -> list[Any]:
             return [next(before) for _ in range(model.start_problem.unknowns)]
 
-        _, point = self._begin(xp, p, u, given)
+        _, point = self._begin(xp, p, u, taken)
         return self.States(
             **{name: point.states(name) for name, m in self.system.members.items() if m.states}
         )
@@ -172,16 +174,18 @@ class SystemModel(Model):
 
     def _internal_step(self, xp: Any, p: Any) -> Any:
         """The least of the components' longest steps."""
-        own = self.system.parameters(p)
+        parameters = self.system.parameters(p)
         models = [(name, model) for name, model in self._components() if model.state_layout]
-        return _least(xp, (model.internal_step(xp, own[name]) for name, model in models))
+        return _least(xp, (model.internal_step(xp, parameters[name]) for name, model in models))
 
     def _tolerance(self, xp: Any, p: Any) -> Any:
         """The parameter `solver.tolerance`, or the least tolerance of the components that control the error if it
         is less."""
-        own = self.system.parameters(p)
+        parameters = self.system.parameters(p)
         models = [(name, model) for name, model in self._components() if model.controlled]
-        return _least(xp, [p.solver.tolerance, *(model.tolerance(xp, own[name]) for name, model in models)])
+        return _least(
+            xp, [p.solver.tolerance, *(model.tolerance(xp, parameters[name]) for name, model in models)]
+        )
 
     def _closed(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states near `x` that meet the constraints of each component; the others are those of `x`."""
@@ -218,7 +222,9 @@ def _outputs_of(declared: Any) -> Callable[..., Any]:
         names.setdefault(name, []).append(output)
 
     def equations(xp: Any, p: Any, u: Any, x: Any, point: SystemPoint) -> Any:
-        return layout.instance([y for name, own in names.items() for _, y in point.outputs(name, own)])
+        return layout.instance(
+            [y for name, variables in names.items() for _, y in point.outputs(name, variables)]
+        )
 
     return equations
 
@@ -234,58 +240,64 @@ def _shortest(models: Iterable[Model]) -> dict[str, float]:
     """The shortest step and stop, and the least tolerance, of the components' default experiments."""
     experiment: dict[str, float] = {}
     for model in models:
-        own = model.fmu_data.experiment
-        experiment = {key: min(x, experiment.get(key, x)) for key, x in {**experiment, **own}.items()}
+        limits = model.fmu_data.experiment
+        experiment = {key: min(x, experiment.get(key, x)) for key, x in {**experiment, **limits}.items()}
     return experiment
 
 
-def _sizes(of: SystemDescription) -> dict[str, float]:
+def _sizes(description: SystemDescription) -> dict[str, float]:
     """The components' sizes of the free inputs."""
-    free = set(Layout(of.Inputs).names)
-    sizes = {f"{name}.{key}": x for name, m in of.models.items() for key, x in m.fmu_data.sizes.items()}
+    free = set(Layout(description.Inputs).names)
+    sizes = {
+        f"{name}.{key}": x for name, m in description.models.items() for key, x in m.fmu_data.sizes.items()
+    }
     return {name: x for name, x in sizes.items() if name in free}
 
 
-def _system_model(of: SystemDescription) -> SystemModel:
-    apart, about, models = of.by_differences(), of.data["about"], of.models.values()
+def _system_model(description: SystemDescription) -> SystemModel:
+    apart, about, models = (
+        description.by_differences(),
+        description.data["about"],
+        description.models.values(),
+    )
     return SystemModel(
-        name=of.data["name"],
-        text=of.words(),
-        description=of.data["title"],
-        system=of,
-        components=MappingProxyType(of.models),
-        made=(system_model, (of.data, of.models)),
-        Parameters=of.Parameters,
-        Inputs=of.Inputs,
-        States=of.States if of.has_states else None,
-        required=of.required(lambda model: model.required),
+        name=description.data["name"],
+        text=description.words(),
+        description=description.data["title"],
+        system=description,
+        components=MappingProxyType(description.models),
+        made=(system_model, (description.data, description.models)),
+        Parameters=description.Parameters,
+        Inputs=description.Inputs,
+        States=description.States if description.has_states else None,
+        required=description.required(lambda model: model.required),
         start_problem=StartProblem(
             sum(model.start_problem.unknowns for model in models),
-            of.data["start_rounds"],
-            of.required(lambda model: model.start_problem.required),
+            description.data["start_rounds"],
+            description.required(lambda model: model.start_problem.required),
         ),
         fmu_data=FmuData(
             about=None if about is None else About(**about),
-            experiment=MappingProxyType(_shortest(models) | of.data["experiment"]),
-            sizes=MappingProxyType(_sizes(of)),
+            experiment=MappingProxyType(_shortest(models) | description.data["experiment"]),
+            sizes=MappingProxyType(_sizes(description)),
         ),
         repeated={
-            f"{own}.{name}": f"{own}.{one}"
-            for own, model in of.models.items()
+            f"{component}.{name}": f"{component}.{one}"
+            for component, model in description.models.items()
             for name, one in model.repeated.items()
         },
         constant={
-            f"{own}.{name}": value
-            for own, model in of.models.items()
+            f"{component}.{name}": value
+            for component, model in description.models.items()
             for name, value in model.constant.items()
         },
-        terminals=of.terminals(),
+        terminals=description.terminals(),
         derived_count=sum(model.derived_count for model in models),
-        input_rates=of.input_rates(),
-        controlled=of.has_states,
+        input_rates=description.input_rates(),
+        controlled=description.has_states,
         parts=tuple(
             Part(declared, _outputs_of(declared), by_differences=apart & {*Layout(declared).names})
-            for declared in (of.Outputs, of.Extra)
+            for declared in (description.Outputs, description.Extra)
             if declared
         ),
     )

@@ -109,9 +109,9 @@ def fitting(unit: str, kind: str = "") -> tuple[str, ...]:
 IN_RADIANS = "a number without a unit is in radians"
 
 
-def has_unit(given: object) -> bool:
+def has_unit(value: object) -> bool:
     """Whether a value of a file is a text with a unit."""
-    parts = split(given) if isinstance(given, str) else None
+    parts = split(value) if isinstance(value, str) else None
     return parts is not None and bool(parts[1])
 
 
@@ -229,16 +229,19 @@ def of_other_kind(unit_text: str, unit: str) -> str:
     """What a unit measures that is none of the declared `unit`: ``kg is a mass``. Empty for an unknown unit, and for
     one of the same dimension."""
     try:
-        own = dimension(unit_text)
+        text_dimension = dimension(unit_text)
     except ValueError:
         return ""
-    if own == dimension("" if unit == "1" else unit):
+    if text_dimension == dimension("" if unit == "1" else unit):
         return ""
     if unit_text.strip() == "1":
         return "the quantity has no dimension"
-    is_share = not own and not any(name in _ANGLES for name, _ in _factors(_ascii(unit_text)))
+    is_share = not text_dimension and not any(name in _ANGLES for name, _ in _factors(_ascii(unit_text)))
     alike = {**_KINDS, "N.m": "a torque or an energy"}
-    kind = next((words for each, words in alike.items() if dimension(each) == own), "of another quantity")
+    kind = next(
+        (title for sample, title in alike.items() if dimension(sample) == text_dimension),
+        "of another quantity",
+    )
     return f"{unit_text} is {'a share' if is_share else kind}"
 
 
@@ -246,7 +249,7 @@ def must_be(unit: str) -> str:
     """Words on the kind of the declared `unit`, one of which `_KINDS` has the name: ``must be a speed, such as
     [rad/s] or [rev/min]``."""
     wanted = dict.fromkeys((unit.replace(".", " "), *fitting(unit)[:2]))
-    such = " or ".join(f"[{each}]" for each in list(wanted)[:2])
+    such = " or ".join(f"[{symbol}]" for symbol in list(wanted)[:2])
     return f"must be {_KINDS[unit]}, such as {such}"
 
 
@@ -288,8 +291,8 @@ def probable_text(text: str, unit: str, kind: str = "") -> str:
     if _THOUSANDS.search(text):
         both = [text.replace(",", sign, 1) for sign in ("", ".")]
         return (
-            '" or "'.join(each.strip() for each in both)
-            if all(_reads(each, unit, kind) for each in both)
+            '" or "'.join(reading.strip() for reading in both)
+            if all(_reads(reading, unit, kind) for reading in both)
             else ""
         )
     text = with_point(text) or text
@@ -354,12 +357,12 @@ def _factors(unit_text: str) -> list[tuple[str, int]]:
     factors: list[tuple[str, int]] = []
     outside: list[int] = []
     # a stroke inverts all factors behind it, up to the end of its brackets
-    begin, sign, at = 1, 1, 0
-    while at < len(unit_text):
-        match = _TOKEN.match(unit_text, at)
+    begin, sign, position = 1, 1, 0
+    while position < len(unit_text):
+        match = _TOKEN.match(unit_text, position)
         if match is None:
             raise ValueError(f"{unit_text}: cannot be read")
-        token, at = match[1], match.end()
+        token, position = match[1], match.end()
         if token == "/":
             sign = -begin
         elif token == "(":

@@ -42,7 +42,7 @@ def belt_drive(power: float, w: float, ratio: float, factor: float) -> BeltDrive
     standard pulleys that are nearest to its `ratio`."""
     design = power * factor
     torque = design / w
-    section, least, _ = next(each for each in _SECTIONS if torque <= each[2])
+    section, least, _ = next(row for row in _SECTIONS if torque <= row[2])
     wanted = max(least, _DIAMETER * torque ** (1.0 / 3.0))
     small_sizes, large_sizes = (
         [float(f"{10.0**decade * numeral:.4g}") for decade in (-2, -1, 0) for numeral in SERIES[name]]

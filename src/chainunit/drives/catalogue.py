@@ -142,12 +142,12 @@ def offer(*files: Path) -> Offer:
     InputError
         with a line for each wrong value: the file, the line, the column, the value and the allowed range.
     """
-    found = items_in(files, KINDS, {MOTOR_KIND.name: {motor.designation for motor in _packaged()}})
+    items_by_kind = items_in(files, KINDS, {MOTOR_KIND.name: {motor.designation for motor in _packaged()}})
     return Offer(
-        tuple(map(_motor, found[MOTOR_KIND.name])),
-        tuple(CatalogueGear(**vars(item)) for item in found[GEARS.name]),
-        tuple(CatalogueCoupling(**vars(item)) for item in found[COUPLINGS.name]),
-        tuple(CatalogueFlexible(**vars(item)) for item in found[FLEXIBLE.name]),
+        tuple(map(_motor, items_by_kind[MOTOR_KIND.name])),
+        tuple(CatalogueGear(**vars(item)) for item in items_by_kind[GEARS.name]),
+        tuple(CatalogueCoupling(**vars(item)) for item in items_by_kind[COUPLINGS.name]),
+        tuple(CatalogueFlexible(**vars(item)) for item in items_by_kind[FLEXIBLE.name]),
     )
 
 
@@ -193,18 +193,18 @@ def check_own(files: Sequence[Path]) -> Offer:
     InputError
         see `catalogue` and `CatalogueMotor.identify`.
     """
-    faults, found = Faults(), offer(*files)
-    for motor in found.motors:
+    faults, offered = Faults(), offer(*files)
+    for motor in offered.motors:
         with faults.collected():
             motor.identify()
     faults.refuse()
-    return found
+    return offered
 
 
 @cache
 def _packaged() -> tuple[CatalogueMotor, ...]:
     name, faults = "motors.csv", Faults()
-    rows = [row for _, own in csv_rows(packaged(name), name, [MOTOR_KIND], faults) for row in own]
+    rows = [row for _, kind_rows in csv_rows(packaged(name), name, [MOTOR_KIND], faults) for row in kind_rows]
     motors = MOTOR_KIND.items(rows, (), faults)
     faults.refuse()
     return tuple(map(_motor, motors))

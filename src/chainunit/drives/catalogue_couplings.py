@@ -34,9 +34,9 @@ class CatalogueCoupling(CatalogueItem):
 
     def can_be_set(self, torque: float, speed: float) -> bool:
         """Whether it can be set to that `torque` [N m] and may turn at that `speed` [rad/s]."""
-        of: SafetyCouplingData = self.data
-        fast_enough = not of.largest_speed or speed <= of.largest_speed
-        return bool(of.setting_least <= torque <= of.setting_most and fast_enough)
+        data: SafetyCouplingData = self.data
+        fast_enough = not data.largest_speed or speed <= data.largest_speed
+        return bool(data.setting_least <= torque <= data.setting_most and fast_enough)
 
 
 def _consistent(data: SafetyCouplingData) -> None:

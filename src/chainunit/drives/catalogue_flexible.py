@@ -44,14 +44,14 @@ def _consistent(data: FlexibleCouplingData) -> None:
     InputError
         for the peak torque.
     """
-    for name, words in (
+    for name, title in (
         ("rated_torque", "rated torque TKN"),
         ("alternating_torque", "alternating torque TKW"),
     ):
         least = getattr(data, name)
         if data.peak_torque < least:
             raise InputError(
-                f"peak_torque = {data.peak_torque:g} N m: must be >= {name} = {least:g} N m (the {words})",
+                f"peak_torque = {data.peak_torque:g} N m: must be >= {name} = {least:g} N m (the {title})",
                 "peak_torque",
             )
 

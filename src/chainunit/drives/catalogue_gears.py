@@ -54,25 +54,25 @@ class CatalogueGear(CatalogueItem):
     @property
     def transmission(self) -> Transmission:
         """The gear as a part of a drive; its drag that grows with speed is not known."""
-        of: GearData = self.data
+        data: GearData = self.data
         return Transmission(
-            ratio=of.ratio,
-            efficiency=of.efficiency,
-            J=of.J,
-            torque_limit=of.rated_torque * of.application_factor,
-            start_factor=of.start_factor,
+            ratio=data.ratio,
+            efficiency=data.efficiency,
+            J=data.J,
+            torque_limit=data.rated_torque * data.application_factor,
+            start_factor=data.start_factor,
         )
 
     @property
     def rating(self) -> GearRating:
         """The ratings of the gear, for its checks."""
-        of: GearData = self.data
+        data: GearData = self.data
         return GearRating(
-            rated_torque=of.rated_torque,
-            application_factor=of.application_factor,
-            thermal_power=of.thermal_power,
-            overhung_load=of.overhung_load,
-            largest_speed=of.largest_speed,
+            rated_torque=data.rated_torque,
+            application_factor=data.application_factor,
+            thermal_power=data.thermal_power,
+            overhung_load=data.overhung_load,
+            largest_speed=data.largest_speed,
         )
 
 

@@ -116,33 +116,36 @@ class CatalogueKind:
     ) -> list[CatalogueItem]:
         """The things in these rows; those of the designations `others` stand before them. A wrong row is added to
         the `faults`."""
-        found, taken = [], set(others)
+        items, taken = [], set(others)
         for row in rows:
             if len(faults.errors) >= MOST_FAULTS:
-                words = f"this row and those after it are not checked, as {len(faults.errors)} faults stand before it"
-                faults.add([InputError(f"{row.origin}: {words}", placed=True)])
+                message = (
+                    f"this row and those after it are not checked, as {len(faults.errors)} faults stand "
+                    "before it"
+                )
+                faults.add([InputError(f"{row.origin}: {message}", placed=True)])
                 break
             with faults.collected(), each_refusal(row.refusal):
                 if (item := self._item(row, taken)) is not None:
-                    found.append(item)
+                    items.append(item)
             taken.add(str(row.values.get("designation", "")).strip())
-        return found
+        return items
 
     def _item(self, row: CatalogueRow, others: set[str]) -> CatalogueItem | None:
         """The thing of a row; None where its file lacks a column or has a wrong one."""
         faults, values = Faults(), dict[str, float]()
         for name in row.values:
             if name not in self.columns:
-                words = f"unknown{near_name(name, self.columns)}; known here: {', '.join(self.columns)}"
-                faults.add([InputError(f"{shown(name)}: {words}", name)])
+                message = f"unknown{near_name(name, self.columns)}; known here: {', '.join(self.columns)}"
+                faults.add([InputError(f"{shown(name)}: {message}", name)])
         texts = {name: row.values.get(name, row.origin if name == "source" else "") for name in TEXTS}
         for name, text in texts.items():
             if name not in row.absent:
                 faults.add(_wrong_text(name, text, is_needed=name != "order_number"))
         name, text = "designation", texts["designation"]
         if isinstance(text, str) and text.strip() in others and name not in row.absent:
-            words = "stands in the catalogue already; give each row a name of its own"
-            faults.add([InputError(f"{name} = {shown(text.strip())}: {words}", name)])
+            message = "stands in the catalogue already; give each row a name of its own"
+            faults.add([InputError(f"{name} = {shown(text.strip())}: {message}", name)])
         for name, variable in self.variables.items():
             if name in row.values:
                 try:
@@ -158,16 +161,16 @@ class CatalogueKind:
         data = Layout(self.declared).from_names(values)
         if self.check is not None:
             self.check(data)
-        own = {name: text.strip() for name, text in texts.items()}
-        return CatalogueItem(data=data, origin=row.origin, **own)
+        plain_texts = {name: text.strip() for name, text in texts.items()}
+        return CatalogueItem(data=data, origin=row.origin, **plain_texts)
 
 
 def _wrong_text(name: str, text: Any, *, is_needed: bool) -> Iterator[InputError]:
     if isinstance(text, str) and not text.strip() and not is_needed:
         return
     if not isinstance(text, str) or not text.strip() or not text.isprintable() or len(text) > _LONGEST:
-        words = f"must be a text of one line, of at most {_LONGEST} characters"
-        yield InputError(f"{name} = {shown(text)}: {words}", name)
+        message = f"must be a text of one line, of at most {_LONGEST} characters"
+        yield InputError(f"{name} = {shown(text)}: {message}", name)
 
 
 def heading(variable: Variable) -> str:
@@ -214,18 +217,18 @@ def items_in(
         with a line for each fault of all files: the file, the line, the column, the value and the allowed range.
     """
     faults = Faults()
-    found: dict[str, list[CatalogueItem]] = {kind.name: [] for kind in kinds}
+    items_by_kind: dict[str, list[CatalogueItem]] = {kind.name: [] for kind in kinds}
     for file in files:
         with faults.collected():
             is_toml = file.suffix.lower() == ".toml"
             text = file_text(file, TOML if is_toml else TEXT)
-            for kind, own in (_toml_rows if is_toml else csv_rows)(text, str(file), kinds, faults):
-                before = {item.designation for item in found[kind.name]} | set(
+            for kind, rows in (_toml_rows if is_toml else csv_rows)(text, str(file), kinds, faults):
+                before = {item.designation for item in items_by_kind[kind.name]} | set(
                     (taken or {}).get(kind.name, ())
                 )
-                found[kind.name] += kind.items(own, before, faults)
+                items_by_kind[kind.name] += kind.items(rows, before, faults)
     faults.refuse()
-    return found
+    return items_by_kind
 
 
 def csv_rows(
@@ -244,19 +247,23 @@ def csv_rows(
     (first, headings), *others = lines
     names = {match[1] for cell in headings if (match := _HEADING.fullmatch(cell))}
     # the kind that knows most of the headings; of equals the one that needs most of them
-    kind = max(kinds, key=lambda each: (len(names & {*each.columns}), len(names & {*each.required})))
+    kind = max(
+        kinds, key=lambda candidate: (len(names & {*candidate.columns}), len(names & {*candidate.required}))
+    )
     parts = {part.partition("[")[0].strip() for cell in headings for part in re.split("[;\t]", cell)}
     if not any(part in kind.columns or near_name(part, kind.columns) for part in parts):
-        known = ", ".join(map(kind.heading, kind.columns))
-        raise InputError(f"{file}:{first}: has no heading of a catalogue; known here: {known}", placed=True)
+        known_headings = ", ".join(map(kind.heading, kind.columns))
+        raise InputError(
+            f"{file}:{first}: has no heading of a catalogue; known here: {known_headings}", placed=True
+        )
     columns, wrong = _columns(kind, headings, f"{file}:{first}", faults)
     missing = {name for name in kind.required if name not in dict(columns) and name not in wrong}
     if not any(name for name, _ in columns):
         # these are no headings of a catalogue: what is missing beside them says nothing
         faults.refuse()
     for name in (name for name in kind.required if name in missing):
-        words = f"is missing; add the heading {shown(kind.heading(name))}"
-        faults.add([InputError(f"{file}:{first}: column {name}: {words}", placed=True)])
+        message = f"is missing; add the heading {shown(kind.heading(name))}"
+        faults.add([InputError(f"{file}:{first}: column {name}: {message}", placed=True)])
 
     def rows() -> Iterator[CatalogueRow]:
         for line, row in others:
@@ -268,8 +275,8 @@ def csv_rows(
                 quotes = (
                     "; a comma in a cell needs quotation marks around it" if len(row) > len(columns) else ""
                 )
-                words = f"has {len(row)} cells; must have {len(columns)}, as the headings{quotes}"
-                faults.add([InputError(f"{file}:{line}: {words}", placed=True)])
+                finding = f"has {len(row)} cells; must have {len(columns)}, as the headings{quotes}"
+                faults.add([InputError(f"{file}:{line}: {finding}", placed=True)])
 
     yield kind, rows()
 
@@ -299,12 +306,12 @@ def _columns(
         name, unit = (match[1], match[2] or "") if match else ("", "")
         if name not in kind.columns:
             near = near_name(name, kind.columns)
-            known = ", ".join(map(kind.heading, kind.columns))
+            known_headings = ", ".join(map(kind.heading, kind.columns))
             parted = "; cells must be parted by commas" if cell.count(";") > 2 or "\t" in cell else ""
-            words = f"unknown{parted}{near}; known here: {known}"
-            faults.add([InputError(f"{place}: heading {shown(cell)}: {words}", placed=True)])
+            message = f"unknown{parted}{near}; known here: {known_headings}"
+            faults.add([InputError(f"{place}: heading {shown(cell)}: {message}", placed=True)])
             # the column that was meant is not missing, too
-            wrong |= {each for each in kind.columns if near == near_name(name, [each]) != ""}
+            wrong |= {column for column in kind.columns if near == near_name(name, [column]) != ""}
             name = ""
         elif any(name == other for other, _ in columns):
             faults.add(
@@ -342,21 +349,21 @@ def _toml_rows(
     each_is = f"each thing is a table {' or '.join(brackets)}"
     with in_file(file, lambda: toml_lines.lines_of(text)):
         data = toml(text, 20 * MOST_ROWS)
-        wrong, known = Faults(), {kind.name for kind in kinds}
+        wrong, names = Faults(), {kind.name for kind in kinds}
         if not data:
             wrong.add([InputError(f"is empty; {each_is}")])
         for name, tables in data.items():
-            if name not in known:
+            if name not in names:
                 wrong.add([InputError(f"{shown(name)}: unknown; {each_is}", name)])
             elif not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-                words = f"each {name} must be a table [[{name}]]"
-                wrong.add([InputError(f"{name} = {shown(tables)}: {words}", name)])
+                message = f"each {name} must be a table [[{name}]]"
+                wrong.add([InputError(f"{name} = {shown(tables)}: {message}", name)])
         wrong.refuse()
     lines = toml_lines.lines_of(text)
     for kind in kinds:
         rows = []
         for number, table in enumerate(data.get(kind.name, ()), 1):
             place = f"{kind.name}.{number}"
-            own = {name: lines.get(f"{place}.{name}", 0) for name in table}
-            rows.append(CatalogueRow(file, lines.get(place, 0), table, f"{kind.name} {number}: ", own))
+            key_lines = {name: lines.get(f"{place}.{name}", 0) for name in table}
+            rows.append(CatalogueRow(file, lines.get(place, 0), table, f"{kind.name} {number}: ", key_lines))
         yield kind, rows

@@ -195,13 +195,13 @@ def _torque_limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:
     return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / R)
 
 
-def _largest_torque(p: Any, T: float, *at: float) -> float:
+def _largest_torque(p: Any, T: float, *point: float) -> float:
     """The torque at the current limit, or at the voltage limit at this speed."""
-    (w,) = at
+    (w,) = point
     return float(_torque_limit(MATH, p, w, T))
 
 
-def _pull_out(p: Any, T: float, *at: float) -> float:
+def _pull_out(p: Any, T: float, *point: float) -> float:
     """The torque at standstill, without friction and back-EMF."""
     return float(_torque_limit(MATH, p, 0.0, T))
 

@@ -24,7 +24,7 @@ _BETWEEN_R40 = (
 
 
 def _numbers(*texts: str) -> tuple[float, ...]:
-    return tuple(sorted(float(each) / 100.0 for text in texts for each in text.split()))
+    return tuple(sorted(float(numeral) / 100.0 for text in texts for numeral in text.split()))
 
 
 SERIES: Mapping[str, tuple[float, ...]] = MappingProxyType(
@@ -122,16 +122,16 @@ def next_ratio(ratio: float, ratios: Sequence[float]) -> float | None:
     """The ratio on offer above `ratio`: of the `ratios` of a catalogue of gears, or else of the finest series; None
     where there is none."""
     if ratios:
-        return min((each for each in ratios if each > ratio), default=None)
+        return min((listed for listed in ratios if listed > ratio), default=None)
     decade = 10.0 ** math.floor(math.log10(ratio))
-    decades = (decade * each * numeral for each in (1.0, 10.0) for numeral in SERIES["R80"])
-    above = (each for each in decades if each > ratio * (1.0 + 1e-6))
+    decades = (decade * scale * numeral for scale in (1.0, 10.0) for numeral in SERIES["R80"])
+    above = (standard for standard in decades if standard > ratio * (1.0 + 1e-6))
     return float(f"{next(above):.4g}")
 
 
 def nearest(ratio: float, ratios: Iterable[float]) -> float:
     """The one of the `ratios` with which the speed differs least from that with the `ratio`."""
-    return min(ratios, key=lambda each: abs(math.log(each / ratio)))
+    return min(ratios, key=lambda candidate: abs(math.log(candidate / ratio)))
 
 
 def preferred_ratio(ratio: float, tolerance: float) -> tuple[float, str]:

@@ -377,19 +377,19 @@ def _cooling(xp: Any, p: Any, w: Any) -> Any:
     return p.cooling.still + (1.0 - p.cooling.still) * speed_share
 
 
-def _largest_torque(p: Any, T: float, *at: float) -> float:
+def _largest_torque(p: Any, T: float, *point: float) -> float:
     """The pull-out torque at the present voltage [V] and frequency [Hz] of the motor."""
-    return float(breakdown(p, at[0] / p.supply.V, at[1], T).air_gap_tau) if min(at) > 0.0 else 0.0
+    return float(breakdown(p, point[0] / p.supply.V, point[1], T).air_gap_tau) if min(point) > 0.0 else 0.0
 
 
-def _pull_out(p: Any, T: float, *at: float) -> float:
+def _pull_out(p: Any, T: float, *point: float) -> float:
     """The pull-out torque after friction and windage."""
-    return float(breakdown(p, at[0] / p.supply.V, at[1], T).tau) if min(at) > 0.0 else 0.0
+    return float(breakdown(p, point[0] / p.supply.V, point[1], T).tau) if min(point) > 0.0 else 0.0
 
 
-def _breakdown_speed(p: Any, T: float, *at: float) -> float:
+def _breakdown_speed(p: Any, T: float, *point: float) -> float:
     """The speed of the pull-out torque after friction and windage."""
-    V, f = at
+    V, f = point
     slip = float(breakdown(p, V / p.supply.V, f, T).slip) if min(V, f) > 0.0 else 1.0
     return (1.0 - slip) * _TURN * f / p.pole_pairs
 

@@ -136,13 +136,15 @@ def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: flo
 
     synchronous = _TURN * (p.supply.f if f is None else f) / p.pole_pairs
 
-    def at(slip: float) -> Steady:
+    def steady_at(slip: float) -> Steady:
         return steady(MATH, p, (1.0 - slip) * synchronous, voltage_share, f, T)
 
-    k, tau = 0, at(SLIPS[0]).tau
-    while k + 1 < len(SLIPS) and (next_tau := at(SLIPS[k + 1]).tau) >= tau:
+    k, tau = 0, steady_at(SLIPS[0]).tau
+    while k + 1 < len(SLIPS) and (next_tau := steady_at(SLIPS[k + 1]).tau) >= tau:
         k, tau = k + 1, next_tau
     low, high = SLIPS[max(k - 1, 0)], SLIPS[min(k + 1, len(SLIPS) - 1)]
     accuracy = {"xatol": 1e-6 * (high - low)}
-    most = minimize_scalar(lambda slip: -at(slip).tau, bounds=(low, high), method="bounded", options=accuracy)
-    return max(at(float(most.x)), at(high), key=lambda s: s.tau)
+    most = minimize_scalar(
+        lambda slip: -steady_at(slip).tau, bounds=(low, high), method="bounded", options=accuracy
+    )
+    return max(steady_at(float(most.x)), steady_at(high), key=lambda s: s.tau)

@@ -84,8 +84,8 @@ def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
     twice = [(stiffness, shaft) for shaft, stiffness in SHAFTS.items()]
     for name, other in (*twice, ("d2", "damping_ratio"), ("d3", "damping_ratio")):
         if name in numbers and other in numbers:
-            words = f"given beside {prefix}{other}, which sets it; leave out one of the two"
-            faults.add([InputError(f"{prefix}{name}: {words}", prefix + name)])
+            message = f"given beside {prefix}{other}, which sets it; leave out one of the two"
+            faults.add([InputError(f"{prefix}{name}: {message}", prefix + name)])
     for shaft, stiffness in SHAFTS.items():
         shaft_table = numbers.pop(shaft, None)
         if shaft_table is not None:

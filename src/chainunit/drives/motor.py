@@ -113,7 +113,7 @@ def _tune(p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuni
     return p, None
 
 
-def _breakdown_speed(p: Any, T: float, *at: float) -> float:
+def _breakdown_speed(p: Any, T: float, *point: float) -> float:
     return 0.0
 
 
@@ -152,9 +152,9 @@ class Motor(Model):
     """Outputs on which the largest torque at an instant depends, each with its resolution as a share of its largest
     value."""
     largest_torque: Callable[..., float] = UNSTATED
-    """Largest air-gap torque [N m] that the motor can give at an instant (p, T, *at) with the winding at T [K]; `at`
-    are the values of `limited_by`. A speed among them is positive in the direction of the torque, negative if the
-    torque brakes. The result is zero or negative if the motor can give no torque."""
+    """Largest air-gap torque [N m] that the motor can give at an instant (p, T, *point) with the winding at T [K];
+    `point` are the values of `limited_by`. A speed among them is positive in the direction of the torque, negative if
+    the torque brakes. The result is zero or negative if the motor can give no torque."""
     pull_out: Callable[..., float] = UNSTATED
     """Largest torque at the shaft [N m] while a load slows the motor down, from this point until it stalls;
     arguments as in `largest_torque`."""

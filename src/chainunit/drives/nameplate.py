@@ -183,7 +183,7 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
     faults.add(map(InputError, violations(Layout(Assumptions), assumptions)))
     faults.refuse()
     contradictions = _contradictions(nameplate, assumptions)
-    faults.add(InputError(f"{column} = {words}", column) for column, words in contradictions)
+    faults.add(InputError(f"{column} = {message}", column) for column, message in contradictions)
     faults.refuse()
 
 

@@ -42,11 +42,13 @@ def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_shar
     crossover = bandwidth * crossover_share
     kp = inertia * crossover / armature.k
     speed, current = (kp, kp * crossover / 5.0), (armature.L * bandwidth, armature.R * bandwidth)
-    phase, at = _tuned_margin(crossover_share)
+    phase, crossover_w = _tuned_margin(crossover_share)
     if not phase > 45.0:
         raise InputError(f"speed loop: phase margin {phase:.0f} deg, must be > 45 deg; lower crossover_share")
     names = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
-    return Tuning(dict(zip(names, (*speed, *current), strict=True)), phase, at * bandwidth, bandwidth)
+    return Tuning(
+        dict(zip(names, (*speed, *current), strict=True)), phase, crossover_w * bandwidth, bandwidth
+    )
 
 
 def _tuned_margin(share: float) -> tuple[float, float]:
@@ -66,13 +68,14 @@ def _margin(rise: Any, plant: Any) -> tuple[float, float]:
     power first. A test has the same of python-control, whose import takes a second."""
     # |rise|^2 = |plant|^2 in X = -w^2, as a polynomial times its mirror is even
     squares = [
-        np.polymul(each, each * (-1.0) ** np.arange(len(each))[::-1]) for each in map(np.array, (rise, plant))
+        np.polymul(polynomial, polynomial * (-1.0) ** np.arange(len(polynomial))[::-1])
+        for polynomial in map(np.array, (rise, plant))
     ]
     roots = np.roots(np.polysub(*squares)[::2])
     crossings = [math.sqrt(-x.real) for x in roots if x.real < 0.0 and abs(x.imag) < 1e-9 * abs(x)]
     margins = ((-np.polyval(rise, 1j * w) / np.polyval(plant, 1j * w), w) for w in crossings)
     return min(
-        ((float(np.degrees(np.angle(turned))), w) for turned, w in margins), key=lambda each: abs(each[0])
+        ((float(np.degrees(np.angle(turned))), w) for turned, w in margins), key=lambda margin: abs(margin[0])
     )
 
 
@@ -116,8 +119,8 @@ def loop(motor: Any, inertia: float) -> Loop:
     closed = np.polyadd(np.array([armature.L, armature.R, 0.0]), control)
     rise = armature.k * np.polymul([motor.speed_control.kp, motor.speed_control.ki], control)
     plant = inertia * np.polymul([1.0, 0.0, 0.0], closed)
-    phase, at = _margin(rise, plant)
-    time = np.linspace(0.0, 40.0 / at, 2001)
+    phase, crossover = _margin(rise, plant)
+    time = np.linspace(0.0, 40.0 / crossover, 2001)
     deviation = np.zeros(time.size)
     poles = np.polyadd(plant, rise)
     step = expm(np.vstack([-poles[1:] / poles[0], np.eye(3, 4)]) * time[1])
@@ -127,12 +130,12 @@ def loop(motor: Any, inertia: float) -> Loop:
         state = step @ state
     dip = float(np.max(np.abs(deviation)))
     outside = np.flatnonzero(np.abs(deviation) > 0.05 * dip)
-    frequency = np.logspace(-2.0, 1.5, 200) * at
+    frequency = np.logspace(-2.0, 1.5, 200) * crossover
     gain = np.polyval(rise, 1j * frequency) / np.polyval(plant, 1j * frequency)
     return Loop(
         inertia,
         phase,
-        at,
+        crossover,
         dip,
         float(time[outside[-1]]),
         frequency,

@@ -171,7 +171,7 @@ class SteadyMotion:
     def joined(cls, motions: Sequence[SteadyMotion], order: Any) -> SteadyMotion:
         """All points of some motions, in this order."""
         columns = zip(*(vars(motion).values() for motion in motions), strict=True)
-        return cls(*(np.concatenate(each, axis=-1)[..., order] for each in columns))
+        return cls(*(np.concatenate(column, axis=-1)[..., order] for column in columns))
 
 
 def steady(

@@ -75,12 +75,12 @@ def export(
         return _by_python(
             model, file, start, names, fmi, platforms, f", the C compiler {compiler.name} failed"
         )
-    words = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
+    text = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
     if platforms:
-        words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
+        text += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
     elif backend is None:
-        words += ", the C compiler found here"
-    return Origin("native", words)
+        text += ", the C compiler found here"
+    return Origin("native", text)
 
 
 def _by_python(
@@ -97,5 +97,5 @@ def _by_python(
     if platforms:
         raise InputError("platforms: need the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start, names=names)
-    words = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
-    return Origin("python", words)
+    text = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
+    return Origin("python", text)

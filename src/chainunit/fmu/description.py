@@ -92,8 +92,8 @@ class Interface:
     @cached_property
     def repeated(self) -> dict[str, Signal]:
         """The outputs that repeat another one, by name in the FMU, with the signal of that one."""
-        own = {signal.variable.name: signal for signal in self.signals_of("output")}
-        return {own[name].name: own[of] for name, of in self.model.repeated.items()}
+        outputs = {signal.variable.name: signal for signal in self.signals_of("output")}
+        return {outputs[name].name: outputs[original] for name, original in self.model.repeated.items()}
 
     @property
     def discrete(self) -> list[int]:
@@ -170,7 +170,7 @@ class Interface:
         t = self.trace
         constrained = self.model.constrained_states(casadi_(), t.p, t.u, t.x)
         pairs = zip(self.states, self.model.state_layout.values(t.x), constrained, strict=True)
-        return frozenset(v.name for v, own, met in pairs if not casadi.is_equal(casadi.SX(met), own))
+        return frozenset(v.name for v, start, met in pairs if not casadi.is_equal(casadi.SX(met), start))
 
     def _influences(self, symbols: list[Any], rows: list[Any]) -> list[list[int]]:
         """Value references of the parameters, inputs and states on which each row depends, directly or through
@@ -233,13 +233,13 @@ def model_description(
 
     _definitions(root, interface, exchange, set(), add_type)
     variables = SubElement(root, "ModelVariables")
-    for attributes, kind, own, state in _variables(interface, exchange):
+    for attributes, kind, typed, state in _variables(interface, exchange):
         # an output that repeats another one has its value reference, but a place of its own
         if (one := interface.repeated.get(attributes["name"])) is not None:
             attributes["valueReference"] = str(one.reference)
         # FMI 2.0 counts variables from 1
         derivative = {} if state is None else {"derivative": str(state + 1)}
-        SubElement(SubElement(variables, "ScalarVariable", attributes), kind, {**own, **derivative})
+        SubElement(SubElement(variables, "ScalarVariable", attributes), kind, {**typed, **derivative})
     structure = SubElement(root, "ModelStructure")
     lists = {name: Element(name) for name in ("Outputs", "Derivatives", "InitialUnknowns")}
     first_state = len(interface.parameters) + len(interface.inputs)
@@ -268,13 +268,13 @@ def model_description_3(
     variables = SubElement(root, "ModelVariables")
     elements: dict[str, Element] = {}
     last = 0
-    for attributes, kind, own, state in _variables(interface, True):
+    for attributes, kind, typed, state in _variables(interface, True):
         last = int(attributes["valueReference"])
         if attributes["name"] in interface.repeated:
             continue
         derivative = {} if state is None else {"derivative": str(state)}
         tag = TYPES_3[kind]
-        elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **own, **derivative})
+        elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **typed, **derivative})
     for signal in interface.signals_of("output"):
         if (one := interface.repeated.get(signal.name)) is not None:
             description = interface.text(signal.variable.description)
@@ -351,8 +351,8 @@ def _root(interface: Interface, version: str, identity: Mapping[str, str]) -> El
     about = model.fmu_data.about or About(
         metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version
     )
-    given = {"author": about.author, "version": about.version}
-    given |= {"copyright": about.copyright, "license": about.license}
+    texts = {"author": about.author, "version": about.version}
+    texts |= {"copyright": about.copyright, "license": about.license}
     return Element(
         "fmiModelDescription",
         dict(
@@ -361,7 +361,7 @@ def _root(interface: Interface, version: str, identity: Mapping[str, str]) -> El
                 ("modelName", model.name),
                 identifier,
                 ("description", model.description),
-                *((name, text) for name, text in given.items() if text),
+                *((name, text) for name, text in texts.items() if text),
                 ("generationTool", f"chainunit {version}"),
                 ("generationDateAndTime", generation_time()),
                 ("variableNamingConvention", interface.script.names),
@@ -467,14 +467,14 @@ def _typed(signal: Signal) -> dict[str, str]:
     start = {} if signal.start is None else {"start": written(signal.start, q.type)}
     if q.type == "Boolean":
         return start
-    own = _unit(signal.variable.unit) if q.type == "Real" else {}
+    typed = _unit(signal.variable.unit) if q.type == "Real" else {}
     if q.low > float("-inf"):
-        own["min"] = written(q.low, q.type)
+        typed["min"] = written(q.low, q.type)
     if q.high < float("inf"):
-        own["max"] = written(q.high, q.type)
+        typed["max"] = written(q.high, q.type)
     if q.nominal is not None:
-        own["nominal"] = repr(q.nominal)
-    return own | start
+        typed["nominal"] = repr(q.nominal)
+    return typed | start
 
 
 def terminals(interface: Interface, *, with_icon: bool = True) -> Element:

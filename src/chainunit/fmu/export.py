@@ -73,10 +73,10 @@ def export(
     contents["modelDescription.xml"] = xml_bytes(_description(interface, model.name, digest))
     # not by its import: a Python FMU that runs in this process brings its own pythonfmu, without binaries
     pythonfmu = Path(str(metadata.distribution("pythonfmu").locate_file("pythonfmu")))
-    for each in pythonfmu.glob("*.py"):
-        contents[f"resources/pythonfmu/{each.name}"] = each.read_bytes()
-    for each in (pythonfmu / "resources" / "binaries").glob("*/*"):
-        contents[f"binaries/{each.parent.name}/{model.name}{each.suffix}"] = each.read_bytes()
+    for script in pythonfmu.glob("*.py"):
+        contents[f"resources/pythonfmu/{script.name}"] = script.read_bytes()
+    for binary in (pythonfmu / "resources" / "binaries").glob("*/*"):
+        contents[f"binaries/{binary.parent.name}/{model.name}{binary.suffix}"] = binary.read_bytes()
     with atomic_file(file) as part:
         pack(contents | companion_files(interface, metadata.version("chainunit"), 2, ("pythonfmu",)), part)
     return file

@@ -59,14 +59,14 @@ class _RefusedError(Exception):
 
 
 @cache
-def _evaluation(model: Any, known: frozenset[int]) -> tuple[frozenset[int], list[int], Any]:
+def _evaluation(model: Any, references: frozenset[int]) -> tuple[frozenset[int], list[int], Any]:
     """These variables, always as the same object, the outputs among them by reference, and their function."""
     first = len(model.SETTABLE) + len(model.NOMINAL)
-    outputs = sorted(i for i in known if i >= first)
+    outputs = sorted(i for i in references if i >= first)
     results = [model.OUTPUTS[i - first] for i in outputs]
     functions: dict[str, Any] = {}
     exec(function_text("def values(p, u, x, k=()):", model.STATEMENTS, results), vars(model), functions)
-    return known, outputs, functions["values"]
+    return references, outputs, functions["values"]
 
 
 class ModelInstance:
@@ -165,9 +165,11 @@ class ModelInstance:
                 return False
             self._x = x
         for place, rate, half in run:
-            at = self.first_input + place
-            self._now[at] = self.settable[at].within_bounds(self._now[at] + step * (rate + step * half))
-            self._doubtful.add(at)
+            reference = self.first_input + place
+            self._now[reference] = self.settable[reference].within_bounds(
+                self._now[reference] + step * (rate + step * half)
+            )
+            self._doubtful.add(reference)
         self._touch()
         self._closed = self.model.CONTROLLED
         return True
@@ -257,8 +259,8 @@ class ModelInstance:
         if not bad:
             if not self._read.issuperset(references):
                 self._growths += 1
-                known = self._all if self._growths > _GROWTHS else self._read.union(references)
-                self._read, _, _ = _evaluation(self.model, known)
+                wanted = self._all if self._growths > _GROWTHS else self._read.union(references)
+                self._read, _, _ = _evaluation(self.model, wanted)
             # an output that was read at an earlier state only must not spoil these
             bad = self._fault(self._read) and self._fault(self._states.union(references))
         if bad:
@@ -266,10 +268,10 @@ class ModelInstance:
             self._now[self.first_output :] = [NAN] * len(self.model.OUTPUTS)
             self._known = self._all
 
-    def _fault(self, known: frozenset[int]) -> str:
+    def _fault(self, references: frozenset[int]) -> str:
         """Evaluate the outputs among these variables; why they have no values, or an empty text."""
         try:
-            self._known, outputs, function = _evaluation(self.model, known)
+            self._known, outputs, function = _evaluation(self.model, references)
             values = function(self._p, self._inputs(), self._x, *self._more)
             # the sum of finite numbers is finite, except of the largest, and takes a fifth of the time
             if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
@@ -371,9 +373,9 @@ class ModelInstance:
         return [row for row in rows if row[1] or row[2]]
 
     def _bad_input(self) -> str:
-        for at in sorted(self._doubtful):
-            if not self.settable[at].admits(self._now[at]):
-                return f"input {self.settable[at].complaint(self._now[at])}"
+        for reference in sorted(self._doubtful):
+            if not self.settable[reference].admits(self._now[reference]):
+                return f"input {self.settable[reference].complaint(self._now[reference])}"
         self._doubtful.clear()
         return ""
 

@@ -20,9 +20,9 @@ def icon_svg(sketch: Sketch) -> bytes:
     pieces = [
         f'<rect x="2" y="2" width="96" height="96" rx="6" fill="#ffffff" stroke="{_DARK}" stroke-width="2"/>'
     ]
-    at = _placed(sketch, 100.0, 100.0, 16.0)
-    pieces += _lines(sketch, at, 3.5)
-    pieces += _pins(sketch, at, 3.2, 6.0, 7.0)
+    positions = _placed(sketch, 100.0, 100.0, 16.0)
+    pieces += _lines(sketch, positions, 3.5)
+    pieces += _pins(sketch, positions, 3.2, 6.0, 7.0)
     return _svg(100.0, 100.0, pieces, width=_SIZE, height=_SIZE).encode()
 
 
@@ -38,15 +38,15 @@ def icon_png(sketch: Sketch) -> bytes:
         return [scale * (x - half), scale * (y - half), scale * (x + half), scale * (y + half)]
 
     draw.rounded_rectangle(box(50.0, 50.0, 48.0), 6.0 * scale, outline=_DARK, width=round(2 * scale))
-    at = _placed(sketch, 100.0, 100.0, 16.0)
-    for name, points in _strokes(sketch, at):
+    positions = _placed(sketch, 100.0, 100.0, 16.0)
+    for name, points in _strokes(sketch, positions):
         colour = _DRIVEN if name == sketch.driven else _DARK
         for x, y in points:  # round ends
             draw.ellipse(box(x, y, 1.75), fill=colour)
         draw.line(
             [(scale * x, scale * y) for x, y in points], fill=colour, width=round(3.5 * scale), joint="curve"
         )
-    for name, (x, y) in at.items():
+    for name, (x, y) in positions.items():
         if name in sketch.ground:
             corners = [(x - 6, y + 7), (x, y), (x + 6, y + 7), (x - 6, y + 7)]
             draw.polygon(
@@ -65,17 +65,17 @@ def icon_png(sketch: Sketch) -> bytes:
 def drawing(sketch: Sketch) -> str:
     """The machine with the names of its pins and links, as SVG."""
     width, height = 640.0, 420.0
-    at = _placed(sketch, width, height, 64.0)
-    strokes = list(_strokes(sketch, at))
-    pieces = _lines(sketch, at, 5.0)
-    pieces += _pins(sketch, at, 4.5, 9.0, 12.0)
+    positions = _placed(sketch, width, height, 64.0)
+    strokes = list(_strokes(sketch, positions))
+    pieces = _lines(sketch, positions, 5.0)
+    pieces += _pins(sketch, positions, 4.5, 9.0, 12.0)
     taken = [along for _, points in strokes for a, b in pairwise(points) for along in _between(a, b)]
-    taken += [(x, y + 8.0) for name, (x, y) in at.items() if name in sketch.ground]
+    taken += [(x, y + 8.0) for name, (x, y) in positions.items() if name in sketch.ground]
     middles = []
     for name, points in strokes:
         a, b = max(pairwise(points), key=lambda ends: math.dist(*ends))
         middles.append((name, (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])), "#5a5a5a"))
-    for name, place, colour in [*((name, place, _DARK) for name, place in at.items()), *middles]:
+    for name, place, colour in [*((name, place, _DARK) for name, place in positions.items()), *middles]:
         x, y = _clear_place(name, place, taken)
         taken += _between((x - _half(name), y), (x + _half(name), y))
         pieces.append(
@@ -129,29 +129,29 @@ def _placed(sketch: Sketch, width: float, height: float, margin: float) -> dict[
     }
 
 
-def _strokes(sketch: Sketch, at: Mapping[str, Place]) -> Iterator[tuple[str, list[Place]]]:
+def _strokes(sketch: Sketch, positions: Mapping[str, Place]) -> Iterator[tuple[str, list[Place]]]:
     """Each link with two pins or more, by name, as a line through its pins, closed where there are more than two."""
     for name, pins in sketch.links.items():
         if len(pins) > 1:
-            yield name, [at[pin] for pin in (*pins, *pins[: len(pins) > 2])]
+            yield name, [positions[pin] for pin in (*pins, *pins[: len(pins) > 2])]
 
 
 def _pins(
-    sketch: Sketch, at: Mapping[str, Place], radius: float, half: float, height: float
+    sketch: Sketch, positions: Mapping[str, Place], radius: float, half: float, height: float
 ) -> Iterator[str]:
     """The pins, those in the ground with a support of that half width and height."""
     look = f'fill="#ffffff" stroke="{_DARK}" stroke-width="2"'
-    for name, (x, y) in at.items():
+    for name, (x, y) in positions.items():
         if name in sketch.ground:
             foot = y + height
             yield f'<path d="M{x - half:.1f} {foot:.1f} L{x:.1f} {y:.1f} L{x + half:.1f} {foot:.1f} Z" {look}/>'
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" {look}/>'
 
 
-def _lines(sketch: Sketch, at: Mapping[str, Place], width: float) -> list[str]:
+def _lines(sketch: Sketch, positions: Mapping[str, Place], width: float) -> list[str]:
     return [
         f'<path d="M{" L".join(f"{x:.1f} {y:.1f}" for x, y in points)}" fill="none" '
         f'stroke="{_DRIVEN if name == sketch.driven else _DARK}" stroke-width="{width:g}" stroke-linecap="round" '
         'stroke-linejoin="round"/>'
-        for name, points in _strokes(sketch, at)
+        for name, points in _strokes(sketch, positions)
     ]

@@ -81,7 +81,9 @@ class PrintedSlave(Fmi2Slave):  # type: ignore[misc]
         types = (
             dict.fromkeys(range(instance.first_output + len(self.model.OUTPUTS)), "Real") | self.model.TYPES
         )
-        self._of_type = {kind: {i for i, own in types.items() if own == kind} for kind in _NOTHING}
+        self._of_type = {
+            kind: {i for i, type_name in types.items() if type_name == kind} for kind in _NOTHING
+        }
 
     # -- life cycle
 
@@ -125,7 +127,9 @@ class PrintedSlave(Fmi2Slave):  # type: ignore[misc]
         if vr in self._of_type[kind]:
             return True
         line = (
-            messages.OTHER_TYPE if any(vr in own for own in self._of_type.values()) else messages.NO_REFERENCE
+            messages.OTHER_TYPE
+            if any(vr in references for references in self._of_type.values())
+            else messages.NO_REFERENCE
         )
         self._instance.tell(line.format(reference=vr, type=kind))
         return False

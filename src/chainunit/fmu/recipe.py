@@ -38,5 +38,5 @@ def icon(model: Model, kind: str, sketch: Sketch | None) -> bytes:
     folder = resources.files("chainunit") / "data" / "icons"
     takes = {t.members["tau_bias"] in model.input_layout.names for t in model.terminals if t.kind == LOAD}
     general = {frozenset({True}): "motor", frozenset({True, False}): "line"}.get(frozenset(takes), "machine")
-    own = folder / f"{model.name}.{kind}"
-    return (own if own.is_file() else folder / f"{general}.{kind}").read_bytes()
+    picture = folder / f"{model.name}.{kind}"
+    return (picture if picture.is_file() else folder / f"{general}.{kind}").read_bytes()

@@ -88,7 +88,7 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
             reason,
         )
         return {}
-    words = {
+    titles = {
         INPUTS: f"inputs, set every {STEP * 1e3:g} ms; in between each stays, or follows another input that is its "
         "derivative",
         STEPPED: "outputs at the end of each step, before the inputs of that time are set",
@@ -99,7 +99,7 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     files = {f"{REFERENCE}/{name}_{end}.csv": csv_bytes(*table, types) for end, table in tables.items()}
     test = ReferenceExperiment(
         "reference",
-        f"{words[INPUTS]}; {words[STEPPED]}",
+        f"{titles[INPUTS]}; {titles[STEPPED]}",
         STEP,
         f"{name}_{INPUTS}.csv",
         f"{name}_{STEPPED}.csv",
@@ -108,7 +108,7 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     files[f"{REFERENCE}/{smoke_test}"] = experiments_file(name, "Smoke test in Co-Simulation", [test])
     root = related_files()
     related = [
-        ("text/csv", f"{name}_{end}.csv", "testcase" if end == INPUTS else "result", words[end])
+        ("text/csv", f"{name}_{end}.csv", "testcase" if end == INPUTS else "result", titles[end])
         for end in tables
     ]
     related.append(
@@ -388,8 +388,8 @@ def _inertia(interface: Interface, torque: str) -> float:
     p = parameters_at_start(interface)
     u = [s.start for s in interface.signals_of("input")]
     x = layout.values(model.begin(p, model.input_layout.instance(u)))
-    at: list[Any] = [model.parameter_layout.values(p), u, x, getattr(p, "derived", [])]
-    slopes = casadi.Function("slopes", symbols, [casadi.densify(by)])(*at).full()
+    point: list[Any] = [model.parameter_layout.values(p), u, x, getattr(p, "derived", [])]
+    slopes = casadi.Function("slopes", symbols, [casadi.densify(by)])(*point).full()
     return float(1.0 / (abs(slopes).max() or 1.0))
 
 

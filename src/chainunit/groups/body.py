@@ -100,6 +100,6 @@ def reflected_inertia(bodies: Iterable[Body]) -> tuple[Any, Any]:
     """Reflected inertia of several bodies J [kg m2] and its derivative dJ/dq."""
     J, dJ = 0.0, 0.0
     for body in bodies:
-        own, slope = body.inertia()
-        J, dJ = J + own, dJ + slope
+        inertia, slope = body.inertia()
+        J, dJ = J + inertia, dJ + slope
     return J, dJ

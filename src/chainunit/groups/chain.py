@@ -291,13 +291,13 @@ def close_with_jolt(
     N, work = len(rods), 0.0
     nothing = [Vec2(0.0, 0.0)] * N, [0.0] * N, [0.0] * N
     for _ in range(rounds):
-        at = end_motion(rods, theta, omega, xp)
+        chain_end = end_motion(rods, theta, omega, xp)
         recursion = Recursion(xp, rods, theta, *nothing)
         # the speed of the end is taken at the angles before the change: it is as near as they are
-        turns, _ = recursion.back(recursion.force(end.p - at.p))
-        jolt = recursion.force(end.p1 - at.p1)
+        turns, _ = recursion.back(recursion.force(end.p - chain_end.p))
+        jolt = recursion.force(end.p1 - chain_end.p1)
         faster, _ = recursion.back(jolt)
-        work = work + 0.5 * jolt.dot(end.p1 + at.p1)
+        work = work + 0.5 * jolt.dot(end.p1 + chain_end.p1)
         theta = [a + d for a, d in zip(theta, turns, strict=True)]
         omega = [w + d for w, d in zip(omega, faster, strict=True)]
     return list(theta), list(omega), work

@@ -63,9 +63,9 @@ class Crank(Driver):
         arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
         return mass.I + mass.m * arm2
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The crank at the angle `q` [rad]."""
-        bearing, start = at.pins[self.bar.pin], self.start
+        bearing, start = linkage.pins[self.bar.pin], self.start
         c, s = xp.cos(q), xp.sin(q) * self.sense
         u = Vec2(start.x * c - start.y * s, start.y * c + start.x * s)
         joints = Hinge(0, base=bearing), CrankDrive(0, int(self.sense))
@@ -93,9 +93,9 @@ class Ram(Driver):
         """Its mass [kg]."""
         return 0.0 if self.bar.mass is None else self.bar.mass.m
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The ram at the way `q` [m]."""
-        rail = self.rail.at_position(at.links)
+        rail = self.rail.at_position(linkage.links)
         way = rail.u * q
         return SolvedGroup([(rail.pin.p + way, rail.u)], [Guide(0, rail.u, q, way, rail, line=0.0)])
 
@@ -141,9 +141,9 @@ class Cylinder(Driver):
         """The mass of the rod [kg]."""
         return 0.0 if self.rod.mass is None else self.rod.mass.m
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The cylinder at the way `q` [m]."""
-        p, o = at.pins[self.bar.pin], at.pins[self.lever.pin]
+        p, o = linkage.pins[self.bar.pin], linkage.pins[self.lever.pin]
         way, h, b = q + self.shift, self.offset, self.lever.length
         square = way * way + h * h
         e, r = meeting(xp, p.p, o.p, square, b * b, self.side)

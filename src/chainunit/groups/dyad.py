@@ -41,13 +41,13 @@ class Dyad(Group):
             HingeData(second.pin, second.name),
         )
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The dyad where its outer pins are."""
         a, b, start, end = (
             self.first.length,
             self.second.length,
-            at.pins[self.first.pin],
-            at.pins[self.second.pin],
+            linkage.pins[self.first.pin],
+            linkage.pins[self.second.pin],
         )
         r1, r2 = meeting(xp, start.p, end.p, a * a, b * b, self.side)
         # casadi turns each use of 1/x into a division by x, but keeps -1/x
@@ -94,8 +94,8 @@ class RRP(Group):
             GuideData(self.guide, slider, self.rail),
         )
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        start, rail, a = at.pins[self.first.pin], self.rail.at_position(at.links), self.first.length
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        start, rail, a = linkage.pins[self.first.pin], self.rail.at_position(linkage.links), self.first.length
         d, w = rail.u, rail.pin.p - start.p
         across = w.cross(d)
         along = self.side * xp.sqrt(a * a - across * across)
@@ -136,8 +136,8 @@ class RPR(Group):
             HingeData(second.pin, second.name),
         )
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        start, end, h = at.pins[self.first.pin], at.pins[self.second.pin], self.offset
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        start, end, h = linkage.pins[self.first.pin], linkage.pins[self.second.pin], self.offset
         v = start.p - end.p  # way d + offset n
         square = v.squared()
         way = self.side * xp.sqrt(square - h * h)
@@ -171,8 +171,8 @@ class PRP(Group):
             GuideData(self.guides_at[1], second, self.second_rail),
         )
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        a, b = self.first_rail.at_position(at.links), self.second_rail.at_position(at.links)
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        a, b = self.first_rail.at_position(linkage.links), self.second_rail.at_position(linkage.links)
         per, gap = 1.0 / a.u.cross(b.u), b.pin.p - a.pin.p
         # a.u x - b.u y = gap
         x, y = gap.cross(b.u) * per, gap.cross(a.u) * per
@@ -208,8 +208,8 @@ class RPP(Group):
             GuideData(self.guides_at[1], yoke, self.rail),
         )
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        start, rail, slot = at.pins[self.block.pin], self.rail.at_position(at.links), self.slot
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        start, rail, slot = linkage.pins[self.block.pin], self.rail.at_position(linkage.links), self.slot
         d = rail.u
         e = d * slot.x + d.turned() * slot.y
         per, w = 1.0 / slot.y, start.p - rail.pin.p  # w = d x + e y, and d x e = slot.y

@@ -115,6 +115,6 @@ class Group:
         [rad]."""
         return []
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the coordinate `q` of the driver [rad, m]; `at` is the linkage before the group there."""
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The group at the coordinate `q` of the driver [rad, m]; `linkage` has the links before the group there."""
         raise NotImplementedError

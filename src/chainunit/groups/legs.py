@@ -52,8 +52,8 @@ class Leg:
         """Its outer joint, and the one with the ternary link of this name."""
         raise NotImplementedError
 
-    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
-        """The leg of this number, with the linkage `at` before it."""
+    def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
+        """The leg of this number, with the linkage `linkage` before it."""
         raise NotImplementedError
 
 
@@ -69,8 +69,8 @@ class RodLeg(Leg):
         name = self.bar.name
         return HingeData(self.bar.pin, name), HingeData(self.pin, name, ternary)
 
-    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
-        return partial(_rod, number, at.pins[self.bar.pin], self.bar.length, self.arm)
+    def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
+        return partial(_rod, number, linkage.pins[self.bar.pin], self.bar.length, self.arm)
 
 
 @dataclass
@@ -88,8 +88,8 @@ class BlockLeg(Leg):
     def joints(self, ternary: str) -> tuple[JointData, JointData]:
         return GuideData(self.guide, self.bar.name, self.on), HingeData(self.pin, self.bar.name, ternary)
 
-    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
-        return partial(_block, number, self.on.at_position(at.links), self.arm)
+    def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
+        return partial(_block, number, self.on.at_position(linkage.links), self.arm)
 
 
 @dataclass
@@ -107,8 +107,8 @@ class SlotLeg(Leg):
     def joints(self, ternary: str) -> tuple[JointData, JointData]:
         return HingeData(self.bar.pin, self.bar.name), GuideData(self.guide, self.bar.name, ternary)
 
-    def at_position(self, number: int, at: LinkageInMotion) -> PlacedLeg:
-        return partial(_slot, number, at.pins[self.bar.pin], self.at, self.along)
+    def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
+        return partial(_slot, number, linkage.pins[self.bar.pin], self.at, self.along)
 
 
 def rods_at(outer: Sequence[Motion], lengths: Sequence[Any], arms: Sequence[Vec2]) -> list[PlacedLeg]:
@@ -131,8 +131,8 @@ def _block(number: int, rail: Link, arm: Vec2, origin: Vec2, u: Vec2) -> LegAt:
     return LegAt((n.x, n.y, a.cross(n)), -way.dot(n), a, None, (rail.pin.p + way, d), *joints)
 
 
-def _slot(number: int, outer: Motion, at: Vec2, along: Vec2, origin: Vec2, u: Vec2) -> LegAt:
-    d, a, y = _turned(along, u), _turned(at, u), outer.p - origin
+def _slot(number: int, outer: Motion, point: Vec2, along: Vec2, origin: Vec2, u: Vec2) -> LegAt:
+    d, a, y = _turned(along, u), _turned(point, u), outer.p - origin
     n = d.turned()
     joints = Hinge(number, base=outer), Guide(number, d, (y - a).dot(d), y, LEGS)
     return LegAt((n.x, n.y, y.cross(n)), (y - a).dot(n), a, None, (outer, d), *joints)

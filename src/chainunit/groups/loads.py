@@ -298,15 +298,15 @@ class GuideLosses(NamedTuple):
         smooth2, w2, rest, slope = self.guide.v_smooth * self.guide.v_smooth, w * w, 0.0, 0.0
         friction, by_speed = self.guide.friction, turning is None
         for joint, slide in m.slides.items():
-            k, own = slide.s1, self.damping
+            k, loss = slide.s1, self.damping
             grown = self._growing(m, joint, reactions[joint], growing[joint], by_speed)
             for press, more in zip(self._presses(m, joint, reactions[joint]), grown, strict=True):
                 k2, minus_per, ratio = _friction_terms(xp, press * press, k, w2, smooth2)
                 wider = k2 * w if by_speed else k * slide.s2 * w2
                 grows = (ratio * ratio * wider - press * more) * (minus_per / ratio)
                 slope = slope + k2 * (friction * grows)
-                own = own + friction * ratio
-            rest = rest + (k * k * own if by_speed else 2.0 * (k * slide.s2) * own)
+                loss = loss + friction * ratio
+            rest = rest + (k * k * loss if by_speed else 2.0 * (k * slide.s2) * loss)
         return slope * w + (rest if by_speed else rest * w)
 
     def _presses(self, m: Moving, joint: Joint, reaction: Vec2) -> tuple[Any, ...]:

@@ -106,17 +106,17 @@ class Triad(Group):
         outer, inner = zip(*(leg.joints(self.name) for leg in self.legs), strict=True)
         return *outer, *inner
 
-    def solve(self, xp: Any, q: Any, at: LinkageInMotion, derived: Sequence[Any]) -> SolvedTriad:
-        """The triad with the linkage `at` before it, on the branch that the series `derived` gives."""
-        legs = self.at_position(at)
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedTriad:
+        """The triad with the linkage `linkage` before it, on the branch that the series `derived` gives."""
+        legs = self.at_position(linkage)
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
         if self.turns:
             near = near._replace(theta=near.theta + self.turns * q)
         return SolvedTriad(xp, legs, correct_pose(xp, legs, near, _STEPS))
 
-    def at_position(self, at: LinkageInMotion) -> tuple[PlacedLeg, ...]:
-        """The legs, with the linkage `at` before them, for any pose of the ternary link."""
-        return tuple(leg.at_position(k, at) for k, leg in enumerate(self.legs))
+    def at_position(self, linkage: LinkageInMotion) -> tuple[PlacedLeg, ...]:
+        """The legs, with the linkage `linkage` before them, for any pose of the ternary link."""
+        return tuple(leg.at_position(k, linkage) for k, leg in enumerate(self.legs))
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
         """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""
@@ -283,10 +283,10 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
         u, v, a, b = parts(theta)
         # D lies on the circle about P2 and on the lines d . u = a and d . v = b; these two are one line where u and v
         # are parallel, as with parallel hangers, so that both ends of the chord are tried
-        across, at = (u, a) if u.squared() > v.squared() else (v, b)
+        across, offset = (u, a) if u.squared() > v.squared() else (v, b)
         if not across.squared() > 0.0:
             continue
-        base = across * (at / across.squared())
+        base = across * (offset / across.squared())
         chord = across.turned() * math.sqrt(max(l2 * l2 - base.squared(), 0.0) / across.squared())
         cos, sin = math.cos(theta), math.sin(theta)
         arm = Vec2(cos * arms[1].x - sin * arms[1].y, sin * arms[1].x + cos * arms[1].y)

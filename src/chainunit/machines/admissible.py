@@ -33,20 +33,20 @@ def admits(model: MachineModel) -> Callable[[Mapping[str, float]], bool]:
 
 
 def holding_range(
-    admitted: Callable[[Mapping[str, float]], bool], given: Mapping[str, float], name: str, start: float
+    admitted: Callable[[Mapping[str, float]], bool], values: Mapping[str, float], name: str, start: float
 ) -> tuple[float, float] | None:
-    """The range of the value `name` about its `start` in which the machine works (`admitted`), with the other `given`
-    values; None if it does not work at the start. An end without a limit nearby is 0, or infinite."""
+    """The range of the value `name` about its `start` in which the machine works (`admitted`), with the other
+    `values`; None if it does not work at the start. An end without a limit nearby is 0, or infinite."""
     inside = start
 
     def holds(value: float) -> bool:
-        return admitted({**given, name: value})
+        return admitted({**values, name: value})
 
     if not holds(inside):
         return None
     ends = []
     for sense in (-1.0, 1.0):
-        outside = given[name] if name in given and sense * (given[name] - inside) > 0.0 else None
+        outside = values[name] if name in values and sense * (values[name] - inside) > 0.0 else None
         held = inside
         if outside is None or holds(outside):
             outside = None
@@ -69,23 +69,23 @@ def holding_range(
 
 
 def causes(
-    admitted: Callable[[Mapping[str, float]], bool], given: Mapping[str, float], layout: Layout, start: Any
+    admitted: Callable[[Mapping[str, float]], bool], values: Mapping[str, float], layout: Layout, start: Any
 ) -> dict[str, str]:
     """The given values each of which alone spoils the machine, by name, in words with the range in which it works.
     Whoever keeps to a range is not refused again. `start` are the values of the `layout` that are not given."""
-    words = {}
+    reasons = {}
     units = {variable.name: unit_behind(variable.unit) for variable in layout.variables}
     for name, usual in layout.by_name(start).items():
-        if name not in given or given[name] == usual:
+        if name not in values or values[name] == usual:
             continue
-        span, unit = holding_range(admitted, given, name, usual), units[name]
+        span, unit = holding_range(admitted, values, name, usual), units[name]
         if span is None:
             continue
         low, high = (_inward(x, sense) for x, sense in zip(span, (1.0, -1.0), strict=True))
         limits = [f">= {low}{unit}"] if span[0] not in (0.0, -math.inf) else []
         limits += [f"<= {high}{unit}"] if math.isfinite(span[1]) else []
-        words[name] = f"{name} = {given[name]:g}{unit} must be {' and '.join(limits)}"
-    return words
+        reasons[name] = f"{name} = {values[name]:g}{unit} must be {' and '.join(limits)}"
+    return reasons
 
 
 def _inward(x: float, sense: float) -> str:

@@ -229,10 +229,10 @@ class ChainUnitMachine(Machine):
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
         _check_side(side)
-        p, own = self.p, getattr(self.p, side)
+        p, organ = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
         on_web = p.web_share * loads.material_mass
-        masses = own.wall_mass + loads.material_mass - on_web, own.web_mass + on_web
+        masses = organ.wall_mass + loads.material_mass - on_web, organ.web_mass + on_web
         counts = split((p.l1, p.l2), number)
         lengths, shares = ([x / n for x, n in zip(xs, counts, strict=True)] for xs in ((p.l1, p.l2), masses))
         return np.repeat(lengths, counts), np.repeat(shares, counts)
@@ -268,7 +268,7 @@ class ChainUnitMachine(Machine):
                 except GeometryError:
                     continue
                 candidates.append(modes(lengths, masses * self.p.g, rest, self.p.g))
-        return min(candidates, key=lambda each: float(each.frequency[0]), default=None)
+        return min(candidates, key=lambda candidate: float(candidate.frequency[0]), default=None)
 
     def rocker_extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """(psi, phi_crank) [rad] at the right and at the left extreme of the rocker."""

@@ -122,10 +122,15 @@ class ChainSide(chain_unit.Side):
 
 
 def _rod_fields(
-    name: str, number: int, unit: str, words: str, nominal: float | None = None, default: float | None = None
+    name: str,
+    number: int,
+    unit: str,
+    template: str,
+    nominal: float | None = None,
+    default: float | None = None,
 ) -> list[Any]:
     return [
-        (f"{name}_{k}", Value, quantity(unit, words.format(k, k + 1), nominal=nominal, default=default))
+        (f"{name}_{k}", Value, quantity(unit, template.format(k, k + 1), nominal=nominal, default=default))
         for k in range(1, number + 1)
     ]
 
@@ -155,13 +160,13 @@ class Organs:
     def __init__(self, walls: int, webs: int) -> None:
         self.walls, self.webs = walls, webs
         self.number = N = walls + webs
-        words = "angle of rod {}, counted from A1, from the downward vertical, positive towards +x"
+        angle = "angle of rod {}, counted from A1, from the downward vertical, positive towards +x"
         due = "energy at the start, plus the work of the rocker since, minus the losses to damping and processing"
         self.States = declared_class(
             "ChainStates",
             (),
             [
-                *_rod_fields("theta", N, "rad", words),
+                *_rod_fields("theta", N, "rad", angle),
                 *_rod_fields("omega", N, "rad/s", "speed of rod {}", 10.0),
                 ("energy_due", Value, quantity("J", due, nominal=100.0)),
             ],
@@ -180,7 +185,7 @@ class Organs:
             "RodStart",
             (),
             [
-                *_rod_fields("theta", N, "rad", words, default=0.0),
+                *_rod_fields("theta", N, "rad", angle, default=0.0),
                 *_rod_fields("omega", N, "rad/s", "speed of rod {}", default=0.0),
             ],
         )
@@ -207,10 +212,12 @@ class Organs:
         sides = []
         for masses, loads in ((p.left, u.left), (p.right, u.right)):
             on_web = p.web_share * loads.material_mass
-            each = [(masses.wall_mass + (loads.material_mass - on_web)) / walls] * walls
-            each += [(masses.web_mass + on_web) / webs] * webs
+            rod_masses = [(masses.wall_mass + (loads.material_mass - on_web)) / walls] * walls
+            rod_masses += [(masses.web_mass + on_web) / webs] * webs
             law = p.organ
-            sides.append(Rods(lengths, each, damping, p.rod_inertia, law.fold_limit, law.fold_stiffness))
+            sides.append(
+                Rods(lengths, rod_masses, damping, p.rod_inertia, law.fold_limit, law.fold_stiffness)
+            )
         return sides
 
     def linkage(self, p: Any, u: Any, states: Sequence[State]) -> Linkage:
@@ -345,7 +352,11 @@ class Organs:
     def improved(self, xp: Any, p: Any, u: Any, q: Any, z: Sequence[Any]) -> list[Any]:
         """The unknowns after one more round."""
         sides = zip(self.rods(p, u), self._reaches(xp, p, u, q), (z[:3], z[3:]), strict=True)
-        return [value for rods, reach, own in sides for value in hanging_chain.hang(xp, rods, reach, own)]
+        return [
+            value
+            for rods, reach, unknowns in sides
+            for value in hanging_chain.hang(xp, rods, reach, unknowns)
+        ]
 
     def start_states(
         self, xp: Any, p: Any, u: Any, q: Any, w: Any, z: Sequence[Any], rods_start: Any = None
@@ -361,7 +372,7 @@ class Organs:
                 theta = hanging_chain.resting(xp, rods, names.hand, z[3 * k : 3 * k + 3])
             states.append((theta, [0.0 * theta[0]] * self.number))
         if rods_start is not None:
-            states = [self._start_state(rods_start, *each) for each in zip(SIDES, states, strict=True)]
+            states = [self._start_state(rods_start, *hung) for hung in zip(SIDES, states, strict=True)]
         m = self.mechanism(xp, p, u, states, q)
         # closed once only: a chain without a hanging position keeps a gap, which `start_limits` refuses
         states = [m.linkage.loads[side].close(xp, m, w)[:2] for side in SIDES]
@@ -377,8 +388,8 @@ class Organs:
         N, share = self.number, rods_start.given
         start = self._start_layout.values(getattr(rods_start, side))
         values = [
-            (1.0 - share) * rest + share * own
-            for rest, own in zip((*hanging[0], *hanging[1]), start, strict=True)
+            (1.0 - share) * rest + share * chosen
+            for rest, chosen in zip((*hanging[0], *hanging[1]), start, strict=True)
         ]
         return values[:N], values[N:]
 

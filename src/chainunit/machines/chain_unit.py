@@ -511,8 +511,8 @@ def _further_quantities(
     pulls = organ_pulls(xp, p, u, *(outputs[f"rocker.{name}"] for name in ("psi", "w", "a")))
     for side in SIDES:
         for rod in RODS:
-            words = f"mean pull of the {rod} of the {side} organ"
-            variable = Variable(f"mean_pull({side}.{rod})", words, Quantity("N", words))
+            description = f"mean pull of the {rod} of the {side} organ"
+            variable = Variable(f"mean_pull({side}.{rod})", description, Quantity("N", description))
             columns.append((variable, 0.5 * sum(pulls[side][rod].values())))
     return columns
 

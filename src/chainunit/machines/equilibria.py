@@ -115,7 +115,7 @@ class Equilibria:
     @property
     def stable(self) -> tuple[Equilibrium, ...]:
         """Those about which the machine swings."""
-        return tuple(each for each in self.places if each.stable)
+        return tuple(place for place in self.places if place.stable)
 
     @property
     def indifferent(self) -> bool:
@@ -164,7 +164,7 @@ class _AtRest:
     def loads_without_potential(self, q: Any, nothing: float) -> tuple[str, ...]:
         """The names of the loads that have such a part at any of the places, of a size above `nothing`."""
         effects = self.state(q).effects
-        return tuple(name for name, each in effects.items() if np.max(np.abs(each.dissipative)) > nothing)
+        return tuple(name for name, effect in effects.items() if np.max(np.abs(effect.dissipative)) > nothing)
 
 
 def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
@@ -188,17 +188,17 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     TypeError
         for a machine whose outputs depend on states.
     """
-    at, model = _AtRest(machine, feed), machine.model
+    resting, model = _AtRest(machine, feed), machine.model
     low, high = model.span
     q = np.linspace(low, high, 361)
-    state = at.state(q)
+    state = resting.state(q)
     size = _size(state, q)
     bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
     nothing, repeats = _NOTHING * size, True
     if model.turns:
         # the same place of another turn; no round angle, at which a torque may jump
         odd = low + _ODD * np.arange(1, 8)
-        gap = at.torque(odd + _TURN)[0] - at.torque(odd)[0]
+        gap = resting.torque(odd + _TURN)[0] - resting.torque(odd)[0]
         repeats = bool(np.all(np.abs(gap) <= 1e3 * nothing))
         if repeats:
             # no zero lies at the begin of the turn
@@ -207,25 +207,27 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
             high = low + _TURN
         else:
             low, high = low - 0.5 * _TURN, low + 0.5 * _TURN
-    curve = sampled(at.torque, low, high)
+    curve = sampled(resting.torque, low, high)
     # a driver on its stop is pushed back by it
-    found = _zeros(at, curve, nothing, None if model.turns else (-1.0, 1.0))
-    driven = at.loads_without_potential(curve.x, nothing)
-    places = np.array([x for zero in found for x in (zero.begin, zero.end)])
-    rest, work = _rest(at, curve, places, not driven, model.turns and repeats)
+    crossings = _zeros(resting, curve, nothing, None if model.turns else (-1.0, 1.0))
+    driven = resting.loads_without_potential(curve.x, nothing)
+    places = np.array([x for zero in crossings for x in (zero.begin, zero.end)])
+    rest, work = _rest(resting, curve, places, not driven, model.turns and repeats)
     closes = not (model.turns and repeats) or abs(work) <= _CLOSES * size * _TURN
     rest = rest._replace(potential=rest.potential if closes else None)
     level = _LEVEL * size * (high - low)
     limits = nothing, _FLAT * size / (high - low), _LIGHT * float(np.max(inertia)), level
     way = _Judged(low, high, not model.turns, *limits)
-    listed = [_equilibrium(at, zero, rest, way) for zero in found]
+    listed = [_equilibrium(resting, zero, rest, way) for zero in crossings]
     if model.turns and repeats:
         rest = _from_start(rest, model.span[0])
-        listed = [_folded(each) for each in listed]
+        listed = [_folded(equilibrium) for equilibrium in listed]
     at_peak, _ = largest(
-        lambda x: np.abs(at.torque(x)[0])[None], np.linspace(low, high, 361), around=model.turns and repeats
+        lambda x: np.abs(resting.torque(x)[0])[None],
+        np.linspace(low, high, 361),
+        around=model.turns and repeats,
     )
-    peak, peak_at = float(at.torque(at_peak)[0][0]), float(at_peak[0])
+    peak, peak_at = float(resting.torque(at_peak)[0][0]), float(at_peak[0])
     if abs(peak) <= nothing:
         peak, peak_at = 0.0, model.span[0]
     summary = Holding(
@@ -234,36 +236,38 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
         work=0.0 if abs(work) <= _CLOSES * size * (high - low) else work,
         friction=float(np.max(rest.friction)),
     )
-    return Equilibria(tuple(sorted(listed, key=lambda each: each.place)), summary, rest, driven, repeats)
+    return Equilibria(
+        tuple(sorted(listed, key=lambda equilibrium: equilibrium.place)), summary, rest, driven, repeats
+    )
 
 
 def _size(state: MachineState, q: Any) -> float:
     """The largest torque of a single load, or of the weight of a single body, at the places `q` [N m]."""
-    sizes = [np.abs(each.field) * body.m * np.abs(body.c.p1.y)
-             for each in state.effects.values() for body in state.m.bodies.values()]  # fmt: skip
-    sizes += [np.abs(each.conservative) + np.abs(each.dissipative)
-              for each in state.effects.values()]  # fmt: skip
-    return max((float(np.max(np.broadcast_to(each, q.shape))) for each in sizes), default=0.0)
+    sizes = [np.abs(effect.field) * body.m * np.abs(body.c.p1.y)
+             for effect in state.effects.values() for body in state.m.bodies.values()]  # fmt: skip
+    sizes += [np.abs(effect.conservative) + np.abs(effect.dissipative)
+              for effect in state.effects.values()]  # fmt: skip
+    return max((float(np.max(np.broadcast_to(size, q.shape))) for size in sizes), default=0.0)
 
 
 def _zeros(
-    at: _AtRest, curve: SampledCurve, nothing: float, beyond: tuple[float, float] | None
+    resting: _AtRest, curve: SampledCurve, nothing: float, beyond: tuple[float, float] | None
 ) -> list[Zero]:
     """The zeros of the holding torque; one over the whole way where no load has a torque."""
     if np.all(np.abs(curve.values) <= nothing):
         return [Zero(float(curve.x[0]), float(curve.x[-1]), 0.0, 0.0)]
-    return zeros(at.torque, curve, nothing, beyond)
+    return zeros(resting.torque, curve, nothing, beyond)
 
 
 def friction_torque(state: MachineState) -> Any:
     """The torque that friction of pins and guides holds at the driver [N m], of the shape of the state: each slips
     with its reaction at rest, which is without friction."""
-    losses = [each for each in state.m.linkage.loads.values() if isinstance(each, PinLosses | GuideLosses)]
+    losses = [loss for loss in state.m.linkage.loads.values() if isinstance(loss, PinLosses | GuideLosses)]
     return sum(
-        each._replace(damping=0.0)
+        loss._replace(damping=0.0)
         .effect(numpy_(), state.m, _SLIDING, state.steady.reactions)
         .dissipative
-        for each in losses
+        for loss in losses
     )  # fmt: skip
 
 
@@ -271,21 +275,21 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 def _rest(
-    at: _AtRest, curve: SampledCurve, places: Any, conservative: bool, around: bool
+    resting: _AtRest, curve: SampledCurve, places: Any, conservative: bool, around: bool
 ) -> tuple[Rest, float]:
     """The machine at rest at the places of the curve and at further `places`, and the work of the holding torque over
     the way [J]. The potential is the energy of weights and springs with the integral of all other torque."""
     x = np.unique(np.concatenate([curve.x, places]))
-    state = at.state(x)
+    state = resting.state(x)
     bias, inertia, energy, friction = (
-        np.broadcast_to(each, x.shape).copy()
-        for each in (state.bias, state.J, state.potential_energy, friction_torque(state))
+        np.broadcast_to(course, x.shape).copy()
+        for course in (state.bias, state.J, state.potential_energy, friction_torque(state))
     )
     potential = energy
     if not conservative:
         half = 0.5 * np.diff(x)
         nodes = 0.5 * (x[1:] + x[:-1])[:, None] + half[:, None] * _NODES
-        parts = (at.driven(nodes.ravel()).reshape(nodes.shape) @ _WEIGHTS) * half
+        parts = (resting.driven(nodes.ravel()).reshape(nodes.shape) @ _WEIGHTS) * half
         potential = energy + np.concatenate([[0.0], np.cumsum(parts)])
     elif around:
         potential[-1] = potential[0]
@@ -307,10 +311,10 @@ class _Judged(NamedTuple):
     level: float
 
 
-def _equilibrium(at: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibrium:
+def _equilibrium(resting: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibrium:
     """The equilibrium at a zero of the holding torque."""
     kind = {(-1.0, 1.0): STABLE, (1.0, -1.0): UNSTABLE}.get((zero.before, zero.behind), SADDLE)
-    (holding,), (slope,) = at.torque(np.array([zero.begin]))
+    (holding,), (slope,) = resting.torque(np.array([zero.begin]))
     k = int(np.searchsorted(rest.q, zero.begin))
     stiffness: float | None = float(slope) if abs(slope) > way.flat else 0.0
     if zero.end > zero.begin:
@@ -340,11 +344,11 @@ def _equilibrium(at: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibri
     )
 
 
-def _folded(each: Equilibrium) -> Equilibrium:
+def _folded(equilibrium: Equilibrium) -> Equilibrium:
     """An equilibrium of a driver that turns, with its place from 0 to a whole turn."""
-    place = each.place % _TURN
+    place = equilibrium.place % _TURN
     place = 0.0 if min(place, _TURN - place) < _SAME else place
-    return replace(each, place=place, end=place + (each.end - each.place))
+    return replace(equilibrium, place=place, end=place + (equilibrium.end - equilibrium.place))
 
 
 def _from_start(rest: Rest, start: float) -> Rest:
@@ -354,6 +358,7 @@ def _from_start(rest: Rest, start: float) -> Rest:
     q = q[order]
     q[0] = start if abs(q[0] - start) < 2.0 * _SAME else q[0]
     columns = [
-        None if each is None else np.append(each[:-1][order], each[:-1][order[0]]) for each in rest[1:]
+        None if column is None else np.append(column[:-1][order], column[:-1][order[0]])
+        for column in rest[1:]
     ]
     return Rest(np.append(q, q[0] + _TURN), *columns)

@@ -132,6 +132,6 @@ def normal_probability(xp: Any, z: Any) -> Any:
     return tail + above * (1.0 - 2.0 * tail)
 
 
-def step(xp: Any, x: Any, at: Any) -> Any:
-    """0 where `x` is below `at`, 1 where it is above: a steep ramp, which every engine has."""
-    return xp.minimum(xp.maximum(1e9 * (x - at), 0.0), 1.0)
+def step(xp: Any, x: Any, threshold: Any) -> Any:
+    """0 where `x` is below `threshold`, 1 where it is above: a steep ramp, which every engine has."""
+    return xp.minimum(xp.maximum(1e9 * (x - threshold), 0.0), 1.0)

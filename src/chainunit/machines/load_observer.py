@@ -164,7 +164,7 @@ def _judge(
     """The judgement of an imbalance; `unknown` is the place of its left side, `load` the parameters of the load,
     `usual` its natural fluctuation."""
     size = load.spread * load.spread
-    known, quiet = (
+    variance, quiet = (
         xp.maximum(difference(symmetric(_entries(matrix)), unknown, unknown + 1), _LEAST) * size
         for matrix in (x.covariance, x.quiet)
     )
@@ -178,7 +178,7 @@ def _judge(
     noise = p.noise.w * p.noise.w / (2.0 * ONSET * p.noise.rate)
     # a load that begins to jump
     widening = xp.maximum(1.0, x.surprise * x.surprise / (0.25 * GATE * GATE * noise))
-    return _Judgement(value, xp.sqrt(known + permanent), z * deviation * widening)
+    return _Judgement(value, xp.sqrt(variance + permanent), z * deviation * widening)
 
 
 def _entries(covariance: Any) -> list[Any]:

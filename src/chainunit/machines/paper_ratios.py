@@ -80,8 +80,8 @@ def of_ratios(make: Callable[[dict[str, float]], M], ratios: Mapping[str, float]
     remedy = f"with all other values as they are, {', or '.join(spoil.values())}"
     if not spoil:
         values, start = (
-            ", ".join(f"{name} = {x:.4g}" for name, x in each.items())
-            for each in (ratios, layout.by_name(usual))
+            ", ".join(f"{name} = {x:.4g}" for name, x in numbers.items())
+            for numbers in (ratios, layout.by_name(usual))
         )
         remedy = f"no other value of one of {values} alone makes a machine; begin with {start}"
     raise GeometryError(f"{reason}; {remedy}", next((f"ratios.{name}" for name in spoil), "")) from reason

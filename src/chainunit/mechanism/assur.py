@@ -65,7 +65,7 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> l
     """
     unknown = [link for link in links if link != driver]
     matched = _matching(dict.fromkeys(unknown, 3), joints)
-    free = {link: 3 - sum(1 for each in matched.values() if each == link) for link in unknown}
+    free = {link: 3 - sum(1 for matched_link in matched.values() if matched_link == link) for link in unknown}
     if any(free.values()):
         raise _freedoms(unknown, joints, matched, free)
     groups, placed = [], {GROUND, driver}
@@ -84,19 +84,19 @@ def in_order_of_motion(
     Which of three links in a pin are said to be joined with each other is arbitrary, but the groups depend on it.
     Here the pin is an unknown point of its own, which all links in it share.
     """
-    known = {GROUND: -2, driver: -1}
-    room = {link: 3 for link in links if link not in known} | {f"{pin}.": 2 for pin in pins}
-    every = [joint for joint in joints if not {joint.on, joint.by} <= known.keys()]
+    first_ranks = {GROUND: -2, driver: -1}
+    room = {link: 3 for link in links if link not in first_ranks} | {f"{pin}.": 2 for pin in pins}
+    every = [joint for joint in joints if not {joint.on, joint.by} <= first_ranks.keys()]
     for pin, those in pins.items():
         # ground and driver both say where the pin of the driver is
-        placed = [link for link in those if link in known]
-        meeting = [link for link in those if link not in known] + placed[:1]
+        placed = [link for link in those if link in first_ranks]
+        meeting = [link for link in those if link not in first_ranks] + placed[:1]
         every += [JointOf(pin, REVOLUTE, link, f"{pin}.") for link in meeting]
     try:
         depends = _dependences([*room], every, _matching(room, every))
     except InputError:  # the decomposition says why
         return {pin: list(those) for pin, those in pins.items()}
-    rank = dict(known)
+    rank = dict(first_ranks)
     for k, part in enumerate(_strong_parts(depends)):
         rank |= dict.fromkeys(part, k)
     return {pin: sorted(those, key=rank.__getitem__) for pin, those in pins.items()}
@@ -147,9 +147,9 @@ def _matching(room: Mapping[str, int], joints: Sequence[JointOf]) -> dict[tuple[
             seen: set[str] = set()
             if not augment((k, number), seen):
                 involved = sorted(seen) or [joints[k].on]
-                own = [j.name for j in joints if {j.on, j.by} & set(involved)]
+                fixing = [j.name for j in joints if {j.on, j.by} & set(involved)]
                 raise InputError(
-                    f"too few degrees of freedom: the joints {', '.join(own)} fix the link"
+                    f"too few degrees of freedom: the joints {', '.join(fixing)} fix the link"
                     f"{'s' * (len(involved) > 1)} {', '.join(involved)} more than once; take out a joint, such as "
                     f"{joints[k].name}, or add a link between",
                     key=involved[0],
@@ -233,14 +233,16 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
     outer = {
         link: [j for j in joints if link in (j.on, j.by) and j.other_link(link) in placed] for link in part
     }
-    if len(part) == 2 and len(inner) == 1 and all(len(each) == 1 for each in outer.values()):
-        return _dyad(part, inner[0], {link: each[0] for link, each in outer.items()})
+    if len(part) == 2 and len(inner) == 1 and all(len(link_joints) == 1 for link_joints in outer.values()):
+        return _dyad(part, inner[0], {link: link_joints[0] for link, link_joints in outer.items()})
     if len(part) == 4:
         for ternary in part:
             legs = [link for link in part if link != ternary]
-            own = [[j for j in inner if {j.on, j.by} == {ternary, leg}] for leg in legs]
-            if not outer[ternary] and all(len(each) == 1 for each in (*own, *(outer[leg] for leg in legs))):
-                return _triad(ternary, legs, [outer[leg][0] for leg in legs], [each[0] for each in own])
+            pairs = [[j for j in inner if {j.on, j.by} == {ternary, leg}] for leg in legs]
+            if not outer[ternary] and all(
+                len(meeting) == 1 for meeting in (*pairs, *(outer[leg] for leg in legs))
+            ):
+                return _triad(ternary, legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs])
     raise InputError(
         f"the links {', '.join(part)} form one group with {len(part)} links and "
         f"{len(inner) + sum(map(len, outer.values()))} joints: a class that is not covered; covered are dyads "

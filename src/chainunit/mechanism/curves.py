@@ -87,11 +87,11 @@ class TableCurve:
         turns : whether the coordinate is an angle
         """
         self.turns, self._first = turns, places[0]
-        at, values = [place - places[0] for place in places], list(values)
+        abscissas, values = [place - places[0] for place in places], list(values)
         if turns:
-            at.append(2.0 * math.pi)
+            abscissas.append(2.0 * math.pi)
             values.append(values[0])
-        widths = [b - a for a, b in pairwise(at)]
+        widths = [b - a for a, b in pairwise(abscissas)]
         rises = [(b - a) / h for a, b, h in zip(values, values[1:], widths, strict=False)]
         slopes = [_mean_slope(rises[k - 1], rises[k], widths[k - 1], widths[k]) for k in range(len(rises))]
         slopes.append(slopes[0])
@@ -101,10 +101,10 @@ class TableCurve:
             # Hermite's cubic
             _Piece(a, 1.0 / h, value, h * begin, h * (3.0 * rise - 2.0 * begin - end), h * (begin + end - 2.0 * rise))
             for a, h, value, rise, begin, end in zip(
-                at, widths, values, rises, slopes, slopes[1:], strict=False
+                abscissas, widths, values, rises, slopes, slopes[1:], strict=False
             )
         ]  # fmt: skip
-        self._later, self._length = at[1:-1], at[-1]
+        self._later, self._length = abscissas[1:-1], abscissas[-1]
 
     def value(self, xp: Any, q: Any) -> Any:
         """The value at the coordinate `q` [rad, m]."""
@@ -131,7 +131,9 @@ class TableCurve:
             (after - before for before, after in pairwise(column))
             for column in zip(*self._pieces, strict=True)
         ]
-        return _Piece(*(sum(map(mul, passed, each), begin) for begin, each in zip(first, steps, strict=True)))
+        return _Piece(
+            *(sum(map(mul, passed, column), begin) for begin, column in zip(first, steps, strict=True))
+        )
 
     @cached_property
     def _arrays(self) -> tuple[Any, Any]:

@@ -146,9 +146,9 @@ _WORDS = {
 """The words on a driver that slides, by those on one that turns; the longer ones come first."""
 
 
-def _sliding(name: str, rotating: type, words: str, fields: Fields = ()) -> type:
+def _sliding(name: str, rotating: type, description: str, fields: Fields = ()) -> type:
     """The declaration of a driver that turns, for one that slides: the same names in other units and words, and more
-    `fields`. `words` are its description."""
+    `fields`. `description` are its description."""
     slid: list[tuple[str, Any, Any]] = []
     for field in fields_of(rotating):
         q = field[2].metadata.get("quantity")
@@ -160,9 +160,9 @@ def _sliding(name: str, rotating: type, words: str, fields: Fields = ()) -> type
             more = {"default": q.start, "min": q.low, "nominal": nominal, "tunable": q.tunable}
             field = field[0], field[1], quantity(_UNITS[q.unit], text, **more)
         slid.append(field)
-    made: type = declared_class(name, (), [*slid, *fields])
-    made.__doc__, made.__module__ = words, __name__
-    return made
+    sliding: type = declared_class(name, (), [*slid, *fields])
+    sliding.__doc__, sliding.__module__ = description, __name__
+    return sliding
 
 
 SLIDING = DriverPort(

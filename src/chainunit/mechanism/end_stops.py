@@ -33,14 +33,14 @@ class SwingStops(EndStops):
     )
 
 
-def usual_stops(force: float, mass: float, length: float, of: type[EndStops] = EndStops) -> EndStops:
+def usual_stops(force: float, mass: float, length: float, kind: type[EndStops] = EndStops) -> EndStops:
     """Stops for a driver with the largest holding force [N], the largest reflected mass [kg] and the range [m]; of
     one that swings, the torque [N m], the inertia [kg m2] and the range [rad].
 
     The energy force * length compresses them by `GIVES` of the range; their damping is half of the critical one.
     """
     stiffness = 2.0 * force / (GIVES * GIVES * length)
-    return of(stiffness=stiffness, damping=(stiffness * mass) ** 0.5)
+    return kind(stiffness=stiffness, damping=(stiffness * mass) ** 0.5)
 
 
 class StopAction(NamedTuple):

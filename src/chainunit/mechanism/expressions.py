@@ -72,8 +72,8 @@ class Term(NamedTuple):
     def of(cls, value: Evaluation, *terms: Term) -> Term:
         """The value of a function of some `terms`, with the names in them."""
         names, extremes, tables = (
-            tuple(dict.fromkeys(chain.from_iterable(each)))
-            for each in (
+            tuple(dict.fromkeys(chain.from_iterable(parts)))
+            for parts in (
                 [term.names for term in terms],
                 [term.extremes for term in terms],
                 [term.tables for term in terms],
@@ -165,19 +165,19 @@ class Expression:
         number = term.number({})
         if not math.isfinite(number):
             raise InputError(f"{shown(self.text)}: {self.words(node)} has no value, or an infinite one")
-        return Term(lambda xp, of: number)
+        return Term(lambda xp, quantities: number)
 
     def _compiled(self, node: ast.AST) -> Term:
         match node:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                return Term(lambda xp, of: as_float(number))
+                return Term(lambda xp, quantities: as_float(number))
             case ast.Name(id=name) if name in CONSTANTS:
-                return Term(lambda xp, of: CONSTANTS[name])
+                return Term(lambda xp, quantities: CONSTANTS[name])
             case ast.Name(id=name) if name not in WORDS:
-                return Term(lambda xp, of: of[name], (name,))
+                return Term(lambda xp, quantities: quantities[name], (name,))
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 term = self._term(inner)
-                return Term.of(lambda xp, of: -term.value(xp, of), term)
+                return Term.of(lambda xp, quantities: -term.value(xp, quantities), term)
             case ast.UnaryOp(op=ast.UAdd(), operand=inner):
                 return self._term(inner)
             case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int(power))) if (
@@ -187,7 +187,9 @@ class Expression:
             case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=float(power))):
                 # of a positive number, such as the pressure of a gas
                 term, exponent = self._term(base), float(power)
-                return Term.of(lambda xp, of: xp.exp(exponent * xp.log(term.value(xp, of))), term)
+                return Term.of(
+                    lambda xp, quantities: xp.exp(exponent * xp.log(term.value(xp, quantities))), term
+                )
             case ast.BinOp(op=op) if type(op) in _OPERATORS:
                 return self._chain(node)
             case ast.Call(func=ast.Name(id=name), args=[place], keywords=[]) if name in EXTREMES:
@@ -195,20 +197,24 @@ class Expression:
             case ast.Call(func=ast.Name(id="table"), args=[x, *rest], keywords=[]) if rest:
                 return self._table(self._term(x), rest)
             case ast.Call(func=ast.Name(id="where"), args=[condition, *rest], keywords=[]) if len(rest) == 3:
-                terms = [self._term(each) for each in rest]
+                terms = [self._term(argument) for argument in rest]
                 term = self._where(condition, terms)
                 self._keep_width(node, terms[2])
                 return term
             case ast.Call(func=ast.Name(id=("where" | "table") as name)):
                 raise self._written(name)
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
-                terms = [self._term(each) for each in args]
+                terms = [self._term(argument) for argument in args]
                 term = self._call(name, terms)
                 match name, terms:
                     case (("step" | "positive"), [_, width]):
                         self._keep_width(node, width)
                     case "ramp", [_, begin, end]:
-                        width = Term.of(lambda xp, of: end.value(xp, of) - begin.value(xp, of), begin, end)
+                        width = Term.of(
+                            lambda xp, quantities: end.value(xp, quantities) - begin.value(xp, quantities),
+                            begin,
+                            end,
+                        )
                         self._keep_width(node, width, falls=True)
                 return term
             case ast.Compare() | ast.IfExp() | ast.BoolOp():
@@ -238,10 +244,10 @@ class Expression:
         rest = [(_OPERATORS[type(op)], term.value) for (_, op, _), term in zip(steps, terms[1:], strict=True)]
         begin = terms[0].value
 
-        def value(xp: Any, of: Mapping[str, Any]) -> Any:
-            result = begin(xp, of)
+        def value(xp: Any, quantities: Mapping[str, Any]) -> Any:
+            result = begin(xp, quantities)
             for apply, right in rest:
-                result = apply(result, right(xp, of))
+                result = apply(result, right(xp, quantities))
             return result
 
         return Term.of(value, *terms)
@@ -254,8 +260,8 @@ class Expression:
 
     @staticmethod
     def _power(base: Term, power: int) -> Term:
-        def value(xp: Any, of: Mapping[str, Any]) -> Any:
-            x = result = base.value(xp, of)
+        def value(xp: Any, quantities: Mapping[str, Any]) -> Any:
+            x = result = base.value(xp, quantities)
             for _ in range(power - 1):
                 result = result * x
             return result
@@ -263,20 +269,20 @@ class Expression:
         return Term.of(value, base)
 
     def _extreme(self, name: str, place: ast.AST) -> Term:
-        words = self.words(place)
-        text = words.replace(" ", "")
+        cited = self.words(place)
+        text = cited.replace(" ", "")
         if not _PLACE.fullmatch(text):
             raise InputError(
-                f"{shown(self.text)}: {name} of {words}: {name} has two arguments, or is an extreme: {_EXTREME}"
+                f"{shown(self.text)}: {name} of {cited}: {name} has two arguments, or is an extreme: {_EXTREME}"
                 if name in _TWO
-                else f"{shown(self.text)}: {name} of {words}: {_EXTREME}"
+                else f"{shown(self.text)}: {name} of {cited}: {_EXTREME}"
             )
         if name == "stroke":
             return Term(
-                lambda xp, of: of[f"max({text})"] - of[f"min({text})"],
+                lambda xp, quantities: quantities[f"max({text})"] - quantities[f"min({text})"],
                 extremes=(f"max({text})", f"min({text})"),
             )
-        return Term(lambda xp, of: of[f"{name}({text})"], extremes=(f"{name}({text})",))
+        return Term(lambda xp, quantities: quantities[f"{name}({text})"], extremes=(f"{name}({text})",))
 
     def _where(self, condition: ast.AST, rest: Sequence[Term]) -> Term:
         match condition:
@@ -291,10 +297,12 @@ class Expression:
                 )
         then, other, width = rest
 
-        def value(xp: Any, of: Mapping[str, Any]) -> Any:
-            no = other.value(xp, of)
-            share = step(xp, above.value(xp, of) - below.value(xp, of), width.value(xp, of))
-            return no + share * (then.value(xp, of) - no)
+        def value(xp: Any, quantities: Mapping[str, Any]) -> Any:
+            no = other.value(xp, quantities)
+            share = step(
+                xp, above.value(xp, quantities) - below.value(xp, quantities), width.value(xp, quantities)
+            )
+            return no + share * (then.value(xp, quantities) - no)
 
         return Term.of(value, above, below, then, other, width)
 
@@ -303,24 +311,24 @@ class Expression:
             name = rest[0].id
             self.lookups.append(name)
             return Term(
-                lambda xp, of: of[f"table {name}"].value(xp, x.value(xp, of)),
+                lambda xp, quantities: quantities[f"table {name}"].value(xp, x.value(xp, quantities)),
                 x.names,
                 x.extremes,
                 (*x.tables, name),
             )
-        numbers = [self._term(each) for each in rest]
-        if not all(each.is_number for each in numbers) or len(numbers) < 4 or len(numbers) % 2:
+        numbers = [self._term(argument) for argument in rest]
+        if not all(number.is_number for number in numbers) or len(numbers) < 4 or len(numbers) % 2:
             raise InputError(
                 f"{shown(self.text)}: table has x, then the name of a table, or two or more pairs of numbers: "
                 "table(x, x1, y1, x2, y2)"
             )
-        values = [each.number({}) for each in numbers]
+        values = [number.number({}) for number in numbers]
         places = values[::2]
         if any(b <= a for a, b in pairwise(places)):
             raise InputError(f"{shown(self.text)}: the places x1, x2, ... of the table must rise")
         self.points.append(len(places))
         curve = TableCurve(places, values[1::2], turns=False)
-        return Term.of(lambda xp, of: curve.value(xp, x.value(xp, of)), x)
+        return Term.of(lambda xp, quantities: curve.value(xp, x.value(xp, quantities)), x)
 
     def _call(self, name: str, args: list[Term]) -> Term:
         if name not in FUNCTIONS:
@@ -332,7 +340,10 @@ class Expression:
             kernel = _KERNELS.get(name)
             if kernel is None or len(args) != len(SMOOTH[name]):
                 raise self._written(name)
-            return Term.of(lambda xp, of: kernel(xp, *(each.value(xp, of) for each in args)), *args)
+            return Term.of(
+                lambda xp, quantities: kernel(xp, *(argument.value(xp, quantities) for argument in args)),
+                *args,
+            )
         wanted = 2 if name in _TWO else 1
         if len(args) != wanted:
             raise InputError(
@@ -340,11 +351,16 @@ class Expression:
             )
         first = args[0].value
         if name == "tan":
-            return Term.of(lambda xp, of: (lambda x: xp.sin(x) / xp.cos(x))(first(xp, of)), *args)
+            return Term.of(
+                lambda xp, quantities: (lambda x: xp.sin(x) / xp.cos(x))(first(xp, quantities)), *args
+            )
         if name in _TWO:
             second = args[1].value
-            return Term.of(lambda xp, of: getattr(xp, _TWO[name])(first(xp, of), second(xp, of)), *args)
-        return Term.of(lambda xp, of: getattr(xp, name)(first(xp, of)), *args)
+            return Term.of(
+                lambda xp, quantities: getattr(xp, _TWO[name])(first(xp, quantities), second(xp, quantities)),
+                *args,
+            )
+        return Term.of(lambda xp, quantities: getattr(xp, name)(first(xp, quantities)), *args)
 
     def _written(self, name: str) -> InputError:
         wanted = ", ".join(SMOOTH.get(name, ("LINK.POINT.y",)))
@@ -375,6 +391,6 @@ def expression(text: str) -> Expression:
     return Expression(text)
 
 
-def value_of(xp: Any, given: float | str, of: Mapping[str, Any]) -> Any:
+def value_of(xp: Any, entry: float | str, quantities: Mapping[str, Any]) -> Any:
     """The value of a number or of the text of an expression."""
-    return expression(given).value(xp, of) if isinstance(given, str) else given
+    return expression(entry).value(xp, quantities) if isinstance(entry, str) else entry

@@ -54,7 +54,7 @@ class Topology(NamedTuple):
         pins: dict[str, dict[str, None]] = {link: {} for group in self.groups for link in group.links}
         for pin, link in (*self.joints, *self.carries.items()):
             pins[link][pin] = None
-        return {link: tuple(each) for link, each in pins.items()}
+        return {link: tuple(names) for link, names in pins.items()}
 
 
 @briefly_shown
@@ -76,17 +76,17 @@ class Linkage:
         groups, points = [], {}
         for group in (self.driver, *self.groups):
             inner, bars, guides = group.pins, group.bars, group.guides
-            own = tuple(bar.name for bar in bars)
+            links = tuple(bar.name for bar in bars)
             carries |= inner
             joints = []
             for joint in group.joints:
                 name = joint.pin, joint.link
                 carrier = joint.carrier(carries)
-                joints.append((name, carrier, None if carrier in own else carrier))
+                joints.append((name, carrier, None if carrier in links else carrier))
             for bar in bars:
                 carries |= dict.fromkeys(bar.points, bar.name)
                 points[bar.name] = tuple(bar.points)
-            groups.append(Connections(own, tuple(inner), tuple(joints), tuple(guides)))
+            groups.append(Connections(links, tuple(inner), tuple(joints), tuple(guides)))
         return Topology(carries, tuple(groups), points)
 
     @property

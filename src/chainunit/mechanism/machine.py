@@ -47,7 +47,7 @@ class Mechanism:
         self.linkage, self.q = linkage, q
         self.topology = linkage.topology if topology is None else topology
         self.links: dict[str, Link] = {}
-        self.pins = {name: Motion(at) for name, at in linkage.ground.items()}
+        self.pins = {name: Motion(place) for name, place in linkage.ground.items()}
         self.bodies: dict[str, Body] = {}
         self.turns: dict[Joint, Any] = {}
         self.slides: dict[Joint, Slide] = {}
@@ -208,7 +208,7 @@ def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
         numbers += group.derive(xp, functools.partial(_placed, xp, linkage.before(k), tuple(numbers)))
     if linkage.extremes:
         placed = functools.partial(_placed, xp, linkage, tuple(numbers), topology=linkage.topology)
-        numbers += [each.value(xp, placed) for each in linkage.extremes]
+        numbers += [extreme.value(xp, placed) for extreme in linkage.extremes]
     return numbers
 
 

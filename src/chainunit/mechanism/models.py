@@ -196,9 +196,9 @@ class InverseMachine(LinkageModel, MachineModel):
         from .sketch import sketch_of
 
         low, high = self.span
-        layout, given = self.parameter_layout, start or {}
+        layout, values = self.parameter_layout, start or {}
         p = self.with_derived(
-            MATH, layout.instance([given.get(v.name, v.quantity.start) for v in layout.variables])
+            MATH, layout.instance([values.get(v.name, v.quantity.start) for v in layout.variables])
         )
         return sketch_of(self.state(MATH, p, self.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
@@ -247,7 +247,9 @@ class InverseMachine(LinkageModel, MachineModel):
         """The direct model of the kind `base`, with more `parameters` and attributes."""
         outputs = fields_of(self.Outputs, without=("tau", *names_of(self.driver_port.values)))
         # where the start declares the same name, the machine's own declaration counts
-        own = [field for field in fields_of(self.Parameters) if field[0] in names_of(self.driver_port.start)]
+        starts = [
+            field for field in fields_of(self.Parameters) if field[0] in names_of(self.driver_port.start)
+        ]
         port = self.driver_port
         states = _of_driver(port.states, self.driver_noun)
         return base(
@@ -261,7 +263,7 @@ class InverseMachine(LinkageModel, MachineModel):
             constant=self.constant,
             terminals=port.flanges,
             Parameters=declared_class(
-                "DirectParameters", (port.start, port.added, self.Parameters), [*own, *parameters]
+                "DirectParameters", (port.start, port.added, self.Parameters), [*starts, *parameters]
             ),
             States=declared_class("States", (states,), fields_of(self.States)) if self.States else states,
             Inputs=declared_class(
@@ -284,13 +286,13 @@ def _of_driver(declared: type, noun: str) -> type:
     if noun == USUAL_DRIVER or not any("{driver}" in v.template for v in Layout(declared).variables):
         return declared
     fields: list[tuple[str, Any, Any]] = []
-    for name, of, slot in fields_of(declared):
+    for name, kind, slot in fields_of(declared):
         q = slot.metadata["quantity"]
-        own = dataclasses.replace(q, template=of_driver(q.template, noun))
-        fields.append((name, of, dataclasses.field(default=slot.default, metadata={"quantity": own})))
-    made: type = declared_class(declared.__name__, (), fields)
-    made.__doc__, made.__module__ = declared.__doc__, __name__
-    return made
+        described = dataclasses.replace(q, template=of_driver(q.template, noun))
+        fields.append((name, kind, dataclasses.field(default=slot.default, metadata={"quantity": described})))
+    driver_type: type = declared_class(declared.__name__, (), fields)
+    driver_type.__doc__, driver_type.__module__ = declared.__doc__, __name__
+    return driver_type
 
 
 def running(s: MachineState, a: Any) -> dict[str, Any]:

@@ -47,12 +47,12 @@ def largest(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> tuple[A
     for k in range(min(_CANDIDATES, len(q))):
         middle, reach = q[ranked[:, k]], step
         for _ in range(_ROUNDS):
-            at = middle[:, None] + np.linspace(-reach, reach, _POINTS)
+            places = middle[:, None] + np.linspace(-reach, reach, _POINTS)
             if not around:
-                at = np.clip(at, q[0], q[-1])
-            values = _own(values_at, at)
+                places = np.clip(places, q[0], q[-1])
+            values = _own(values_at, places)
             top = np.argmax(values, axis=1)
-            middle, value = at[rows, top], values[rows, top]
+            middle, value = places[rows, top], values[rows, top]
             more = value > best
             best, place = np.where(more, value, best), np.where(more, middle, place)
             reach *= 2.0 / (_POINTS - 1)
@@ -62,7 +62,7 @@ def largest(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> tuple[A
 def roots(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> list[Any]:
     """The places at which each quantity changes its sign, a sorted array for each. The arguments are those of
     `largest`; a quantity that only touches zero has no root there."""
-    found: list[Any] = []
+    crossings: list[Any] = []
     rows = np.asarray(values_at(q))
     for row, samples in enumerate(rows[:, :-1] if around else rows):
         nothing = ROUNDING * float(np.max(np.abs(samples)))
@@ -73,7 +73,7 @@ def roots(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> list[Any]
         signs = signs_of(samples)
         there = np.flatnonzero(signs)
         if not len(there):
-            found.append(np.empty(0))
+            crossings.append(np.empty(0))
             continue
         # a zero belongs to the range before it, of a turn also across its begin
         last = np.searchsorted(there, np.arange(len(signs)), side="right") - 1
@@ -84,8 +84,8 @@ def roots(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> list[Any]
             middle = 0.5 * (low + high)
             same = signs_of(np.asarray(values_at(middle))[row]) != -sign
             low, high = np.where(same, middle, low), np.where(same, high, middle)
-        found.append(0.5 * (low + high))
-    return found
+        crossings.append(0.5 * (low + high))
+    return crossings
 
 
 def means(values_at: Callable[[Any], Any], low: float, high: float) -> tuple[Any, Any]:
@@ -114,8 +114,8 @@ def _parts(values_at: Callable[[Any], Any], low: float, high: float, parts: int)
 
     def integrals(begin: Any, end: Any) -> tuple[Any, Any]:
         half = 0.5 * (end - begin)
-        at = 0.5 * (begin + end)[:, None] + half[:, None] * nodes
-        values = np.asarray(values_at(at.ravel())).reshape(-1, *at.shape)
+        places = 0.5 * (begin + end)[:, None] + half[:, None] * nodes
+        values = np.asarray(values_at(places.ravel())).reshape(-1, *places.shape)
         return (values @ weights) * half, (np.abs(values) @ weights) * half
 
     edges = np.linspace(low, high, parts + 1)
@@ -139,8 +139,8 @@ def _parts(values_at: Callable[[Any], Any], low: float, high: float, parts: int)
     return np.concatenate(begins), np.concatenate(ends), np.concatenate(values, axis=1), size
 
 
-def _own(values_at: Callable[[Any], Any], at: Any) -> Any:
-    """The values of each quantity at its own places `at`, shape (quantities, points)."""
-    count, points = at.shape
-    values = np.asarray(values_at(at.ravel())).reshape(count, count, points)
+def _own(values_at: Callable[[Any], Any], places: Any) -> Any:
+    """The values of each quantity at its own `places`, shape (quantities, points)."""
+    count, points = places.shape
+    values = np.asarray(values_at(places.ravel())).reshape(count, count, points)
     return values[np.arange(count), np.arange(count)]

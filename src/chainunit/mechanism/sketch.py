@@ -25,11 +25,13 @@ def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
 
 def sketch_of(mechanism: Mechanism) -> Sketch:
     """The sketch of a machine, from its mechanism at one place of the driver."""
-    linkage, at = mechanism.linkage, places(mechanism)
-    links = {name: [pin for pin in carried if pin in at] for name, carried in linkage.topology.links.items()}
+    linkage, positions = mechanism.linkage, places(mechanism)
+    links = {
+        name: [pin for pin in carried if pin in positions] for name, carried in linkage.topology.links.items()
+    }
     return Sketch(
-        {name: (float(x), float(y)) for name, (x, y) in at.items()},
+        {name: (float(x), float(y)) for name, (x, y) in positions.items()},
         links,
         linkage.driver.bar.name,
-        frozenset(linkage.ground) & {*at},
+        frozenset(linkage.ground) & {*positions},
     )

@@ -36,13 +36,13 @@ class SampledCurve(NamedTuple):
     values: Any
     slopes: Any
 
-    def with_places(self, at: ValuesAndSlopes, x: Any) -> SampledCurve:
+    def with_places(self, quantity: ValuesAndSlopes, x: Any) -> SampledCurve:
         """The curve with further places."""
         every = np.concatenate([self.x, x])
         order = np.argsort(every, kind="stable")
         return SampledCurve(
             every[order],
-            *(np.concatenate([a, b])[order] for a, b in zip(self[1:], at(x), strict=True)),
+            *(np.concatenate([a, b])[order] for a, b in zip(self[1:], quantity(x), strict=True)),
         )
 
 
@@ -56,21 +56,21 @@ class Zero(NamedTuple):
     behind: float
 
 
-def sampled(at: ValuesAndSlopes, low: float, high: float) -> SampledCurve:
+def sampled(quantity: ValuesAndSlopes, low: float, high: float) -> SampledCurve:
     """The quantity from `low` to `high`. A part of the way is halved until the cubic through its ends meets the value
     in its middle; so a load that acts over a thousandth of the way has places of its own."""
     x = np.linspace(low, high, _PARTS + 1)
-    curve = SampledCurve(x, *at(x))
+    curve = SampledCurve(x, *quantity(x))
     largest = float(np.max(np.abs(curve.values)))
     ends = np.arange(_PARTS)
     for _ in range(_DEEPEST):
-        (x0, f0, g0), (x1, f1, g1) = ([each[ends + k] for each in curve] for k in (0, 1))
+        (x0, f0, g0), (x1, f1, g1) = ([column[ends + k] for column in curve] for k in (0, 1))
         middle = 0.5 * (x0 + x1)
-        value, _ = at(middle)
+        value, _ = quantity(middle)
         cubic = 0.5 * (f0 + f1) + 0.125 * (x1 - x0) * (g0 - g1)
         least = np.minimum(np.abs(value), np.minimum(np.abs(f0), np.abs(f1)))
         rough = np.abs(value - cubic) > np.maximum(_ROUGH * least, _EXACT * largest)
-        curve = curve.with_places(at, middle)
+        curve = curve.with_places(quantity, middle)
         halves = np.concatenate([x0[rough], middle[rough]])
         if not len(halves) or len(halves) > _MOST:
             break
@@ -79,7 +79,7 @@ def sampled(at: ValuesAndSlopes, low: float, high: float) -> SampledCurve:
 
 
 def zeros(
-    at: ValuesAndSlopes, curve: SampledCurve, nothing: float, beyond: tuple[float, float] | None
+    quantity: ValuesAndSlopes, curve: SampledCurve, nothing: float, beyond: tuple[float, float] | None
 ) -> list[Zero]:
     """The zeros in rising order.
 
@@ -97,8 +97,8 @@ def zeros(
     turning = np.flatnonzero(curve.slopes[:-1] * curve.slopes[1:] < 0.0)
     if len(turning):
         sign = np.sign(curve.slopes[turning])
-        low, high = _halved(lambda x: np.sign(at(x)[1]) == sign, curve.x[turning], curve.x[turning + 1])
-        curve = curve.with_places(at, 0.5 * (low + high))
+        low, high = _halved(lambda x: np.sign(quantity(x)[1]) == sign, curve.x[turning], curve.x[turning + 1])
+        curve = curve.with_places(quantity, 0.5 * (low + high))
     signs = np.where(np.abs(curve.values) <= nothing, 0.0, np.sign(curve.values))
     there = np.flatnonzero(signs)
     last = len(signs) - 1
@@ -108,27 +108,29 @@ def zeros(
     first_side = signs[there[0]] if signs[0] else -signs[there[0]]
     last_side = signs[there[-1]] if signs[-1] else -signs[there[-1]]
     places = [-1, *map(int, there), last + 1]
-    sides = [float(each) for each in (first_side, *signs[there], last_side)]
+    sides = [float(side) for side in (first_side, *signs[there], last_side)]
     if beyond:
         sides[0], sides[-1] = beyond
-    found: list[Zero] = []
+    listed: list[Zero] = []
     crossings: list[tuple[int, Any, Any]] = []
     for k, (i, j) in enumerate(itertools.pairwise(places)):
         before, behind = sides[k : k + 2]
         if j == i + 1 and before == behind:
             continue
-        begin, end = _stretch(at, curve, nothing, i, j)
+        begin, end = _stretch(quantity, curve, nothing, i, j)
         if i >= 0 and j <= last and begin == end and before != behind:
-            crossings.append((len(found), curve.x[i], curve.x[j]))
-        found.append(Zero(begin, end, before, behind))
+            crossings.append((len(listed), curve.x[i], curve.x[j]))
+        listed.append(Zero(begin, end, before, behind))
     if crossings:
-        of, low, high = (np.array(each) for each in zip(*crossings, strict=True))
-        for k, x in zip(of, _crossed(at, low, high), strict=True):
-            found[k] = found[k]._replace(begin=float(x), end=float(x))
-    return found
+        numbers, low, high = (np.array(column) for column in zip(*crossings, strict=True))
+        for k, x in zip(numbers, _crossed(quantity, low, high), strict=True):
+            listed[k] = listed[k]._replace(begin=float(x), end=float(x))
+    return listed
 
 
-def _stretch(at: ValuesAndSlopes, curve: SampledCurve, nothing: float, i: int, j: int) -> tuple[float, float]:
+def _stretch(
+    quantity: ValuesAndSlopes, curve: SampledCurve, nothing: float, i: int, j: int
+) -> tuple[float, float]:
     """Begin and end of the zero between the places `i` and `j`, at which the quantity is not zero; -1 and the number
     of places stand for those beyond the ends. One place unless it is zero over a range; the place of a zero that is
     crossed between two places is not yet exact."""
@@ -143,7 +145,7 @@ def _stretch(at: ValuesAndSlopes, curve: SampledCurve, nothing: float, i: int, j
     ends = []
     for inside, out in ((first, i), (final, j)):
         if 0 <= out <= last:
-            near, far = _halved(lambda q: np.abs(at(q)[0]) <= nothing, x[[inside]], x[[out]])
+            near, far = _halved(lambda q: np.abs(quantity(q)[0]) <= nothing, x[[inside]], x[[out]])
             ends.append(float(0.5 * (near[0] + far[0])))
         else:
             ends.append(float(x[inside]))
@@ -159,12 +161,12 @@ def _halved(stays: Callable[[Any], Any], low: Any, high: Any) -> tuple[Any, Any]
     return low, high
 
 
-def _crossed(at: ValuesAndSlopes, low: Any, high: Any) -> Any:
+def _crossed(quantity: ValuesAndSlopes, low: Any, high: Any) -> Any:
     """The places between `low` and `high` at which the quantity changes its sign, shape (n,) each, to rounding."""
-    sign = np.sign(at(low)[0])
+    sign = np.sign(quantity(low)[0])
     x = 0.5 * (low + high)
     for k in range(_STEPS):
-        value, slope = at(x)
+        value, slope = quantity(x)
         low, high = np.where(np.sign(value) == sign, x, low), np.where(np.sign(value) == sign, high, x)
         with np.errstate(divide="ignore", invalid="ignore"):
             newton = x - value / slope

@@ -53,32 +53,32 @@ class Entry(Faults):
         with self.collected(), refusal_prefix(begin + sign, self.key(name)):
             yield
 
-    def fault(self, name: str, words: str) -> None:
+    def fault(self, name: str, message: str) -> None:
         """Collect the fault of a key."""
         with self.at(name):
-            raise InputError(words + self.more)
+            raise InputError(message + self.more)
 
-    def wrong(self, name: str, value: Any, words: str) -> None:
+    def wrong(self, name: str, value: Any, message: str) -> None:
         """Collect the fault of the value of a key."""
         with self.at(name, " = "):
-            raise InputError(f"{shown(value)}: {words}{self.more}")
+            raise InputError(f"{shown(value)}: {message}{self.more}")
 
-    def keys(self, name: str, table: Mapping[str, Any], known: Collection[str]) -> None:
+    def keys(self, name: str, table: Mapping[str, Any], allowed: Collection[str]) -> None:
         """Collect the faults of the unknown keys of a `table` in it, or, with an empty name, of the table itself."""
-        for each in table:
-            if each not in known:
-                where = ".".join(filter(None, (name, str(each))))
-                self.fault(where, f"unknown key{meant(str(each), known)} known here: {', '.join(known)}")
+        for key in table:
+            if key not in allowed:
+                where = ".".join(filter(None, (name, str(key))))
+                self.fault(where, f"unknown key{meant(str(key), allowed)} known here: {', '.join(allowed)}")
 
-    def choice(self, name: str, known: Mapping[str, T]) -> T | None:
-        """The one of the `known` values that the table names; None, with a fault, where it names none."""
+    def choice(self, name: str, allowed: Mapping[str, T]) -> T | None:
+        """The one of the `allowed` values that the table names; None, with a fault, where it names none."""
         value = self.given.get(name)
-        if isinstance(value, str) and value in known:
-            return known[value]
+        if isinstance(value, str) and value in allowed:
+            return allowed[value]
         if value is None:
-            self.fault(name, f"must be given, {one_of('', known)}")
+            self.fault(name, f"must be given, {one_of('', allowed)}")
         else:
-            self.wrong(name, value, f"must be {one_of(value, known)}")
+            self.wrong(name, value, f"must be {one_of(value, allowed)}")
         return None
 
     def quantity(self, name: str, variable: Variable, value: Any) -> float:
@@ -91,8 +91,8 @@ class Entry(Faults):
             except ValueError as error:
                 raise InputError(f"{error}{self.more}", key) from None
             if variable.unit == "rad" and not units.has_unit(value) and abs(number) > 2.0 * math.pi:
-                words = f'is more than a turn; {units.IN_RADIANS}; was "{value} deg" meant?'
-                raise InputError(f"{key}: {words}{self.more}", key)
+                message = f'is more than a turn; {units.IN_RADIANS}; was "{value} deg" meant?'
+                raise InputError(f"{key}: {message}{self.more}", key)
             return number
         return math.nan
 
@@ -160,8 +160,8 @@ class TableList:
     @property
     def field(self) -> tuple[Any, Any]:
         """The pydantic field of the list."""
-        words = f"{self.description}: tables [[{self.name}]]"
-        return list[dict[str, Any]], Field([], max_length=self.most, description=words)
+        description = f"{self.description}: tables [[{self.name}]]"
+        return list[dict[str, Any]], Field([], max_length=self.most, description=description)
 
     def form(self, prefix: str) -> type[BaseModel]:
         """The form of an entry; in a refusal `prefix` stands before its keys."""
@@ -184,7 +184,7 @@ class TableList:
         without a name has the name `usual`, which its number follows."""
         names: set[str] = set()
 
-        def of(entry: Entry, number: int) -> tuple[str, T]:
+        def named_result(entry: Entry, number: int) -> tuple[str, T]:
             prefix = f"{entry.place}."
             entry.raw = given_values(read_table(self.form(prefix), entry.given, prefix))
             name = entry.given.get(self.named_by, usual and f"{usual}{number}")
@@ -195,7 +195,7 @@ class TableList:
             names.add(name)
             return name, read(entry, name)
 
-        return dict(read_entries(enumerate(tables, 1), self.name, faults, of))
+        return dict(read_entries(enumerate(tables, 1), self.name, faults, named_result))
 
     def read_named(
         self, tables: Mapping[str, Any], faults: Faults, read: Callable[[Entry, str], T]
@@ -203,21 +203,21 @@ class TableList:
         """The results of `read` by the names of the tables [name.NAME], for those without a fault; the faults of the
         others go to `faults`."""
 
-        def of(entry: Entry, name: str) -> tuple[str, T]:
+        def named_result(entry: Entry, name: str) -> tuple[str, T]:
             entry.raw = given_values(read_table(self.form(f"{entry.place}."), entry.given, f"{entry.place}."))
             return name, read(entry, name)
 
-        return dict(read_entries(tables.items(), self.name, faults, of))
+        return dict(read_entries(tables.items(), self.name, faults, named_result))
 
     def _check(
-        self, entry: Entry, name: str, known: Collection[str] | None, fixed: Mapping[str, str]
+        self, entry: Entry, name: str, names: Collection[str] | None, fixed: Mapping[str, str]
     ) -> None:
         """Collect the fault of a name that is missing, or not allowed."""
         if not name:
-            example = f'such as "{self.example}"' if self.example else one_of("", known or ())
+            example = f'such as "{self.example}"' if self.example else one_of("", names or ())
             entry.fault(self.named_by, f"must be given, {example}")
         elif name in fixed:
             entry.wrong(self.named_by, name, fixed[name])
-        elif known is not None and name not in known:
-            allowed = f"{self.must_be}{near_name(name, known)}" if self.must_be else one_of(name, known)
+        elif names is not None and name not in names:
+            allowed = f"{self.must_be}{near_name(name, names)}" if self.must_be else one_of(name, names)
             entry.wrong(self.named_by, name, f"must be {allowed}")

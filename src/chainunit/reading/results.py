@@ -84,10 +84,10 @@ def part(
 ) -> Any:
     """A field that is in the data of a result, see `ResultPart`; its name there is that of the field unless `name`
     gives another."""
-    own = ResultPart("", name, description, unit, kind, inline, titled, optional)
+    declared_part = ResultPart("", name, description, unit, kind, inline, titled, optional)
     if default_factory is not dataclasses.MISSING:
-        return dataclasses.field(default_factory=default_factory, metadata={"part": own})
-    return dataclasses.field(default=default, metadata={"part": own})
+        return dataclasses.field(default_factory=default_factory, metadata={"part": declared_part})
+    return dataclasses.field(default=default, metadata={"part": declared_part})
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(quantity, group, part))
@@ -111,36 +111,42 @@ def derived(
     description. A type checker takes the property for an attribute of the type that it gives."""
 
     def declared(function: Callable[[Any], T]) -> Any:
-        own = _Derived(function)
-        words = " ".join((function.__doc__ or "").split()).removesuffix(".")
-        words = words[:1].lower() + words[1:]
-        own.part = ResultPart(
-            function.__name__, name or function.__name__, words, unit, kind, titled=titled, optional=optional
+        derived_part = _Derived(function)
+        description = " ".join((function.__doc__ or "").split()).removesuffix(".")
+        description = description[:1].lower() + description[1:]
+        derived_part.part = ResultPart(
+            function.__name__,
+            name or function.__name__,
+            description,
+            unit,
+            kind,
+            titled=titled,
+            optional=optional,
         )
-        return own
+        return derived_part
 
     return declared
 
 
 @cache
-def parts(of: Any) -> tuple[ResultPart, ...]:
+def parts(result_type: Any) -> tuple[ResultPart, ...]:
     """The declared parts of a result: its fields, then its properties. Those of a group have its name before
     theirs."""
-    own = []
-    for field in dataclasses.fields(of):
+    listed = []
+    for field in dataclasses.fields(result_type):
         if "quantity" in field.metadata:
             q = field.metadata["quantity"]
-            own.append(ResultPart(field.name, field.name, q.template, q.unit, q.kind))
+            listed.append(ResultPart(field.name, field.name, q.template, q.unit, q.kind))
         elif "group" in field.metadata:
-            for each in parts(field.metadata["of"]):
-                attribute, name = (f"{field.name}.{x}" for x in (each.attribute, each.name))
-                words = f"{field.metadata['group']}: {each.description}"
-                own.append(each._replace(attribute=attribute, name=name, description=words))
+            for member in parts(field.metadata["of"]):
+                attribute, name = (f"{field.name}.{x}" for x in (member.attribute, member.name))
+                description = f"{field.metadata['group']}: {member.description}"
+                listed.append(member._replace(attribute=attribute, name=name, description=description))
         elif "part" in field.metadata:
-            given = field.metadata["part"]
-            own.append(given._replace(attribute=field.name, name=given.name or field.name))
-    members = {name: x for base in reversed(of.__mro__) for name, x in vars(base).items()}
-    return (*own, *(x.part for x in members.values() if isinstance(x, _Derived)))
+            declared_part = field.metadata["part"]
+            listed.append(declared_part._replace(attribute=field.name, name=declared_part.name or field.name))
+    members = {name: x for base in reversed(result_type.__mro__) for name, x in vars(base).items()}
+    return (*listed, *(x.part for x in members.values() if isinstance(x, _Derived)))
 
 
 def as_data(x: Any, *, titled: bool = False, driver: str = USUAL_DRIVER) -> Any:
@@ -166,7 +172,7 @@ def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
         ends = {end: entry(getattr(x, end), x.unit, x.kind) for end in ("low", "high")}
         return entry(x.value, x.unit, x.kind) | ends
     if isinstance(x, Mapping):
-        return {str(key): _data(each, unit, kind, titled, driver) for key, each in x.items()}
+        return {str(key): _data(element, unit, kind, titled, driver) for key, element in x.items()}
     if unit == GIVEN:
         return list(x) if isinstance(x, tuple) else x
     if unit:
@@ -177,7 +183,7 @@ def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
     if hasattr(x, "tolist"):
         x = x.tolist()
     if isinstance(x, list | tuple | frozenset):
-        return [_data(each, "", "", titled, driver) for each in x]
+        return [_data(element, "", "", titled, driver) for element in x]
     if isinstance(x, Path):
         return str(x)
     if x is None or isinstance(x, str | bool | int):
@@ -187,21 +193,21 @@ def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
 
 def _table(x: Any, titled: bool, driver: str) -> dict[str, Any]:
     data: dict[str, Any] = {}
-    of: Any = type(x)
-    for each in parts(of):
+    result_type: Any = type(x)
+    for member in parts(result_type):
         value = x
-        for attribute in each.attribute.split("."):
+        for attribute in member.attribute.split("."):
             value = getattr(value, attribute)
-        if value is None and each.optional:
+        if value is None and member.optional:
             continue
-        unit, kind = (x.unit, getattr(x, "kind", "")) if each.unit == OWN else (each.unit, each.kind)
-        own = _data(value, unit, kind, titled or each.titled, driver)
-        if each.inline:
-            data |= own
+        unit, kind = (x.unit, getattr(x, "kind", "")) if member.unit == OWN else (member.unit, member.kind)
+        content = _data(value, unit, kind, titled or member.titled, driver)
+        if member.inline:
+            data |= content
         else:
-            if titled and unit and "value" in own and "title" not in own:
-                own = own | {"title": of_driver(each.description, driver)}
-            data[each.name] = own
+            if titled and unit and "value" in content and "title" not in content:
+                content = content | {"title": of_driver(member.description, driver)}
+            data[member.name] = content
     return data
 
 
@@ -213,22 +219,22 @@ def _number(x: Any, unit: str, kind: str) -> dict[str, Any]:
     return entry(x, unit, kind) | ({"value": x} if type(x) is int else {})
 
 
-def documented(of: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:
+def documented(result_type: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:
     """Name in the data, unit and description of each number and text of a result and of the results in it. In a
     name ``*`` stands for the key of a mapping, and ``#`` for the place in a sequence."""
-    for each in parts(of):
-        steps, inner = results_in(_annotated(of, each.attribute))
-        own = prefix if each.inline else f"{prefix}{each.name}."
-        name = f"{own.removesuffix('.')}{steps}".removeprefix(".")
-        if inner is None or each.unit:
-            yield name, "" if each.unit in (OWN, GIVEN) else each.unit, of_driver(each.description)
+    for member in parts(result_type):
+        steps, inner = results_in(_annotated(result_type, member.attribute))
+        path = prefix if member.inline else f"{prefix}{member.name}."
+        name = f"{path.removesuffix('.')}{steps}".removeprefix(".")
+        if inner is None or member.unit:
+            yield name, "" if member.unit in (OWN, GIVEN) else member.unit, of_driver(member.description)
         else:
             yield from documented(inner, name and f"{name}.")
 
 
-def _annotated(of: type, attribute: str) -> Any:
+def _annotated(result_type: type, attribute: str) -> Any:
     """The type of a part; None for that of a group, which is a number."""
-    for base in of.__mro__:
+    for base in result_type.__mro__:
         member: Any = vars(base).get(attribute)
         if isinstance(member, _Derived):
             hint = member.fget.__annotations__["return"]
@@ -245,10 +251,10 @@ def results_in(hint: Any) -> tuple[str, Any]:
     """The steps from a value of this type to the results in it, and their class; None where it has none."""
     if hasattr(hint, "__dataclass_fields__"):
         return "", hint if parts(hint) else None
-    found = [results_in(each) for each in typing.get_args(hint)]
+    candidates = [results_in(argument) for argument in typing.get_args(hint)]
     steps, inner = next(
-        (each for each in found if each[1] is not None),
-        max(found, key=lambda each: each[0], default=("", None)),
+        (candidate for candidate in candidates if candidate[1] is not None),
+        max(candidates, key=lambda candidate: candidate[0], default=("", None)),
     )
     outer = typing.get_origin(hint)
     if isinstance(outer, type) and issubclass(outer, Mapping):

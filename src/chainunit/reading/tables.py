@@ -41,7 +41,7 @@ from .toml_faults import syntax_faults
 T = TypeVar("T")
 
 
-def to_number(variable: Variable, given: Any) -> float:
+def to_number(variable: Variable, entry: Any) -> float:
     """The value of a config entry in the declared unit.
 
     Raises
@@ -49,23 +49,23 @@ def to_number(variable: Variable, given: Any) -> float:
     ValueError
         for a text that is no number, a unit of another kind, or a value out of bounds.
     """
-    given = as_text(given)
+    entry = as_text(entry)
     if variable.type == "Boolean":
-        fits = isinstance(given, int | float) and given in (0, 1)
+        fits = isinstance(entry, int | float) and entry in (0, 1)
     else:
-        fits = isinstance(given, int | float | str) and not isinstance(given, bool)
+        fits = isinstance(entry, int | float | str) and not isinstance(entry, bool)
     if not fits:
-        raise ValueError(f"{variable.name} = {shown(given)}: must be {kind_words(variable)}")
+        raise ValueError(f"{variable.name} = {shown(entry)}: must be {kind_words(variable)}")
     try:
-        value = number_of_text(variable, given) if isinstance(given, str) else float(given)
+        value = number_of_text(variable, entry) if isinstance(entry, str) else float(entry)
     except OverflowError:
         raise ValueError(
             f"{variable.name}: the number is too large; must be {kind_words(variable)}"
         ) from None
     if not variable.quantity.admits(value):
-        meant = _meant(variable, given)
+        meant = _meant(variable, entry)
         hints = [
-            f"; {units.IN_RADIANS}" * (variable.unit == "rad" and not units.has_unit(given)),
+            f"; {units.IN_RADIANS}" * (variable.unit == "rad" and not units.has_unit(entry)),
             _SENSE * (variable.unit == "rad/s" and bool(variable.quantity.admits(-value))),
             f'; was "{meant}" meant?' if meant else "",
         ]
@@ -116,13 +116,13 @@ class UnusualValue:
     meant: str | None = part("the probable value, in the form of a study file")
 
     @classmethod
-    def of(cls, variable: Variable, given: Any, value: float) -> UnusualValue | None:
-        """The unusual `value` of a variable, `given` so in a file; None for a usual one."""
+    def of(cls, variable: Variable, entry: Any, value: float) -> UnusualValue | None:
+        """The unusual `value` of a variable, which a file has as `entry`; None for a usual one."""
         if variable.quantity.is_usual(value):
             return None
-        if units.has_unit(given):
-            return cls(variable, value, str(given), None)
-        return cls(variable, value, "", _meant(variable, given))
+        if units.has_unit(entry):
+            return cls(variable, value, str(entry), None)
+        return cls(variable, value, "", _meant(variable, entry))
 
     @property
     def with_unit(self) -> bool:
@@ -178,25 +178,25 @@ def unusual_values(
     """The unusual values in the sections of a checked file. `declared` has the declaration of each section by
     its name. `usual` has, by the name of a quantity, the usual sizes that replace the declared ones; these quantities
     are looked at if the file leaves them at their start values, too."""
-    for section, of in declared.items():
-        for variable in variables(of, f"{section}."):
-            given: Any = data
+    for section, section_type in declared.items():
+        for variable in variables(section_type, f"{section}."):
+            entry: Any = data
             for name in variable.name.split("."):
-                given = given.get(name) if isinstance(given, Mapping) else None
+                entry = entry.get(name) if isinstance(entry, Mapping) else None
             if variable.name in usual:
                 quantity = dataclasses.replace(variable.quantity, usual=usual[variable.name])
                 variable = dataclasses.replace(variable, quantity=quantity)
                 start = float(quantity.start or 0.0)
-                if given is None and not quantity.is_usual(start):
+                if entry is None and not quantity.is_usual(start):
                     template = f"{variable.template}; not in the file"
                     yield UnusualValue(dataclasses.replace(variable, template=template), start, "", None)
-            if given is not None and (value := UnusualValue.of(variable, given, to_number(variable, given))):
+            if entry is not None and (value := UnusualValue.of(variable, entry, to_number(variable, entry))):
                 yield value
 
 
-def _meant(variable: Variable, given: Any) -> str | None:
+def _meant(variable: Variable, entry: Any) -> str | None:
     """The given number with the unit in which it is allowed and usual; None where there is no such unit."""
-    parts = units.split(str(given))
+    parts = units.split(str(entry))
     if parts is None or not math.isfinite(parts[0]):
         return None
     for unit in units.fitting(variable.unit, variable.kind):
@@ -212,7 +212,7 @@ Title = Annotated[str, AfterValidator(printable)]
 
 def number(variable: Variable) -> Any:
     """The pydantic field of one scalar."""
-    check = BeforeValidator(lambda given: to_number(variable, given))
+    check = BeforeValidator(lambda entry: to_number(variable, entry))
     return Annotated[float, check], Field(None, description=variable.description)
 
 
@@ -268,7 +268,8 @@ def refusals(error: ValidationError, file: type[BaseModel], prefix: str = "") ->
     """The faults of a table of the form `file`, in the order of its keys; `prefix` stands before their
     names."""
     return [
-        InputError(_line(each, file, prefix), key=prefix + ".".join(_path(each))) for each in error.errors()
+        InputError(_line(detail, file, prefix), key=prefix + ".".join(_path(detail)))
+        for detail in error.errors()
     ]
 
 
@@ -284,9 +285,9 @@ def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
         table: Any = file
         for part in path[:-1]:
             table = table.model_fields[part].annotation
-        known = f"known here: {', '.join(table.model_fields)}"
+        keys = f"known here: {', '.join(table.model_fields)}"
         hint = near_name(str(path[-1]), table.model_fields) or _elsewhere(str(path[-1]), file)
-        return f"{where}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{known}"
+        return f"{where}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{keys}"
     if error["type"] == "model_type":
         array = f", below [{where}]" if isinstance(error["input"], list) else ""
         named = _holders(where, file) if isinstance(error["input"], str) else []
@@ -347,14 +348,14 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def filled(declared: type, given: Mapping[str, float]) -> dict[str, Any]:
+def filled(declared: type, values: Mapping[str, float]) -> dict[str, Any]:
     """Every value of a declaration by name: the given value, or else the start value."""
-    return {v.name: given.get(v.name, v.quantity.start) for v in variables(declared)}
+    return {v.name: values.get(v.name, v.quantity.start) for v in variables(declared)}
 
 
-def instance(declared: type, given: Mapping[str, float]) -> Any:
-    """An instance of a declaration with the values `given` by name; the other values are the start values."""
-    return Layout(declared).from_names(dict(given))
+def instance(declared: type, values: Mapping[str, float]) -> Any:
+    """An instance of a declaration with the `values` by name; the other values are the start values."""
+    return Layout(declared).from_names(dict(values))
 
 
 def packaged(name: str) -> str:
@@ -418,8 +419,8 @@ def _wrong_texts(data: Any, key: str) -> Iterator[InputError]:
 
 def _wrong_text(text: str, key: str, subject: str) -> Iterator[InputError]:
     if wrong := _NO_SIGNS.search(text):
-        words = f"has U+{ord(wrong[0]):04X}, which is no sign of a text; take it out"
-        yield InputError(f"{printable(key)}: {subject} {words}", key)
+        message = f"has U+{ord(wrong[0]):04X}, which is no sign of a text; take it out"
+        yield InputError(f"{printable(key)}: {subject} {message}", key)
 
 
 _DEEPEST = 30
@@ -431,8 +432,8 @@ def nested_deeply(data: Any) -> bool:
     """Whether tables and lists are nested more than any file needs."""
     level = [data]
     for _ in range(_DEEPEST + 1):
-        inner = (each.values() if isinstance(each, Mapping) else each for each in level)
-        level = [x for each in inner for x in each if isinstance(x, Mapping | list | tuple)]
+        inner = (container.values() if isinstance(container, Mapping) else container for container in level)
+        level = [x for container in inner for x in container if isinstance(x, Mapping | list | tuple)]
     return bool(level)
 
 

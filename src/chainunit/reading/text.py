@@ -132,9 +132,9 @@ def scales(unit: str, kind: str = "", units: Units = DEFAULT_UNITS) -> list[tupl
     shown = factor * value + offset."""
     if kind in _SHARES:
         return [("%", 100.0, 0.0)]
-    of = kind if kind in _SCALES else _KIND_OF.get(unit, "")
-    if of in units:
-        return [(name, *_SCALES[of][name]) for name in units[of]]
+    quantity_kind = kind if kind in _SCALES else _KIND_OF.get(unit, "")
+    if quantity_kind in units:
+        return [(name, *_SCALES[quantity_kind][name]) for name in units[quantity_kind]]
     if unit in DISPLAY_UNITS and unit != "rad/s" and kind != "difference":
         return [DISPLAY_UNITS[unit]]
     return [(unit, 1.0, 0.0)]
@@ -143,14 +143,14 @@ def scales(unit: str, kind: str = "", units: Units = DEFAULT_UNITS) -> list[tupl
 def scales_of_size(value: float, unit: str, kind: str, units: Units) -> list[tuple[str, float, float]]:
     """The `scales` of one number, or of an axis up to that number: a large torque is in kN m and a small power in W,
     unless the user chose another unit."""
-    of = kind if kind in _SCALES else _KIND_OF.get(unit, "")
-    if of not in _BY_SIZE or units.get(of) != DEFAULT_UNITS.get(of):
+    quantity_kind = kind if kind in _SCALES else _KIND_OF.get(unit, "")
+    if quantity_kind not in _BY_SIZE or units.get(quantity_kind) != DEFAULT_UNITS.get(quantity_kind):
         return scales(unit, kind, units)
-    low, high, name = _BY_SIZE[of]
+    low, high, name = _BY_SIZE[quantity_kind]
     if not low <= abs(value) < high:
         return scales(unit, kind, units)
-    factor, offset = _SCALES[of][name]
-    return [(name, 0.0 if of == "power" and abs(value) < _ROUNDING else factor, offset)]
+    factor, offset = _SCALES[quantity_kind][name]
+    return [(name, 0.0 if quantity_kind == "power" and abs(value) < _ROUNDING else factor, offset)]
 
 
 def unit_text(unit: str) -> str:
@@ -230,7 +230,7 @@ def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
     """An array as a result holds it, see `entry`; None for each number that is not finite."""
 
     def plain_list(x: Any) -> Any:
-        return [plain_list(each) for each in x] if isinstance(x, list | tuple) else finite(float(x))
+        return [plain_list(element) for element in x] if isinstance(x, list | tuple) else finite(float(x))
 
     value = plain_list(x.tolist() if hasattr(x, "tolist") else x)
     return {"value": value, "unit": unit} | ({"kind": kind} if kind else {})

@@ -31,11 +31,11 @@ def syntax_faults(text: str, error: Exception) -> list[InputError]:
     lines = text.replace("\r\n", "\n").split("\n")
     while len(faults) < _MOST:
         line = _line(lines, error)
-        own = _value_fault(lines[line - 1]) if line else ""
-        if faults and not own:
+        value_fault = _value_fault(lines[line - 1]) if line else ""
+        if faults and not value_fault:
             break
-        faults.append(InputError(f"no valid TOML: {own or _words(lines, line, error)}", line=line))
-        if not own:
+        faults.append(InputError(f"no valid TOML: {value_fault or _words(lines, line, error)}", line=line))
+        if not value_fault:
             break
         lines[line - 1] = ""
         try:
@@ -87,22 +87,24 @@ def _is_value(text: str) -> bool:
 def _words(lines: list[str], line: int, error: Exception) -> str:
     """Words on a fault that is not one of a value."""
     said = _PLACE.sub("", str(error))
-    first = next((each for each in map(str.strip, lines) if each and not each.startswith("#")), "")
+    first = next(
+        (stripped for stripped in map(str.strip, lines) if stripped and not stripped.startswith("#")), ""
+    )
     if not _BEGIN.match(first) and not _kind(first):
         return "the file has no tables and keys, as a file in TOML has: [name], and below it key = value"
-    own = lines[line - 1] if line else ""
+    faulty_line = lines[line - 1] if line else ""
     twice = any(word in said for word in ("Cannot", "Duplicate"))
-    if twice and (heading := _HEADING.match(own)):
+    if twice and (heading := _HEADING.match(faulty_line)):
         return _twice(lines, line, heading)
     if twice:
-        key = printable(own.partition("=")[0].strip(), 80)
+        key = printable(faulty_line.partition("=")[0].strip(), 80)
         return f"{key} stands twice in its table; leave one of the two out"
-    if _DIGITS.search(own):
+    if _DIGITS.search(faulty_line):
         return "a number has more than 4300 digits"
-    if own.count('"') == 1 or own.count("'") == 1:
-        return f"{printable(own.strip(), 80)}: a quotation mark is missing"
+    if faulty_line.count('"') == 1 or faulty_line.count("'") == 1:
+        return f"{printable(faulty_line.strip(), 80)}: a quotation mark is missing"
     kind = _kind(first)
-    cited = f"{printable(own.strip(), 80)}: " if own.strip() and not kind else ""
+    cited = f"{printable(faulty_line.strip(), 80)}: " if faulty_line.strip() and not kind else ""
     return f"{cited}{printable(said[:1].lower() + said[1:])}{kind}"
 
 

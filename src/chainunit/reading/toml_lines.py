@@ -66,14 +66,14 @@ def _blocks(text: str) -> Iterator[tuple[int, int]]:
 def lines_of(text: str) -> dict[str, int]:
     """The line of each key and table of a TOML text by its full name (``machine.crank.m``, ``event.2.force``); the
     entries of an array of tables count from 1."""
-    found: dict[str, int] = {}
+    line_by_key: dict[str, int] = {}
     for statement in statements(text):
         for name in statement.keys or (statement.table,):
             # the line of a table is that of its first key
             parts = name.split(".")
             for k in range(1, len(parts) + 1):
-                found.setdefault(".".join(parts[:k]), statement.line)
-    return found
+                line_by_key.setdefault(".".join(parts[:k]), statement.line)
+    return line_by_key
 
 
 def _loaded(statement: str) -> dict[str, Any]:

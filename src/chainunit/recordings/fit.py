@@ -57,7 +57,10 @@ class NormalEquations:
     @cached_property
     def mean_squares(self) -> dict[tuple[str, str], float]:
         """The mean squares of the residuals by run and column."""
-        return {(each.run, each.column): float(np.mean(each.residuals**2)) for each in self.comparisons}
+        return {
+            (comparison.run, comparison.column): float(np.mean(comparison.residuals**2))
+            for comparison in self.comparisons
+        }
 
     @cached_property
     def covariance(self) -> Any:
@@ -96,20 +99,20 @@ def assemble(
     fisher, gradient = np.zeros((size, size)), (problem.start_values - z) / deviations**2
     cost = float(np.sum(((z - problem.start_values) / deviations) ** 2))
     weights = {(c.run, c.column): 1.0 / (scales or {}).get((c.run, c.column), 1.0) for c in comparisons}
-    for each in comparisons:
-        factor = weights[each.run, each.column]
-        r = np.abs(each.residuals) * factor
+    for comparison in comparisons:
+        factor = weights[comparison.run, comparison.column]
+        r = np.abs(comparison.residuals) * factor
         cost += float(np.sum(np.where(r < OUTLIER, r * r, OUTLIER * (2.0 * r - OUTLIER))))
         root, slopes, places = (
             np.sqrt(OUTLIER / np.maximum(r, OUTLIER)),
-            each.slopes,
-            np.array(each.places, int),
+            comparison.slopes,
+            np.array(comparison.places, int),
         )
         if np.any(root < 1.0):
             slopes = slopes * root[:, None]
         # the product of a matrix with itself costs half of that of two
         fisher[np.ix_(places, places)] += factor**2 * (slopes.T @ slopes)
-        gradient[places] += factor**2 * (slopes.T @ (root * each.residuals))
+        gradient[places] += factor**2 * (slopes.T @ (root * comparison.residuals))
     return NormalEquations(
         z, comparisons, weights, cost, gradient, fisher, fisher + np.diag(1.0 / deviations**2)
     )
@@ -131,7 +134,7 @@ class Fit(NormalEquations):
     def worst(self) -> tuple[Comparison, float]:
         """The comparison with the largest residuals, and their RMS in standard deviations of its noise."""
         squares = self.mean_squares
-        worst = max(self.comparisons, key=lambda each: squares[each.run, each.column])
+        worst = max(self.comparisons, key=lambda comparison: squares[comparison.run, comparison.column])
         return worst, math.sqrt(squares[worst.run, worst.column])
 
 
@@ -224,19 +227,19 @@ def _fit_roughly(rounds: _LevenbergMarquardt, z: Any) -> NormalEquations:
     return rounds.reweight(best, None)
 
 
-def _scales(at: NormalEquations) -> dict[tuple[str, str], float]:
-    return {key: max(1.0, math.sqrt(share)) for key, share in at.mean_squares.items()}
+def _scales(point: NormalEquations) -> dict[tuple[str, str], float]:
+    return {key: max(1.0, math.sqrt(share)) for key, share in point.mean_squares.items()}
 
 
-def _measured_noises(at: NormalEquations) -> dict[tuple[str, str], float]:
+def _measured_noises(point: NormalEquations) -> dict[tuple[str, str], float]:
     """The measured noise of each column in parts of the stated one, which counts as some rows. Outliers are those
     of noise of the median size."""
     noises = {}
-    for each in at.comparisons:
-        squares = each.residuals**2
+    for comparison in point.comparisons:
+        squares = comparison.residuals**2
         outlier = OUTLIER**2 * max(1.0, float(np.median(squares)) / _MEDIAN)
         total = STATED_ROWS + float(np.sum(np.minimum(squares, outlier)))
-        noises[each.run, each.column] = math.sqrt(total / (STATED_ROWS + len(squares)))
+        noises[comparison.run, comparison.column] = math.sqrt(total / (STATED_ROWS + len(squares)))
     return noises
 
 
@@ -255,9 +258,9 @@ class _LevenbergMarquardt:
         """Whether all rounds from a start are made."""
         return self._count >= self._most
 
-    def reweight(self, at: NormalEquations, scales: Scales | None) -> NormalEquations:
+    def reweight(self, point: NormalEquations, scales: Scales | None) -> NormalEquations:
         """The same point, with columns that count otherwise."""
-        return assemble(self._problem, at.z, at.comparisons, scales)
+        return assemble(self._problem, point.z, point.comparisons, scales)
 
     def evaluate(self, z: Any, scales: Scales | None) -> NormalEquations:
         """The normal equations at these values; those of clocks and sensors are the best."""
@@ -302,15 +305,15 @@ class _LevenbergMarquardt:
 
 def _fit_sensors(problem: Problem, simulations: Sequence[SimulatedRun], z: Any, scales: Scales | None) -> Any:
     """The values with those of clocks and sensors that fit best, without another simulation."""
-    own = ~problem.needs_simulation
+    sensors = ~problem.needs_simulation
     best = None
     for _ in range(MOST_SENSOR_STEPS):
-        at = assemble(problem, z, tuple(problem.compare(simulations, z, with_slopes=False)), scales)
-        if best is not None and at.cost >= best.cost:
+        point = assemble(problem, z, tuple(problem.compare(simulations, z, with_slopes=False)), scales)
+        if best is not None and point.cost >= best.cost:
             break
-        best, step = at, np.zeros(len(z))
-        step[own] = _solve(at.matrix[np.ix_(own, own)], at.gradient[own])
-        if step @ at.gradient < ENOUGH:
+        best, step = point, np.zeros(len(z))
+        step[sensors] = _solve(point.matrix[np.ix_(sensors, sensors)], point.gradient[sensors])
+        if step @ point.gradient < ENOUGH:
             break
         z = z + step
     assert best is not None
@@ -323,24 +326,24 @@ def _solve(matrix: Any, gradient: Any) -> Any:
     return scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * gradient)
 
 
-def _next_point(problem: Problem, at: NormalEquations, damping: float) -> Any:
+def _next_point(problem: Problem, point: NormalEquations, damping: float) -> Any:
     """The next point. Unknowns that would pass a bound stop there, and the others follow."""
     low, high = problem.bounds
-    step, moving = np.zeros(len(at.z)), np.ones(len(at.z), bool)
-    damped = at.matrix + np.diag(
+    step, moving = np.zeros(len(point.z)), np.ones(len(point.z), bool)
+    damped = point.matrix + np.diag(
         np.where(problem.needs_simulation, damping / problem.prior_deviations**2, 0.0)
     )
-    for _ in range(len(at.z)):
+    for _ in range(len(point.z)):
         # unknowns that have stopped change the gradient of the others
-        gradient = at.gradient[moving] - at.matrix[np.ix_(moving, ~moving)] @ step[~moving]
+        gradient = point.gradient[moving] - point.matrix[np.ix_(moving, ~moving)] @ step[~moving]
         step[moving] = _solve(damped[np.ix_(moving, moving)], gradient)
-        z = at.z + step
+        z = point.z + step
         passing = moving & ((z < low) | (z > high))
         if not passing.any():
             return z
-        step[passing] = np.clip(z, low, high)[passing] - at.z[passing]
+        step[passing] = np.clip(z, low, high)[passing] - point.z[passing]
         moving &= ~passing
-    return np.clip(at.z + step, low, high)
+    return np.clip(point.z + step, low, high)
 
 
 @result

@@ -103,15 +103,15 @@ def inspect_runs(problem: Problem, workers: int) -> None:
             continue
         expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
         # of less than a turn the RMS is that of an angle
-        known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
+        has_turn = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
         has_angle = len(mark_times(run.recording)) > 0
-        for name in run.recording.columns if known else ():
+        for name in run.recording.columns if has_turn else ():
             rows = response.describes(name, response.time) & (response.time <= off)
             if MEASURANDS[name].analog and rows.any():
                 size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
-                words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
+                message = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
                 like = likeness(run.recording, name, response) if has_angle else 0.0
-                expected[name] = Expectation(size / factor, size * factor, words, like)
+                expected[name] = Expectation(size / factor, size * factor, message, like)
         faults.add(inspect_columns(run.recording, expected, run.off))
     faults.refuse()
     for run in problem.runs:
@@ -321,11 +321,11 @@ def inspect_steadiness(
     name, times = _turns(driven, ratio)
     if len(times) < FEWEST_TURNS + 1.0:
         return []
-    at, lasts = 0.5 * (times[1:] + times[:-1]), np.diff(times)
+    middles, lasts = 0.5 * (times[1:] + times[:-1]), np.diff(times)
     # a gap may hide passes of the mark
     speeds = 2.0 * math.pi * np.round(lasts / np.median(lasts)) / lasts
     degree = min(DRIFT, (len(speeds) - 2) // 2)
-    slow = np.polynomial.Polynomial.fit(at, speeds, degree)(at)
+    slow = np.polynomial.Polynomial.fit(middles, speeds, degree)(middles)
     mean, spread = (
         float(np.mean(speeds)),
         math.sqrt(np.sum((speeds - slow) ** 2) / (len(speeds) - degree - 1)),
@@ -402,14 +402,14 @@ def _of_column(
     """The faults of a column; `driven` are its rows whose RMS and mean are `expected`, where they are known."""
     x, size, mean = recording.columns[name], rms(driven), float(np.mean(driven))
     stuck = _longest_constant(recording.time, x)
-    extreme, share, at = _extremes(x)
+    extreme, share, longest = _extremes(x)
     if stuck is not None and not (share > CLIPPED and x[stuck[0]] in (x.min(), x.max())):
         begin, end = recording.time[list(stuck)]
-        words = "record again"
+        remedy_text = "record again"
         if end - begin <= 0.5 * (recording.time[-1] - recording.time[0]):
-            words = f"leave this part out (begin, end), or {words}"
+            remedy_text = f"leave this part out (begin, end), or {remedy_text}"
         kept = _kept(recording, name, stuck)
-        yield _fault(recording, name, f"{kept}: the sensor or the logger is stuck; {words}")
+        yield _fault(recording, name, f"{kept}: the sensor or the logger is stuck; {remedy_text}")
         return
     if expected is not None and not expected.admits(size):
         yield _fault(recording, name, _scale_words(name, size, expected))
@@ -420,7 +420,7 @@ def _of_column(
             f"mean of {_size(name, mean)} at an RMS of {_size(name, size)}, although the motor drives: the sign is "
             "reversed; change the sign of the column, or turn the sensor round",
         )  # fmt: skip
-    if share > CLIPPED and at >= 3:
+    if share > CLIPPED and longest >= 3:
         yield _fault(
             recording, name,
             f"{100.0 * share:.2g} % of the rows have its {extreme} value, "
@@ -435,9 +435,9 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
     if turn / step < LEAST_ROWS or span < FEWEST_TURNS * turn:
         likely = _likely_unit(recording, turn, longest)
         if likely:
-            words = f"{span:.4g} s with {turn / step:.2g} rows in a turn of the crank"
+            message = f"{span:.4g} s with {turn / step:.2g} rows in a turn of the crank"
             yield _fault(
-                recording, "time", f"{words}: the values look like {likely}; write [{likely}] into its head"
+                recording, "time", f"{message}: the values look like {likely}; write [{likely}] into its head"
             )
             return
     if span > longest:
@@ -471,10 +471,10 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
 
 def _likely_unit(recording: Recording, turn: float, longest: float) -> str:
     """The unit in which the times would be those of a recording that can be used; empty where there is none."""
-    own = scale(name_and_unit(recording.heads["time"])[1], "s")[0]
+    time_scale = scale(name_and_unit(recording.heads["time"])[1], "s")[0]
     span = float(recording.time[-1] - recording.time[0])
     for unit in ("s", "ms", "µs"):
-        factor = scale(unit, "s")[0] / own
+        factor = scale(unit, "s")[0] / time_scale
         fits = FEWEST_TURNS * turn <= factor * span <= longest
         if factor != 1.0 and fits and LEAST_ROWS * factor * recording.step <= turn:
             return unit
@@ -485,14 +485,16 @@ def _marks(recording: Recording, speeds: tuple[float, float], ratio: float) -> I
     """The fault of marks that do not come once a turn. The speed is the one of the run, or the measured one."""
     if "mark" not in recording.columns or len(recording.time) < 2:
         return
-    own = measured_speed(recording, ratio)
-    known = [*speeds, *([] if own is None else [float(np.mean(own))])]
+    measured = measured_speed(recording, ratio)
+    all_speeds = [*speeds, *([] if measured is None else [float(np.mean(measured))])]
     seen = recording.step * len(recording.time) / (2.0 * math.pi)
     passes, rows = int(np.sum(recording.columns["mark"] > 0.5)), len(recording.time)
-    if not (passes - 1 <= PASSES * max(known) * seen and PASSES * (passes + 1) >= min(known) * seen):
-        turns = f"{seen * min(known):.3g}"
-        if max(known) > 1.01 * min(known):
-            turns += f" to {seen * max(known):.3g}"
+    if not (
+        passes - 1 <= PASSES * max(all_speeds) * seen and PASSES * (passes + 1) >= min(all_speeds) * seen
+    ):
+        turns = f"{seen * min(all_speeds):.3g}"
+        if max(all_speeds) > 1.01 * min(all_speeds):
+            turns += f" to {seen * max(all_speeds):.3g}"
         yield _fault(
             recording, "mark",
             f"is 1 in {'all ' if passes == rows else ''}{passes} rows of {turns} turns of the crank; must be 1 only "
@@ -510,10 +512,11 @@ def _counted(recording: Recording) -> Iterator[InputError]:
     if count[-1] < count[0] and np.median(steps) < 0.0:
         yield _fault(recording, "motor.count", "counts down, while the motor turns forward: change its sign")
     elif steps[place] < -JUMP:
-        at = recording.time[place + 1]
+        instant = recording.time[place + 1]
         yield _fault(
             recording, "motor.count",
-            f"falls by {-steps[place]:.0f} at {at:.10g} s: the counter begins anew; write the count without the jump",
+            f"falls by {-steps[place]:.0f} at {instant:.10g} s: the counter begins anew; write the count without "
+            "the jump",
         )  # fmt: skip
 
 
@@ -535,18 +538,21 @@ def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: 
     switched off."""
     count, passed = driven.columns.get("motor.count"), mark_times(driven)
     counts = 0.0 if count is None else float(np.ptp(count))
-    for name, of in (("motor.w", ratio), ("crank.w", 1.0)):
-        if name in driven.columns and abs(float(np.mean(driven.columns[name]))) < STANDS * crank_speed * of:
-            words = f"mean of {_size(name, float(np.mean(driven.columns[name])))}"
-            other = _with_speed(driven, name, crank_speed * of)
+    for name, factor in (("motor.w", ratio), ("crank.w", 1.0)):
+        if (
+            name in driven.columns
+            and abs(float(np.mean(driven.columns[name]))) < STANDS * crank_speed * factor
+        ):
+            finding = f"mean of {_size(name, float(np.mean(driven.columns[name])))}"
+            other = _with_speed(driven, name, crank_speed * factor)
             if other:
-                sizes = {each: rms(driven.columns[each]) for each in (name, other)}
+                sizes = {quantity: rms(driven.columns[quantity]) for quantity in (name, other)}
                 return [_exchanged(recording, name, other, sizes)]
             if len(passed) > FEWEST_TURNS or counts > FEWEST_TURNS * COUNTS * ratio:
                 turns = f"the mark is passed {len(passed)} times" if len(passed) else "the encoder counts"
                 remedy = "the sensor is not connected, or the column is another one; mend it, or leave it out"
-                return [_fault(recording, name, f"{words}, although {turns}: {remedy}")]
-            return [_standing(recording, name, words)]
+                return [_fault(recording, name, f"{finding}, although {turns}: {remedy}")]
+            return [_standing(recording, name, finding)]
     if count is not None and counts < 4.0:
         return [_standing(recording, "motor.count", "does not change")]
     if "mark" in recording.columns and not np.any(recording.columns["mark"]):
@@ -570,11 +576,11 @@ def _with_speed(recording: Recording, name: str, speed: float) -> str:
     return ""
 
 
-def _standing(recording: Recording, name: str, words: str) -> InputError:
+def _standing(recording: Recording, name: str, finding: str) -> InputError:
     return _fault(
         recording,
         name,
-        f"{words}: the machine stands, or the sensor is not connected; record the running machine",
+        f"{finding}: the machine stands, or the sensor is not connected; record the running machine",
     )
 
 
@@ -588,16 +594,14 @@ def _exchanged(recording: Recording, first: str, second: str, sizes: Mapping[str
 
 
 def _scale_words(name: str, size: float, expected: Expectation) -> str:
-    words = f"RMS of {_size(name, size)}"
+    finding = f"RMS of {_size(name, size)}"
     limit = f"must be from {_size(name, expected.low)} to {_size(name, expected.high)} ({expected.words})"
     unit = MEASURANDS[name].unit
     for factor, prefix in ((1e-3, "m"), (1e3, "k")):
         if expected.admits(size * factor):
-            return (
-                f"{words}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
-            )
+            return f"{finding}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
     more = ", crank_speed and machine.ratio" if name in OF_SPEED else ""
-    return f"{words}; {limit}: check the sensor, the unit in its head{more}"
+    return f"{finding}; {limit}: check the sensor, the unit in its head{more}"
 
 
 def _swapped(sizes: Mapping[str, float], expected: Mapping[str, Expectation]) -> tuple[str, str] | None:
@@ -622,11 +626,11 @@ def _longest_constant(time: Any, x: Any) -> tuple[int, int] | None:
 
 def _extremes(x: Any) -> tuple[str, float, int]:
     """Which extreme value more rows have, their share, and the length of the longest series of them."""
-    found = []
+    extremes = []
     for name, value in (("largest", x.max()), ("least", x.min())):
         begin, end = _longest(stretches(x == value))
-        found.append((float(np.mean(x == value)), end - begin, name))
-    share, longest, name = max(found)
+        extremes.append((float(np.mean(x == value)), end - begin, name))
+    share, longest, name = max(extremes)
     return name, share, longest
 
 
@@ -634,5 +638,5 @@ def _size(name: str, x: float) -> str:
     return f"{x:.4g}{unit_behind(MEASURANDS[name].unit)}"
 
 
-def _fault(recording: Recording, name: str, words: str) -> InputError:
-    return InputError(f"{recording.source}, column {recording.heads[name]}: {words}")
+def _fault(recording: Recording, name: str, message: str) -> InputError:
+    return InputError(f"{recording.source}, column {recording.heads[name]}: {message}")

@@ -41,10 +41,10 @@ class DirectedLoop:
         layout = self.system.model.parameter_layout
         assert self.system.model.state_layout is not None
         self.states = self.system.model.state_layout.names
-        known = {*layout.names, *self.system.inputs}
+        names = {*layout.names, *self.system.inputs}
         self._outputs = tuple(outputs)
         # derivatives by the states alone need a quantity, too
-        self._by = tuple(name for name in by if name in known) or (layout.names[0],)
+        self._by = tuple(name for name in by if name in names) or (layout.names[0],)
         self._loop = lru_cache(maxsize=8)(self._transients)
 
     def _transients(self, driven: tuple[str, ...], changes: int) -> Transients:
@@ -54,19 +54,27 @@ class DirectedLoop:
         self, values: Mapping[str, Any], parameters: Mapping[str, float], time: float
     ) -> dict[str, float]:
         """The states at rest by name, with these values and further start `parameters`."""
-        own, inputs, profiles = self._parted(values)
+        system_values, inputs, profiles = self._parted(values)
         first = inputs | {name: float(x(time)) for name, x in profiles.items()}
         return dict(
-            zip(self.states, map(float, self.system.start(first, own | dict(parameters))), strict=True)
+            zip(
+                self.states,
+                map(float, self.system.start(first, system_values | dict(parameters))),
+                strict=True,
+            )
         )
 
     def _parted(self, values: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, float], dict[str, Any]]:
         """Values of parameters and inputs, and the profiles of inputs; those of another system are left out."""
         layout = self.system.model.parameter_layout
-        own = {name: x for name, x in values.items() if name in layout.names}
+        system_values = {name: x for name, x in values.items() if name in layout.names}
         inputs = {name: x for name, x in values.items() if name in self.system.inputs}
         profiles = {name: x for name, x in inputs.items() if hasattr(x, "changes")}
-        return own, self.system.inputs | {n: x for n, x in inputs.items() if n not in profiles}, profiles
+        return (
+            system_values,
+            self.system.inputs | {n: x for n, x in inputs.items() if n not in profiles},
+            profiles,
+        )
 
     def run(
         self,
@@ -95,7 +103,7 @@ class DirectedLoop:
             where the states leave all bounds.
         """
         system, count, size = self.system, max(1, len(directions)), len(self.states)
-        own, inputs, profiles = self._parted(values)
+        system_values, inputs, profiles = self._parted(values)
         x = np.zeros((2 * size, count))
         changes = np.zeros((len(self._by), count))
         for k, name in enumerate(self.states):
@@ -104,10 +112,10 @@ class DirectedLoop:
         for k, (name, change) in enumerate(directions):
             if name in self._by:
                 changes[self._by.index(name), k] = change
-        bends = max((len(each.changes) for each in profiles.values()), default=0)
+        bends = max((len(profile.changes) for profile in profiles.values()), default=0)
         begin, end = span
         result = self._loop(tuple(profiles), bends).run(
-            system.model.check(system.model.parameter_layout.from_names(own, system.p)),
+            system.model.check(system.model.parameter_layout.from_names(system_values, system.p)),
             inputs,
             x,
             begin=begin,

@@ -31,7 +31,7 @@ _ALL = (
     Measurand("crank.w", "rad/s", "speed of the crank"),
     Measurand("mark", "1", "1 in the first row after the crank passed the mark, else 0", analog=False),
 )
-MEASURANDS = {each.name: each for each in _ALL}
+MEASURANDS = {measurand.name: measurand for measurand in _ALL}
 """By name."""
 PHASES = ("motor.ia", "motor.ib", "motor.ic")
 """Instantaneous currents of the phases, of which a reader forms `motor.i`."""

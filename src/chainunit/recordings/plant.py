@@ -177,8 +177,8 @@ def source_of(drive: Drive, name: str, outputs: Container[str]) -> tuple[str, fl
         "crank.w": ("motor.w", 1.0 / drive.ratio),
     }
     if name not in sources or sources[name][0] not in outputs:
-        known = [key for key, (output, _) in sources.items() if output in outputs]
-        raise InputError(f"{name}: is not measured at this drive; there are {', '.join(known)}")
+        measurable = [key for key, (output, _) in sources.items() if output in outputs]
+        raise InputError(f"{name}: is not measured at this drive; there are {', '.join(measurable)}")
     return sources[name]
 
 
@@ -186,8 +186,8 @@ class SourcedLoop(DirectedLoop):
     """The loop of a drive with the outputs from which the `measured` quantities follow."""
 
     def __init__(self, drive: Drive, measured: Sequence[str], by: Sequence[str]) -> None:
-        known = CompiledSystem(drive.graph).outputs
-        self._sources = {name: source_of(drive, name, known) for name in measured}
+        available = CompiledSystem(drive.graph).outputs
+        self._sources = {name: source_of(drive, name, available) for name in measured}
         self._sources[CRANK] = "motor.phi", 1.0 / drive.ratio
         outputs = ["motor.a", *(output for output, _ in self._sources.values())]
         super().__init__(drive, list(dict.fromkeys(outputs)), by)

@@ -116,21 +116,21 @@ class SimulatedRun:
         self.run, self.response, self.names, self._sizes = run, response, tuple(names), sizes
         self._courses: dict[tuple[str, int], CubicSpline] = {}
 
-    def interpolate(self, name: str, at: Any, with_slopes: bool = True) -> Interpolated:
-        """A simulated quantity at the times `at` [s], shape (n,). Before the first and behind the last simulated time
-        it stands."""
+    def interpolate(self, name: str, instants: Any, with_slopes: bool = True) -> Interpolated:
+        """A simulated quantity at the times `instants` [s], shape (n,). Before the first and behind the last
+        simulated time it stands."""
         from scipy.interpolate import CubicSpline
 
         response = self.response
-        at = np.clip(at, response.time[0], response.time[-1])
-        x, rate = np.empty(len(at)), np.empty(len(at))
-        slopes = np.empty((len(at), len(self.names) if with_slopes else 0))
+        instants = np.clip(instants, response.time[0], response.time[-1])
+        x, rate = np.empty(len(instants)), np.empty(len(instants))
+        slopes = np.empty((len(instants), len(self.names) if with_slopes else 0))
         for rows in response.pieces:
             time = response.time[rows]
-            here = at >= time[0]
+            here = instants >= time[0]
             if (name, rows.start) not in self._courses:
                 self._courses[name, rows.start] = CubicSpline(time, response.values[name][rows])
-            course, inside = self._courses[name, rows.start], at[here]
+            course, inside = self._courses[name, rows.start], instants[here]
             x[here], rate[here] = course(inside), course(inside, 1)
             for k in range(slopes.shape[1]):
                 slopes[here, k] = np.interp(inside, time, response.slopes[name][k, rows]) / self._sizes[k]
@@ -196,14 +196,14 @@ class Problem:
 
     def _run_unknowns(self, run: RecordedRun) -> Iterator[Unknown]:
         columns = run.recording.columns
-        for each in self._nuisances(run):
+        for nuisance in self._nuisances(run):
             yield Unknown(
-                f"{run.name}.{each.name}",
-                each.unit,
-                each.start,
-                each.low,
+                f"{run.name}.{nuisance.name}",
+                nuisance.unit,
+                nuisance.start,
+                nuisance.low,
                 math.inf,
-                each.prior_deviation,
+                nuisance.prior_deviation,
                 is_nuisance=True,
             )
         if "mark" in columns or "motor.count" in columns:
@@ -252,21 +252,26 @@ class Problem:
         first row behind it."""
         runs = []
         for run in self.runs:
-            own, every = run.recording, max(1, round(step / run.recording.step))
-            begins = np.arange(0, len(own.time), every)
+            recording, every = run.recording, max(1, round(step / run.recording.step))
+            begins = np.arange(0, len(recording.time), every)
             columns = {
                 name: np.maximum.reduceat(x, begins) if name == "mark" else x[begins]
-                for name, x in own.columns.items()
+                for name, x in recording.columns.items()
             }
-            runs.append(replace(run, recording=Recording(own.source, own.time[begins], columns, own.heads)))
+            runs.append(
+                replace(
+                    run,
+                    recording=Recording(recording.source, recording.time[begins], columns, recording.heads),
+                )
+            )
         return Problem(self.plant, runs, self.sought, self.sensors)
 
     @cached_property
     def needs_simulation(self) -> Any:
         """Whether a change of the unknown needs another simulation, shape (unknowns,). The others are those of clocks
         and sensors."""
-        own = {f"{run.name}.{each.name}" for run in self.runs for each in self._nuisances(run)}
-        return np.array([not u.is_nuisance or u.name in own for u in self.unknowns])
+        nuisances = {f"{run.name}.{nuisance.name}" for run in self.runs for nuisance in self._nuisances(run)}
+        return np.array([not u.is_nuisance or u.name in nuisances for u in self.unknowns])
 
     def comparisons(self, z: Any, workers: int = 2) -> Iterator[Comparison]:
         """The comparisons of all runs with the values `z` of the unknowns, shape (unknowns,)."""
@@ -282,8 +287,8 @@ class Problem:
         """The comparisons of simulated runs with the values `z` of clocks and sensors; without slopes, with the
         derivatives by clocks and sensors alone."""
         value = self._values(z)
-        for each in simulations:
-            yield from self._compare_columns(each, value, with_slopes)
+        for simulation in simulations:
+            yield from self._compare_columns(simulation, value, with_slopes)
 
     def _values(self, z: Any) -> dict[str, float]:
         return {u.name: float(x) for u, x in zip(self.unknowns, z, strict=True)}
@@ -298,7 +303,7 @@ class Problem:
         margin = 2.0 * recording.step + part * (end - begin) + max(0.0, float(ahead))
         return Scenario(
             {u.name: value[u.name] + run.added.get(u.name, 0.0) for u in self.sought} | dict(run.values),
-            {each.name: value[f"{run.name}.{each.name}"] for each in self._nuisances(run)},
+            {nuisance.name: value[f"{run.name}.{nuisance.name}"] for nuisance in self._nuisances(run)},
             run.crank_speed,
             begin,
             end + margin,
@@ -310,7 +315,10 @@ class Problem:
     def _simulate(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> SimulatedRun:
         free = [u for u in self.sought if u.name not in run.values]
         directions = {u.name: (u.name, _CHANGE * u.prior_deviation) for u in free}
-        directions |= {f"{run.name}.{each.name}": (each.name, each.change) for each in self._nuisances(run)}
+        directions |= {
+            f"{run.name}.{nuisance.name}": (nuisance.name, nuisance.change)
+            for nuisance in self._nuisances(run)
+        }
         response = self.plant.respond(self._scenario(run, value), directions, workers)
         return SimulatedRun(run, response, list(directions), [size for _, size in directions.values()])
 
@@ -319,16 +327,16 @@ class Problem:
         return self.plant.respond(self._scenario(run, self._values(z)), {}, workers)
 
     def _simulation_times(
-        self, run: RecordedRun, at: Any, value: Mapping[str, float]
+        self, run: RecordedRun, instants: Any, value: Mapping[str, float]
     ) -> tuple[Any, dict[str, Any]]:
         """The times of the simulation that belong to times of the logger, and their derivatives by unknowns."""
         begin, end = float(run.recording.time[0]), float(run.recording.time[-1])
-        since = at - begin
+        since = instants - begin
         rates = {f"{run.name}.drift": since}
         part, counts = since / (end - begin), run.crank_speed * self.plant.ratio * COUNTS / (2.0 * math.pi)
         rates |= {f"{run.name}.count.{k}": part**k / counts for k in ADVANCE_ORDERS}
         rates = {name: rate for name, rate in rates.items() if name in self.place}
-        return at + sum(value[name] * rate for name, rate in rates.items()), rates
+        return instants + sum(value[name] * rate for name, rate in rates.items()), rates
 
     def _compare_columns(
         self, simulation: SimulatedRun, value: Mapping[str, float], with_slopes: bool
@@ -343,12 +351,12 @@ class Problem:
                 yield from self._compare_marks(simulation, value, with_slopes)
                 continue
             x, slopes, rate = simulation.interpolate(name, time, with_slopes)
-            by_clock = {key: rate * each for key, each in rates.items()}
+            by_clock = {key: rate * slope for key, slope in rates.items()}
             shown = self._count if name == "motor.count" else self._sensor
             x, slopes, further, size = shown(run, name, x, slopes, by_clock, value)
             rows = response.describes(name, recording.time)
             if rows.any():
-                further = {key: each[rows] for key, each in further.items()}
+                further = {key: slope[rows] for key, slope in further.items()}
                 residuals = (y - x)[rows] / size
                 yield self._comparison(
                     run, name, residuals, slopes[rows] / size, names, further, angle[rows], size, rows
@@ -363,11 +371,11 @@ class Problem:
         passed = passed[simulation.response.describes("mark", passed)]
         if len(passed) < 2:
             return
-        at, rates = self._simulation_times(run, passed, value)
-        x, slopes, rate = simulation.interpolate(CRANK, at, with_slopes)
+        instants, rates = self._simulation_times(run, passed, value)
+        x, slopes, rate = simulation.interpolate(CRANK, instants, with_slopes)
         size = mean_speed(run, self.plant.ratio) * recording.step / math.sqrt(12.0)
         off = (x - value[MARK_ANGLE] + math.pi) % (2.0 * math.pi) - math.pi
-        further = {key: rate * each for key, each in rates.items()} | {MARK_ANGLE: -np.ones(len(x))}
+        further = {key: rate * slope for key, slope in rates.items()} | {MARK_ANGLE: -np.ones(len(x))}
         names = simulation.names if with_slopes else ()
         yield self._comparison(run, "mark", -off / size, slopes / size, names, further, x, size)
 
@@ -403,7 +411,7 @@ class Problem:
             sensor.noise * rms(run.recording.columns[name]), sensor.resolution / math.sqrt(12.0)
         )
         if gain in self.place:
-            further = {key: each * value[gain] for key, each in further.items()} | {gain: x}
+            further = {key: slope * value[gain] for key, slope in further.items()} | {gain: x}
             x, slopes = x * value[gain], slopes * value[gain]
         if offset in self.place:
             further = further | {offset: np.ones(len(x))}

@@ -20,7 +20,9 @@ def check_motor_is_known(recordings: Mapping[str, Recording], *, is_known: bool)
     InputError
         with these signals.
     """
-    of_motor = sorted({name for each in recordings.values() for name in each.columns if name in OF_TERMINALS})
+    of_motor = sorted(
+        {name for recording in recordings.values() for name in recording.columns if name in OF_TERMINALS}
+    )
     if of_motor and not is_known:
         raise InputError(
             f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "

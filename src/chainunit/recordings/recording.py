@@ -109,7 +109,11 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
             [InputError(f"{file}: has no column time [s]{text}{remedy('time', table.heads)}, or add it")]
         )
     if not places:
-        text = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
+        text = ", ".join(
+            f"{measurand.name} [{measurand.unit}]"
+            for measurand in MEASURANDS.values()
+            if measurand.name != "time"
+        )
         text += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
         faults.add([InputError(f"{file}: has no column of a known quantity, such as {text}")])
     with faults.collected():
@@ -145,7 +149,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
 def remedy(quantity: str, heads: Sequence[str]) -> str:
     """Words for a file without the column of a quantity, with one of its `heads` for example: the key that names
     it."""
-    head = printable(next((name for each in heads if (name := name_and_unit(each)[0])), ""))
+    head = printable(next((name for heading in heads if (name := name_and_unit(heading)[0])), ""))
     if not head:
         return ""
     return f'; name it by the key columns, such as columns = {{ "{quantity}" = "{head}" }}'
@@ -166,8 +170,8 @@ def read_part(file: Path, names: Mapping[str, str], begin: float, end: float) ->
     for key, limit in (("begin", begin), ("end", end)):
         # 60 s is the end of a minute whose last row is one step before
         if math.isfinite(limit) and not first - 1.01 * full.step <= limit <= last + 1.01 * full.step:
-            words = "must lie within, or be left out"
-            faults.add([InputError(f"{key} = {limit:.12g} s: {goes}; {words}")])
+            message = "must lie within, or be left out"
+            faults.add([InputError(f"{key} = {limit:.12g} s: {goes}; {message}")])
     faults.refuse()
     part = full.part(begin, end)
     if len(part.time) < FEWEST:

@@ -115,19 +115,21 @@ class PriorConflict:
 def sensor_conflicts(problem: Problem, best: NormalEquations) -> list[PriorConflict]:
     """The numbers of clocks and sensors that are not as they are known."""
     numbers = zip(problem.unknowns, best.z, problem.needs_simulation, strict=True)
-    own = [
+    sensors = [
         (u, float(x), (float(x) - u.start) / u.prior_deviation)
         for u, x, simulated in numbers
         if not simulated
     ]
-    return [PriorConflict(u.name, u.unit, x, far) for u, x, far in own if abs(far) > CONFLICT]
+    return [PriorConflict(u.name, u.unit, x, far) for u, x, far in sensors if abs(far) > CONFLICT]
 
 
 def prior_conflicts(sought: Sequence[Unknown], best: NormalEquations) -> list[PriorConflict]:
     """The `sought` numbers with a stated deviation, in the order of the problem, that are not as they are known."""
-    known = [(u, float(x)) for u, x in zip(sought, best.z, strict=False) if not u.is_even]
-    priors = [PriorConflict(u.name, u.unit, x, (x - u.start) / u.prior_deviation, u.start) for u, x in known]
-    return [each for each in priors if abs(each.deviations) > CONFLICT]
+    expected = [(u, float(x)) for u, x in zip(sought, best.z, strict=False) if not u.is_even]
+    priors = [
+        PriorConflict(u.name, u.unit, x, (x - u.start) / u.prior_deviation, u.start) for u, x in expected
+    ]
+    return [conflict for conflict in priors if abs(conflict.deviations) > CONFLICT]
 
 
 def describes(
@@ -142,10 +144,14 @@ def describes(
 
 def residual_tests(best: NormalEquations) -> list[ResidualTest]:
     """The checks of all columns of a fit that have a value in each row. Of few rows fewer orders are looked at."""
-    columns = [each for each in best.comparisons if each.column != "mark" and len(each.residuals) >= 2 * ROWS]
+    columns = [
+        comparison
+        for comparison in best.comparisons
+        if comparison.column != "mark" and len(comparison.residuals) >= 2 * ROWS
+    ]
     # each has two statistics
     level = (1.0 - FALSE_REJECTIONS) ** (0.5 / max(1, len(columns)))
-    return [residual_test(each, level) for each in columns]
+    return [residual_test(comparison, level) for comparison in columns]
 
 
 def residual_test(comparison: Comparison, level: float) -> ResidualTest:

@@ -139,14 +139,14 @@ class MeasuredShaft(AnyPlant):
             if name in slopes_of:
                 slopes["crank.tau"][place] = size * slopes_of[name]
                 continue
-            own = size * motion.slopes(name)
+            motion_slopes = size * motion.slopes(name)
             slopes["crank.tau"][place] = sum(
-                slopes_of[each] * x for each, x in zip(_MOTION, own, strict=True)
+                slopes_of[quantity] * x for quantity, x in zip(_MOTION, motion_slopes, strict=True)
             )
             for quantity, factor, k in (
                 ("crank.w", 1.0, 1), ("motor.w", self.ratio, 1), ("motor.count", count, 0), (CRANK, 1.0, 0),
             ):  # fmt: skip
-                slopes[quantity][place] = factor * own[k]
+                slopes[quantity][place] = factor * motion_slopes[k]
         kept = (*self._measured, CRANK)
         return Response(time, {name: rows[name] for name in kept}, {name: slopes[name] for name in kept})
 
@@ -157,21 +157,25 @@ class MeasuredShaft(AnyPlant):
         import xarray as xr
 
         model, ratio = self.machine.model, self.ratio
-        own = {name.removeprefix("machine."): x for name, x in values.items() if name.startswith("machine.")}
-        p = self.machine.replace({k: x for k, x in own.items() if k in model.parameter_layout.names}).p
+        machine_values = {
+            name.removeprefix("machine."): x for name, x in values.items() if name.startswith("machine.")
+        }
+        p = self.machine.replace(
+            {k: x for k, x in machine_values.items() if k in model.parameter_layout.names}
+        ).p
         # a sought parameter is an argument, at its value
-        given = model.parameter_layout.by_name(p) | {
-            k: x for k, x in own.items() if k in model.input_layout.names
+        arguments = model.parameter_layout.by_name(p) | {
+            k: x for k, x in machine_values.items() if k in model.input_layout.names
         }
         along = {name: xr.DataArray(ratio * x, dims="row") for name, x in zip(_MOTION, motion, strict=True)}
         names = [name.removeprefix("machine.") for name in self._by]
-        result = evaluate(model, given | along, ["tau"], by=[*names, *_MOTION], workers=workers)
+        result = evaluate(model, arguments | along, ["tau"], by=[*names, *_MOTION], workers=workers)
         if np.any(result["reason"].values):
             reasons = result["reason"].attrs["reasons"]
             raise RunError(f"the machine has no torque at a row of the run: {reasons}")
         slopes = {
-            name: ratio * _rows(result, f"d(tau)/d({own})", motion)
-            for name, own in zip(self._by, names, strict=True)
+            name: ratio * _rows(result, f"d(tau)/d({argument})", motion)
+            for name, argument in zip(self._by, names, strict=True)
         }
         slopes |= {name: ratio * ratio * _rows(result, f"d(tau)/d({name})", motion) for name in _MOTION}
         return ratio * result["tau"].values, slopes
@@ -189,9 +193,11 @@ class MeasuredShaft(AnyPlant):
                 dict.fromkeys(kept, nothing),
                 spans=dict.fromkeys((*kept, "mark"), ()),
             )
-        own, ratio = scenario.nuisances, self.ratio
+        nuisances, ratio = scenario.nuisances, self.ratio
         names = {INERTIA: ("motor.rotor.J", ratio**-2), FRICTION: ("motor.rotor.d", ratio**-2)}
-        values = dict(scenario.values) | {full: own[name] * factor for name, (full, factor) in names.items()}
+        values = dict(scenario.values) | {
+            full: nuisances[name] * factor for name, (full, factor) in names.items()
+        }
         turned = [
             (names[name][0], size * names[name][1]) if name in names else (name, size)
             for name, size in changes
@@ -200,7 +206,7 @@ class MeasuredShaft(AnyPlant):
         start = loop.start(values, {}, off)
         states = {name: np.array([x, *(0.0 for _ in changes)]) for name, x in start.items()}
         for state, nuisance in (("motor.phi", ANGLE), ("motor.w", SPEED)):
-            states[state][0] = own[nuisance] * ratio
+            states[state][0] = nuisances[nuisance] * ratio
             states[state][1:] = [size * ratio * (name == nuisance) for name, size in changes]
         piece = loop.run(values, states, turned, (off, scenario.end), scenario.step, workers)
         response = loop.response(piece)

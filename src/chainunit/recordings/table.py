@@ -70,7 +70,7 @@ class PlannedRecording:
 
 def recording_rules(table: str) -> Iterator[Rule]:
     """The rules of a `table` with recordings, which need models of motor and machine."""
-    for condition, words in (
+    for condition, reason in (
         (MACHINE_FMU, "machine is an FMU"),
         (MOTOR_FMU, "motor is an FMU"),
         (motor_is_chosen(), "motor is not known before it is chosen"),
@@ -78,7 +78,9 @@ def recording_rules(table: str) -> Iterator[Rule]:
         *((other.on, other.words) for other in other_models()),
     ):
         yield Rule(
-            table, condition, f"needs a motor and a machine of two-bar organs as models, and here the {words}"
+            table,
+            condition,
+            f"needs a motor and a machine of two-bar organs as models, and here the {reason}",
         )
 
 

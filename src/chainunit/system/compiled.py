@@ -59,17 +59,17 @@ def compiled(
         a name that a component of a compiled system cannot have.
     """
     models: dict[str, Model] = {}
-    for own, component in system.components.items():
+    for component_name, component in system.components.items():
         if not isinstance(component, ModelComponent):
             raise InputError(
-                f"{own} ({component.title}): is an FMU, whose equations are not known; only a system of models can "
-                "be one model (an SSP package takes FMUs as they are)"
+                f"{component_name} ({component.title}): is an FMU, whose equations are not known; only a system "
+                "of models can be one model (an SSP package takes FMUs as they are)"
             )
-        if own in RESERVED or own.startswith("_") or keyword.iskeyword(own):
+        if component_name in RESERVED or component_name.startswith("_") or keyword.iskeyword(component_name):
             raise InputError(
-                f"{shown(own)}: a component of a system that becomes one model cannot have this name"
+                f"{shown(component_name)}: a component of a system that becomes one model cannot have this name"
             )
-        models[own] = component.model
+        models[component_name] = component.model
     if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or keyword.iskeyword(name):
         raise InputError(
             f"{shown(name)}: the name of a model must be of letters, digits and _, and begin with a letter"
@@ -79,10 +79,17 @@ def compiled(
     model = system_model(description, models)
     values = system.values
     layout = model.parameter_layout
-    limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}
+    limits = {
+        setting: [values[full] for prefix in models if (full := f"{prefix}.{setting}") in values]
+        for setting in SOLVER
+    }
     own_values = {full: values[full] for full in layout.names if full in values}
     # as many steps as the part that needs most of them, as exact as the most exact part
-    own_values |= {own: (max if own == MAX_STEPS else min)(given) for own, given in limits.items() if given}
+    own_values |= {
+        setting: (max if setting == MAX_STEPS else min)(bounds)
+        for setting, bounds in limits.items()
+        if bounds
+    }
     return ModelComponent(model, layout.from_names(own_values))
 
 
@@ -125,7 +132,7 @@ def input_starts(system: System, model: Model) -> dict[str, float]:
 def _description(system: System, models: Mapping[str, Model], name: str, title: str) -> dict[str, Any]:
     """The description of a system that a `chainunit.core.system_description.SystemDescription` takes."""
     exact = hold_loads(system).connections
-    influences = {each: _influences(model) for each, model in models.items()}
+    influences = {component: _influences(model) for component, model in models.items()}
     free = _free_terminals(system)
     members = {
         f"{full.partition('.')[0]}.{variable}"
@@ -133,19 +140,21 @@ def _description(system: System, models: Mapping[str, Model], name: str, title: 
         for variable in system.terminal(full)[1].members.values()
     }
     slopes = {c for c in replace(system, slopes=True).connections if c not in exact}
-    gears = {each: influences[each] for each, model in models.items() if not model.state_layout}
+    gears = {
+        component: influences[component] for component, model in models.items() if not model.state_layout
+    }
     passed = _passed_on(slopes, members, gears)
     connections = [*exact, *passed]
     left_out = {full for connection in slopes - set(passed) for full in connection}
     further = {
         f"{name}.{output}"
-        for name, each in models.items()
-        for part in each.parts[1:]
+        for name, model in models.items()
+        for part in model.parts[1:]
         for output in part.layout.names
     }
     extra = further & (members | {source for source, _ in connections})
     plan = _Plan(connections, models, influences)
-    kinds = ", ".join(f"{each} ({model.name})" for each, model in models.items())
+    kinds = ", ".join(f"{component} ({model.name})" for component, model in models.items())
     return {
         "name": name,
         "title": f"{title}: {kinds}" if title else f"System of {kinds}",
@@ -189,17 +198,25 @@ def _free_terminals(system: System) -> list[str]:
             taken |= {f"{name}.{variable}" for variable in terminal.members.values()}
     free = []
     for name, component in system.components.items():
-        own = [
+        open_terminals = [
             terminal
             for terminal in component.terminals.values()
             if not taken & {f"{name}.{variable}" for variable in terminal.members.values()}
             or _gives_signals(component, terminal)
         ]
         # who gives the motion takes the load
-        moved = [t.members["phi"] for t in own if t.kind != MEASURED and "phi" in t.members]
+        moved = [t.members["phi"] for t in open_terminals if t.kind != MEASURED and "phi" in t.members]
         shafts = {component.connectors[name].causality for name in moved}
-        ports = {t.name: component.connectors[t.members["tau_bias"]] for t in own if "tau_bias" in t.members}
-        free += [f"{name}.{t.name}" for t in own if t.name not in ports or shafts - {ports[t.name].causality}]
+        ports = {
+            t.name: component.connectors[t.members["tau_bias"]]
+            for t in open_terminals
+            if "tau_bias" in t.members
+        }
+        free += [
+            f"{name}.{t.name}"
+            for t in open_terminals
+            if t.name not in ports or shafts - {ports[t.name].causality}
+        ]
     return free
 
 
@@ -260,19 +277,23 @@ class _Plan:
     ) -> None:
         self._models, self._of = models, influences
         self._sources = {target: source for source, target in connections}
-        direct = {name: each.direct for name, each in influences.items()}
+        direct = {name: influence.direct for name, influence in influences.items()}
         self.steps = [(name, outputs) for name, outputs in order(connections, direct)]
 
     def _feeding(self, name: str, inputs: set[str]) -> list[tuple[str, str]]:
         """Component and variable of each source of these inputs of a component."""
-        fulls = [f"{name}.{each}" for each in sorted(inputs)]
+        fulls = [f"{name}.{variable}" for variable in sorted(inputs)]
         sources = [self._sources[full] for full in fulls if full in self._sources]
         return [(source.partition(".")[0], source.partition(".")[2]) for source in sources]
 
     def steps_for(self, kind: str) -> list[tuple[str, list[str]]]:
         """The steps that the derivatives ("rates") or the constraints ("closed") of the components need."""
         needed: set[tuple[str, str]] = set()
-        waiting = [each for name, of in self._of.items() for each in self._feeding(name, getattr(of, kind))]
+        waiting = [
+            source
+            for name, influence in self._of.items()
+            for source in self._feeding(name, getattr(influence, kind))
+        ]
         while waiting:
             name, output = waiting.pop()
             if (name, output) not in needed:
@@ -294,8 +315,8 @@ class _Plan:
             if name in self._started_by or layout is None:
                 return
             before: set[str] = set()
-            for each in self._feeding(name, self._of[name].start):
-                before |= know(*each, (*above, name))
+            for source in self._feeding(name, self._of[name].start):
+                before |= know(*source, (*above, name))
             self._started_by[name] = before
             steps.append((name, None))
 
@@ -305,8 +326,8 @@ class _Plan:
             begin(name, above)
             before = {name} if layout else set()
             if layout is None or variable not in layout.names:
-                for each in self._feeding(name, self._of[name].direct[variable]):
-                    before |= know(*each, above)
+                for source in self._feeding(name, self._of[name].direct[variable]):
+                    before |= know(*source, above)
                 steps.append((name, [variable]))
             return before
 

@@ -63,9 +63,9 @@ class CompiledSystem:
         p = self.p
         if parameters:
             p = model.check(model.parameter_layout.from_names(dict(parameters), self.p))
-        known = {full: x for full, x in inputs.items() if full in self.inputs}
-        own = model.input_layout.from_names(self.inputs | known)
-        return np.array(model.state_layout.values(model.begin(p, own)), float)
+        set_inputs = {full: x for full, x in inputs.items() if full in self.inputs}
+        values = model.input_layout.from_names(self.inputs | set_inputs)
+        return np.array(model.state_layout.values(model.begin(p, values)), float)
 
 
 class CompiledSimulation(Simulation):
@@ -132,12 +132,12 @@ class CompiledSimulation(Simulation):
             chosen = np.append(chosen, len(times) - 1)
         signals = {full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()}
         rows = {**outputs, **signals}
-        known = {v.name: v for v in self._system.model.input_layout.variables} | self._system.outputs
+        declared = {v.name: v for v in self._system.model.input_layout.variables} | self._system.outputs
         variables = {
             full: (
                 "time",
                 rows[full][chosen],
-                {"units": known[full].unit, "long_name": known[full].description},
+                {"units": declared[full].unit, "long_name": declared[full].description},
             )
             for full in kept
         }
@@ -181,9 +181,9 @@ def run_together(
         as `Simulation.run`; and InputError for systems that are different models.
     """
     pairs = list(zip(simulations, stops, strict=True))
-    together = [each for each in simulations if isinstance(each, CompiledSimulation)]
+    together = [simulation for simulation in simulations if isinstance(simulation, CompiledSimulation)]
     if len(together) < len(pairs):
-        return [each.run(stop, step, guards=guards, names=names) for each, stop in pairs]
+        return [simulation.run(stop, step, guards=guards, names=names) for simulation, stop in pairs]
     for simulation, stop in pairs:
         check_forward(simulation.time, stop, step)
     options = RunOptions(max(stops, default=0.0), step, None, guards or {}, 1, names, None)
@@ -206,21 +206,26 @@ def _advance(
         simulation._check_signals()
     system, signals = simulations[0]._system, [simulation.signals for simulation in simulations]
     if any(
-        each._system.model is not system.model or each.signals.keys() != signals[0].keys()
-        for each in simulations
+        simulation._system.model is not system.model or simulation.signals.keys() != signals[0].keys()
+        for simulation in simulations
     ):
         raise InputError("simulations side by side must have one model, and signals of the same inputs")
     kept, guards = selected(options.names, [*system.outputs, *signals[0]]), options.guards
     needed = {*kept, *guards}
     outputs = [name for name in system.outputs if name in needed]
-    by_name = [system.model.parameter_layout.by_name(each._system.p) for each in simulations]
+    by_name = [system.model.parameter_layout.by_name(simulation._system.p) for simulation in simulations]
     varying = [name for name, value in by_name[0].items() if any(p[name] != value for p in by_name)]
     driven = [
         full
         for full, signal in signals[0].items()
-        if any(hasattr(own[full], "changes") or own[full] != signal for own in signals)
+        if any(
+            hasattr(run_signals[full], "changes") or run_signals[full] != signal for run_signals in signals
+        )
     ]
-    changes = max((len(getattr(own[full], "changes", ())) for own in signals for full in driven), default=0)
+    changes = max(
+        (len(getattr(run_signals[full], "changes", ())) for run_signals in signals for full in driven),
+        default=0,
+    )
     loop = Transients(
         system.model, outputs, varying=varying, driven=driven, guarded=list(guards), changes=changes
     )

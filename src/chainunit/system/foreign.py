@@ -73,11 +73,11 @@ def fmu_component(
     fmu = Fmu(file, kind)
     try:
         variables = [v for v in fmu.description.modelVariables if v.type in NUMBERS]
-        known = {v.name for v in variables}
+        fmu_names = {v.name for v in variables}
         for name, theirs in names.items():
-            if theirs not in known:
+            if theirs not in fmu_names:
                 raise InputError(f"{file}: has no variable {printable(theirs)}, which was given for {name}")
-            if name != theirs and name in known and name not in names.values():
+            if name != theirs and name in fmu_names and name not in names.values():
                 raise InputError(
                     f"{file}: has a variable {printable(name)} of its own, beside {printable(theirs)}, which was "
                     f"given for {name}; leave that name out, or name its own otherwise: other = {name!r}"
@@ -142,8 +142,8 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
                 )
             if connector.causality != gives[kind]:
                 raise InputError(f"{file}: {label} is of the kind {connector.causality}; {needs}")
-    known = _MOTOR if motor else _MACHINE
-    signals = {name: unit for name, unit in known.items() if name in component.connectors}
+    signal_units = _MOTOR if motor else _MACHINE
+    signals = {name: unit for name, unit in signal_units.items() if name in component.connectors}
     return replace(
         component, connectors={**component.connectors, **_with_units(file, signals, component.connectors)}
     )
@@ -204,24 +204,24 @@ def _prefixes(names: Iterable[str], members: Iterable[str]) -> list[str]:
     return sorted(set.intersection(*sets))
 
 
-def _of(ends: Iterable[str], known: Terminal, name: str, prefix: str) -> Terminal:
-    """A terminal of the kind of `known`, with those of its members that the FMU has."""
-    members = {m: prefix + m for m in known.members if prefix + m in ends}
-    return Terminal(name, known.kind, known.description, members)
+def _of(ends: Iterable[str], pattern: Terminal, name: str, prefix: str) -> Terminal:
+    """A terminal of the kind of `pattern`, with those of its members that the FMU has."""
+    members = {m: prefix + m for m in pattern.members if prefix + m in ends}
+    return Terminal(name, pattern.kind, pattern.description, members)
 
 
 def _number(file: Path, variable: Any, name: str, usual: float) -> float:
     """The number of an attribute of a variable; `usual` where it states none."""
-    given = getattr(variable, name)
-    if given in (None, ""):
+    attribute = getattr(variable, name)
+    if attribute in (None, ""):
         return usual
     try:
-        number = float({"true": 1, "false": 0}.get(given, given))
+        number = float({"true": 1, "false": 0}.get(attribute, attribute))
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number) and number != usual:
         raise InputError(
-            f"{file}: {printable(variable.name)} has {name} = {shown(given)}; must be a finite number"
+            f"{file}: {printable(variable.name)} has {name} = {shown(attribute)}; must be a finite number"
         )
     return number
 

@@ -292,8 +292,8 @@ class System:
     @property
     def values(self) -> dict[str, float]:
         """Start values of all components and those of `start`, by full name."""
-        own = {f"{name}.{v}": x for name, c in self.components.items() for v, x in c.start.items()}
-        return own | dict(self.start)
+        starts = {f"{name}.{v}": x for name, c in self.components.items() for v, x in c.start.items()}
+        return starts | dict(self.start)
 
     def with_values(self, values: Mapping[str, float]) -> System:
         """The system with other values of parameters and inputs, by full name."""
@@ -386,11 +386,11 @@ def order(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, 
     for output in sources.values():
         rank(output, ())
     groups: dict[tuple[int, str], list[str]] = {}
-    for output, at in level.items():
+    for output, depth in level.items():
         name, _, variable = output.partition(".")
-        groups.setdefault((at, name), []).append(variable)
+        groups.setdefault((depth, name), []).append(variable)
     places = {name: place for place, name in enumerate(direct)}
-    return [(name, groups[at, name]) for at, name in sorted(groups, key=lambda g: (g[0], places[g[1]]))]
+    return [(name, groups[depth, name]) for depth, name in sorted(groups, key=lambda g: (g[0], places[g[1]]))]
 
 
 # -- twins: the system without one part

@@ -160,7 +160,7 @@ class Handle:
         self.references = (ctypes.c_uint * self.n)(*(v.valueReference for v in variables))
         self.values: Any = (NUMBERS[self.kind] * self.n)()
         places = [[i for i, v in enumerate(variables) if v.type == kind] for kind in kinds]
-        self.parts = [(own, Handle([variables[i] for i in own])) for own in places]
+        self.parts = [(part, Handle([variables[i] for i in part])) for part in places]
 
     def put(self, new: Sequence[float]) -> None:
         """Take values of variables of one type.
@@ -173,10 +173,10 @@ class Handle:
         if self.kind == "Real":
             self.values[:] = new
             return
-        least, most, words = _WHOLE[self.kind]
+        least, most, range_text = _WHOLE[self.kind]
         for i, value in enumerate(new):
             if not (least <= value <= most and value % 1.0 == 0.0):
-                raise InputError(f"{self.names[i]} = {value:g}: must be {words}")
+                raise InputError(f"{self.names[i]} = {value:g}: must be {range_text}")
             self.values[i] = int(value)
 
 

@@ -158,17 +158,17 @@ class LinearModel:
 
         self._refuse_undefined()
         kinds = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
-        names = {kind: labels([each.name for each in signals]) for kind, signals in kinds.items()}
+        names = {kind: labels([signal.name for signal in signals]) for kind, signals in kinds.items()}
         return control.ss(self.A, self.B, self.C, self.D, name=self.model, **names)
 
     def _refuse_undefined(self) -> None:
         for name in "ABCD":
             for row, column in np.argwhere(~np.isfinite(getattr(self, name)))[:1]:
-                of = (self.states if name in "AB" else self.outputs)[row].name
+                row_name = (self.states if name in "AB" else self.outputs)[row].name
                 by = (self.states if name in "AC" else self.inputs)[column].name
                 raise InputError(
-                    f"{self.model}: the derivative of {'der(' + of + ')' if name in 'AB' else of} by {by} is not "
-                    "defined at this point, a corner of the equations; take a point beside it"
+                    f"{self.model}: the derivative of {'der(' + row_name + ')' if name in 'AB' else row_name} by {by} "
+                    "is not defined at this point, a corner of the equations; take a point beside it"
                 )
 
 
@@ -180,10 +180,10 @@ def labels(names: Sequence[str]) -> list[str]:
     """The names with _ in place of points, each of them another one."""
     taken: list[str] = []
     for name in names:
-        own = name.replace(".", "_")
-        while own in taken:
-            own += "_"
-        taken.append(own)
+        label = name.replace(".", "_")
+        while label in taken:
+            label += "_"
+        taken.append(label)
     return taken
 
 
@@ -195,7 +195,7 @@ def place(kind: str, name: str, signals: Sequence[LinearSignal | Variable]) -> i
     InputError
         where there is none; it names the signals that there are.
     """
-    names = [each.name for each in signals]
+    names = [signal.name for signal in signals]
     if name not in names:
         there = f"there are {', '.join(names)}" if len(names) <= _MOST else f"there are {len(names)}"
         raise InputError(f"{shown(name)}: no such {kind}{near_name(name, names) or ';'} {there}")
@@ -291,7 +291,7 @@ class _Derivatives:
         self._model = model
         self._states = model.state_layout.variables if model.state_layout else ()
         inputs = model.input_layout.variables
-        outputs = [v for of in model.parts for v in of.layout.variables]
+        outputs = [v for model_part in model.parts for v in model_part.layout.variables]
         kept = [k for k, v in enumerate(outputs) if v.type == "Real"]
         self.rows = (*self._states, *self._states, *(outputs[k] for k in kept))
         names = [v.name for v in self.rows]
@@ -308,23 +308,29 @@ class _Derivatives:
         by = casadi.vertcat(*x, *(u[k] for k in chosen))
         slopes = casadi.jacobian(rows, by)
         self._all, self._slopes = (
-            casadi.Function(name, traced.symbols, [casadi.densify(each) for each in of], {"cse": True})
-            for name, of in (("values", (rows, slopes)), ("slopes", (slopes,)))
+            casadi.Function(
+                name, traced.symbols, [casadi.densify(matrix) for matrix in matrices], {"cse": True}
+            )
+            for name, matrices in (("values", (rows, slopes)), ("slopes", (slopes,)))
         )
 
     def point(self, p: Any, x: Sequence[float], u: Any) -> tuple[Any, ...]:
         """The point as the functions take it: states and inputs, and before and behind them parameters and derived
         values."""
-        layout, own = self._model.parameter_layout, self._model.input_layout
+        layout, input_layout = self._model.parameter_layout, self._model.input_layout
         if self._model.derived_count and not hasattr(p, "derived"):
             p = self._model.with_derived(MATH, p)
         fixed = layout.values(p), (p.derived if self._model.derived_count else [])
-        return np.array(fixed[0], float), [np.array(x, float), np.array(own.values(u), float)], fixed[1]
+        return (
+            np.array(fixed[0], float),
+            [np.array(x, float), np.array(input_layout.values(u), float)],
+            fixed[1],
+        )
 
     def columns_at(self, point: tuple[Any, ...]) -> list[tuple[Variable, float]]:
         """Each column with its value."""
-        at = zip(self.columns, self._columns, strict=True)
-        return [(v, float(point[1][kind][k])) for v, (kind, k) in at]
+        places = zip(self.columns, self._columns, strict=True)
+        return [(v, float(point[1][kind][k])) for v, (kind, k) in places]
 
     def at(self, point: tuple[Any, ...]) -> tuple[np.ndarray, np.ndarray]:
         """The values of the rows, shape (rows,), and their slopes, shape (rows, columns)."""
@@ -338,34 +344,34 @@ class _Derivatives:
     def _moved(self, point: tuple[Any, ...], column: int, by: float) -> np.ndarray:
         """The slopes with one column moved."""
         p, moving, derived_values = point
-        own = [each.copy() for each in moving]
+        moved = [array.copy() for array in moving]
         kind, k = self._columns[column]
-        own[kind][k] += by
-        return self._shaped(self._slopes(p, own[1], own[0], derived_values))
+        moved[kind][k] += by
+        return self._shaped(self._slopes(p, moved[1], moved[0], derived_values))
 
     def bends(self, point: tuple[Any, ...], values: np.ndarray, slopes: np.ndarray) -> list[Bend]:
         """The places near the point where slopes change faster than those of smooth powers."""
-        sizes = np.array([_size(v, at) for v, at in self.columns_at(point)])
+        sizes = np.array([_size(v, value) for v, value in self.columns_at(point)])
         least = _SLIGHT * (
             np.array([[v.quantity.nominal or 1.0] for v in self.rows]) + np.abs(values)[:, None]
         )
         undefined = ~np.isfinite(slopes)
-        found = []
+        bends = []
         for column, v in enumerate(self.columns):
             for share in (AT, NEAR):
                 distance = float(share * sizes[column])
                 with np.errstate(all="ignore"):
                     jump, most = self._jump(point, column, distance, sizes, slopes)
                     nearer, _ = self._jump(point, column, 0.1 * distance, sizes, slopes)
-                    told = ~(jump <= CHANGE * most + least) & ~(nearer <= _SHARP * jump)
-                of_rows = told.any(axis=1) | undefined[:, column]
+                    bent = ~(jump <= CHANGE * most + least) & ~(nearer <= _SHARP * jump)
+                of_rows = bent.any(axis=1) | undefined[:, column]
                 if of_rows.any():
-                    changes = [float(x) for x in (jump[told] / most[told]) if np.isfinite(x)]
-                    names = [name for name, of in zip(self.row_names, of_rows, strict=True) if of]
+                    changes = [float(x) for x in (jump[bent] / most[bent]) if np.isfinite(x)]
+                    names = [name for name, is_bent in zip(self.row_names, of_rows, strict=True) if is_bent]
                     within = InUnit(distance, v.unit)
-                    found.append(Bend(v.name, share == AT, within, tuple(names), max(changes, default=1.0)))
+                    bends.append(Bend(v.name, share == AT, within, tuple(names), max(changes, default=1.0)))
                     break
-        return found
+        return bends
 
     def _jump(
         self, point: tuple[Any, ...], column: int, distance: float, sizes: np.ndarray, slopes: np.ndarray
@@ -374,17 +380,17 @@ class _Derivatives:
         (rows, columns), both by the `sizes` of the columns. A slope that is not defined at the point does not
         count."""
         here, low, high = (
-            np.where(np.isfinite(slopes), each * sizes, 0.0)
-            for each in (slopes, *(self._moved(point, column, by) for by in (-distance, distance)))
+            np.where(np.isfinite(slopes), side_slopes * sizes, 0.0)
+            for side_slopes in (slopes, *(self._moved(point, column, by) for by in (-distance, distance)))
         )
         jumps = np.abs([high - low, high - here, here - low])
         return np.max(jumps, axis=0), np.max(np.abs([low, high, here]), axis=0)
 
 
-def _size(v: Variable, at: float) -> float:
+def _size(v: Variable, value: float) -> float:
     """The size of a state or input: its value, or its nominal one where that is larger; of an angle, which may have
     many turns, one turn at most."""
-    size = max(v.quantity.nominal or 1.0, abs(at))
+    size = max(v.quantity.nominal or 1.0, abs(value))
     return min(size, 2.0 * np.pi) if v.unit == "rad" else size
 
 

@@ -38,9 +38,9 @@ class CoSimulation(FmuSimulation):
         points = self._signal_values(times)
         middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
         moves_inside, moves_over = _moves(points, middles, len(times) - 1)
-        for (instance, handle, at), (_, _, between) in zip(points, middles, strict=True):
+        for (instance, handle, nodes), (_, _, between) in zip(points, middles, strict=True):
             run_on = [name in self._run_on(instance.name) for name in handle.names]
-            between[:, run_on] = at[:-1, run_on]
+            between[:, run_on] = nodes[:-1, run_on]
             if any(run_on):
                 moves_over = [True] * len(moves_over)
         for k, after in enumerate(times[1:].tolist()):
@@ -71,7 +71,7 @@ def _moves(points: _Table, middles: _Table, n: int) -> tuple[list[bool], list[bo
     """For each of the `n` steps: whether a signal changes within it, so that its value at the middle acts, and
     whether the values have to be set at its end."""
     inside, over = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    for (_, _, at), (_, _, between) in zip(points, middles, strict=True):
-        inside |= ((between != at[:-1]) | (between != at[1:])).any(axis=1)
-        over |= (at[1:] != at[:-1]).any(axis=1)
+    for (_, _, nodes), (_, _, between) in zip(points, middles, strict=True):
+        inside |= ((between != nodes[:-1]) | (between != nodes[1:])).any(axis=1)
+        over |= (nodes[1:] != nodes[:-1]).any(axis=1)
     return inside.tolist(), (inside | over).tolist()

@@ -86,8 +86,8 @@ class ModelExchange(FmuSimulation):
     def _put(self, t: float, x: Any, inputs_at: float | None = None) -> None:
         """Make all values consistent at the time `t` [s] and the states `x`; `inputs_at` is the time of the signals
         if it differs."""
-        for unit, own in zip(self._units, self._slices, strict=True):
-            unit.put(t, x[own])
+        for unit, rows in zip(self._units, self._slices, strict=True):
+            unit.put(t, x[rows])
         self._set_inputs(t if inputs_at is None else inputs_at)
 
     def _set_inputs(self, t: float) -> None:
@@ -105,8 +105,8 @@ class ModelExchange(FmuSimulation):
         dx = np.empty_like(self._x)
         try:
             self._put(t, x, self._within(t))
-            for unit, own in zip(self._units, self._slices, strict=True):
-                dx[own] = unit.rates()
+            for unit, rows in zip(self._units, self._slices, strict=True):
+                dx[rows] = unit.rates()
         except DiscardError as error:
             self._refusal = error
             dx[:] = math.nan
@@ -131,9 +131,9 @@ class ModelExchange(FmuSimulation):
         else:
             raise RunError(f"the event at t = {t:g} s finds no end in {_ROUNDS} rounds")
         self._next_event = min((time for _, time in answers), default=math.inf)
-        for unit, own in zip(self._units, self._slices, strict=True):
+        for unit, rows in zip(self._units, self._slices, strict=True):
             unit.leave_event()
-            self._x[own] = unit.states()
+            self._x[rows] = unit.states()
 
     def _event(self, t: float) -> None:
         for unit in self._units:

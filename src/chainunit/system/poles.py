@@ -56,19 +56,19 @@ def poles_of(A: Any, names: Sequence[str]) -> tuple[Pole, ...]:
 
     A = np.asarray(A, float)
     count, group = connected_components(csr_matrix(A != 0.0), connection="strong") if len(A) else (0, [])
-    found = []
+    poles = []
     for k in range(count):
-        own = np.flatnonzero(group == k)
-        values, left, right = eig(A[np.ix_(own, own)], left=True, right=True)
+        members = np.flatnonzero(group == k)
+        values, left, right = eig(A[np.ix_(members, members)], left=True, right=True)
         values = np.where(np.abs(values) <= _ROUNDING * np.max(np.abs(values)), 0.0, values)
         shares = np.abs(left.conj() * right)
         for value, share in zip(values, shares.T, strict=True):
             if value.imag >= 0.0:
-                state = names[own[int(np.argmax(share >= (1.0 - _EQUAL) * np.max(share)))]]
+                state = names[members[int(np.argmax(share >= (1.0 - _EQUAL) * np.max(share)))]]
                 real = 0.0 if abs(value.real) <= _ROUNDING * np.max(np.abs(values)) else float(value.real)
-                found.append(Pole(real, float(value.imag), state))
+                poles.append(Pole(real, float(value.imag), state))
 
     def order(pole: Pole) -> tuple[float, float, str]:
         return float(f"{pole.natural_frequency:.9e}"), -float(f"{pole.real:.9e}"), pole.state
 
-    return tuple(sorted(found, key=order))
+    return tuple(sorted(poles, key=order))

@@ -99,7 +99,7 @@ class _Equations:
         self._outputs = model.parts[0].layout.variables
         self.states = [v.name for v in self._states]
         p = self._p = model.with_derived(MATH, component.parameters)
-        symbols = [casadi.SX.sym(s, len(of)) for s, of in (("u", self._outside), ("x", self.states))]
+        symbols = [casadi.SX.sym(s, len(names)) for s, names in (("u", self._outside), ("x", self.states))]
         u = model.input_layout.instance(casadi.vertsplit(symbols[0]))
         x = model.state_layout.instance(casadi.vertsplit(symbols[1])) if model.state_layout else None
         rates = model.derivatives(casadi_(), p, u, x) if model.state_layout else []

@@ -66,10 +66,10 @@ class Rows:
             self._flush()
         row = self._values[:, self._filled]
         row[0] = time
-        at = 1
+        column = 1
         for instance, handle, names in self._recorders:
-            row[at : at + len(names)] = instance.read(handle)
-            at += len(names)
+            row[column : column + len(names)] = instance.read(handle)
+            column += len(names)
         self._filled += 1
 
     def _attributes(self) -> dict[str, dict[str, str]]:

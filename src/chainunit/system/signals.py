@@ -40,19 +40,19 @@ class Profile:
 
     def __post_init__(self) -> None:
         free = -float("inf")
-        for at, duration, _ in self.changes:
-            if duration <= 0.0 or at < free:
+        for begin, duration, _ in self.changes:
+            if duration <= 0.0 or begin < free:
                 raise ValueError(
-                    f"change at t = {at:g} s: must last > 0 s and begin after the one before ends"
+                    f"change at t = {begin:g} s: must last > 0 s and begin after the one before ends"
                 )
-            free = at + duration
+            free = begin + duration
 
     def __call__(self, t: Any) -> Any:
         """The value at time `t` (float or array)."""
         value: Any = self.start
         before = self.start
-        for at, duration, after in self.changes:
-            s = _share(t, at, duration)
+        for begin, duration, after in self.changes:
+            s = _share(t, begin, duration)
             value = value + (after - before) * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
             before = after
         return value if np.ndim(t) else float(value)
@@ -61,8 +61,8 @@ class Profile:
         """The derivative of the value at time `t` (float or array)."""
         value: Any = 0.0
         before = self.start
-        for at, duration, after in self.changes:
-            s = _share(t, at, duration)
+        for begin, duration, after in self.changes:
+            s = _share(t, begin, duration)
             value = value + (after - before) / duration * (30.0 * s * s * (1.0 - s) ** 2)
             before = after
         return value if np.ndim(t) else float(value)
@@ -70,7 +70,7 @@ class Profile:
     @property
     def corners(self) -> list[float]:
         """Times at which a change begins or ends."""
-        return [x for at, duration, _ in self.changes for x in (at, at + duration)]
+        return [x for begin, duration, _ in self.changes for x in (begin, begin + duration)]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Jump:
 
 def corners(signals: Iterable[Any]) -> list[float]:
     """Times at which one of the signals jumps or bends [s], in order."""
-    return sorted({float(at) for signal in signals for at in getattr(signal, "corners", ())})
+    return sorted({float(corner) for signal in signals for corner in getattr(signal, "corners", ())})
 
 
 def at_time(signal: Any, t: Any) -> Any:

@@ -284,10 +284,10 @@ class FmuSimulation(Simulation):
         return [
             (
                 self._instances[name],
-                self._instances[name].handle([full.partition(".")[2] for full in own]),
-                own,
+                self._instances[name].handle([full.partition(".")[2] for full in group]),
+                group,
             )
-            for name, own in self._by_instance(fulls).items()
+            for name, group in self._by_instance(fulls).items()
         ]
 
     def _signal_inputs(self) -> list[tuple[Instance, Any, list[str]]]:

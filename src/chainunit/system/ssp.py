@@ -86,7 +86,7 @@ def export(
     sources: dict[str, str] = {}
     origins: list[str] = []
     paths: dict[tuple[object, ...], str] = {}
-    with scratch() as made:
+    with scratch() as build_folder:
         for name_of, part in parts.items():
             alike = (part.of, *sorted(part.start.items()))
             if alike not in paths:
@@ -96,7 +96,7 @@ def export(
                     fmu = part.of
                     origins.append(f"{fmu.name} as it is")
                 else:
-                    fmu = made / f"{part.title}.fmu"
+                    fmu = build_folder / f"{part.title}.fmu"
                     origins.append(
                         str(
                             export_fmu(
@@ -149,19 +149,22 @@ def _parts(system: System, names: Names) -> dict[str, _Part]:
     parts = {}
     for name, component in system.components.items():
         if isinstance(component, FmuComponent):
-            own = list(component.connectors.values())
+            declared = list(component.connectors.values())
             title = component.file.stem
             parts[name] = _Part(
-                component.file, title, component.description, own, start[name], component.names
+                component.file, title, component.description, declared, start[name], component.names
             )
             continue
         with refusal_prefix(f"{name}: "):
             interface = interface_of(component.model, start[name])
-        known = component.connectors
-        own = [replace(known[s.variable.name], start=float(s.start or 0.0)) for s in interface.signals]
+        connector_by_name = component.connectors
+        declared = [
+            replace(connector_by_name[s.variable.name], start=float(s.start or 0.0))
+            for s in interface.signals
+        ]
         connectors = [
             replace(c, description=s.variable.description)
-            for c, s in zip(own, interface.signals, strict=True)
+            for c, s in zip(declared, interface.signals, strict=True)
         ]
         values = {c.name: c.start for c in connectors if c.causality != "output"}
         model = component.model
@@ -233,8 +236,8 @@ def _description(
     """The XML tree of SystemStructure.ssd; `sources` are the FMUs' paths by component, `hidden` the variables without
     a connector, `title` is name and description of the system, `experiment` end and step [s]."""
     # a description may hold characters that XML does not allow
-    words = "".join(c if c.isprintable() else " " for c in title[1])
-    root = _root("ssd:SystemStructureDescription", title[0], ("ssd", "ssc", "osp"), words)
+    description = "".join(c if c.isprintable() else " " for c in title[1])
+    root = _root("ssd:SystemStructureDescription", title[0], ("ssd", "ssc", "osp"), description)
     top = SubElement(root, "ssd:System", name=title[0])
     elements = SubElement(top, "ssd:Elements")
     for name, part in parts.items():

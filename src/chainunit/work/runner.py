@@ -82,20 +82,20 @@ def run(
                     raise
                 except Exception as error:
                     begin, end = store.extent(batch)
-                    words = str(error)
+                    message = str(error)
                     if not isinstance(error, RunError):
-                        cause = printable(words or type(error).__name__, 300)
-                        words = f"was lost, as a worker ended ({cause})"
+                        cause = printable(message or type(error).__name__, 300)
+                        message = f"was lost, as a worker ended ({cause})"
                     raise RunError(
-                        f"{job.title}: batch {batch} ({job.dimension} {begin} to {end - 1}) {words}; {complete} of "
+                        f"{job.title}: batch {batch} ({job.dimension} {begin} to {end - 1}) {message}; {complete} of "
                         f"{job.points} are in {store.file}: run it again to go on"
                     ) from error
                 store.write(batch, results)
                 complete += store.size(batch)
                 progress(job.title, complete, job.points)
     except (KeyboardInterrupt, InterruptedRunError) as error:
-        words = f"interrupted after {complete} of {job.points} {job.title}"
-        raise InterruptedRunError(words) from error
+        message = f"interrupted after {complete} of {job.points} {job.title}"
+        raise InterruptedRunError(message) from error
     return store
 
 
@@ -119,8 +119,8 @@ def _results(work: Any, task: Any, begin: int, end: int) -> Any:
         raise
     except Exception as error:
         # an error of a library need not survive the way between processes
-        words = str(error) if isinstance(error, RunError | InputError) else repr(error)
-        raise RunError(f"failed: {printable(words, 500)}") from error
+        message = str(error) if isinstance(error, RunError | InputError) else repr(error)
+        raise RunError(f"failed: {printable(message, 500)}") from error
 
 
 def _made_here(job: Job, begin: int, end: int) -> Future:

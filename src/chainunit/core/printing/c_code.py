@@ -64,10 +64,12 @@ class Program:
             argument, place = operation.entry
             return f"i{argument}[{place}]" if operation.kind == ARGUMENT else in_c[operation.kind]
 
-        self._forms = [form(each) for each in operations.items]
-        self._operands = [each.operands for each in operations.items]
-        self._pairs = {k for k, each in enumerate(operations.items) if is_pair(each.kind)}
-        self._arguments = {k: each.entry for k, each in enumerate(operations.items) if each.kind == ARGUMENT}
+        self._forms = [form(operation) for operation in operations.items]
+        self._operands = [operation.operands for operation in operations.items]
+        self._pairs = {k for k, operation in enumerate(operations.items) if is_pair(operation.kind)}
+        self._arguments = {
+            k: operation.entry for k, operation in enumerate(operations.items) if operation.kind == ARGUMENT
+        }
         self._results = operations.results
 
     def _part(self, k: int, part: list[int]) -> list[str]:

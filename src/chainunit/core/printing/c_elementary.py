@@ -96,28 +96,30 @@ _FORMS = {kind: f"{{0}} {sign} {{1}}" for kind, sign in _SIGNS.items()} | {
 def header() -> str:
     """The C header with all functions."""
     written = dict.fromkeys((function, arguments) for function, arguments, _ in OWN.values())
-    functions = [_function(*each) for each in written]
+    functions = [_function(*signature) for signature in written]
     return "\n".join([_HEAD + _NO_CONTRACTION + _BASIC, *functions, "#endif", ""])
 
 
 def _function(function: Callable[..., Any], arguments: int) -> str:
     """The definition of a function in C."""
-    of = recorded(function, arguments)
+    recording = recorded(function, arguments)
 
     def value(place: int) -> str:
-        each = of.items[place]
-        if each.kind == NUMBER:
-            return number(each.value)
-        return f"x{each.entry[1]}" if each.kind == ARGUMENT else f"v{place}"
+        operation = recording.items[place]
+        if operation.kind == NUMBER:
+            return number(operation.value)
+        return f"x{operation.entry[1]}" if operation.kind == ARGUMENT else f"v{place}"
 
-    def line(place: int, each: Operation) -> str:
-        kind = "int" if each.kind == "LT" else "double"
-        return f"    const {kind} v{place} = {_FORMS[each.kind].format(*map(value, each.operands))};"
+    def line(place: int, operation: Operation) -> str:
+        kind = "int" if operation.kind == "LT" else "double"
+        return (
+            f"    const {kind} v{place} = {_FORMS[operation.kind].format(*map(value, operation.operands))};"
+        )
 
-    results = [value(place) for place in of.results]
+    results = [value(place) for place in recording.results]
     kind, result = ("Two", f"(Two){{{', '.join(results)}}}") if len(results) > 1 else ("double", results[0])
     parameters = ", ".join(f"double x{k}" for k in range(arguments))
-    lines = [line(place, each) for place, each in enumerate(of.items) if each.operands]
+    lines = [line(place, operation) for place, operation in enumerate(recording.items) if operation.operands]
     head = f"static inline {kind} {c_name(function)}({parameters}) {{"
     return "\n".join([head, *lines, f"    return {result};", "}", ""])
 

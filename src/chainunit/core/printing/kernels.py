@@ -40,15 +40,15 @@ def frequent_outputs(model: Model) -> set[str]:
 def output_groups(model: Model) -> list[list[int]]:
     """Outputs that are evaluated together, as places among the declared outputs: last all discrete ones."""
     lists: list[list[int]] = []
-    terminal_outputs, discrete, at = frequent_outputs(model), [], 0
+    terminal_outputs, discrete, offset = frequent_outputs(model), [], 0
     for part in model.parts:
         real: dict[str, int] = {}
-        for i, v in enumerate(part.layout.variables, at):
+        for i, v in enumerate(part.layout.variables, offset):
             if v.type == "Real":
                 real[v.name] = i
             else:
                 discrete.append(i)
-        at += len(part.layout.names)
+        offset += len(part.layout.names)
         often = [i for name, i in real.items() if name in terminal_outputs - part.by_differences]
         apart = [i for name, i in real.items() if name in part.by_differences]
         rest = [i for i in real.values() if i not in often and i not in apart]
@@ -80,7 +80,7 @@ def kernels(
     more = "k" if model.derived_count else ""
 
     def kernel(name: str, takes: str, groups: list[Any], offsets: list[int], frequency: str) -> ModelFunction:
-        return ModelFunction(name, takes, [symbols[each] for each in takes], groups, offsets, frequency)
+        return ModelFunction(name, takes, [symbols[letter] for letter in takes], groups, offsets, frequency)
 
     def one(name: str, takes: str, results: Sequence[Any], frequency: str = "ONCE") -> ModelFunction:
         return kernel(name, takes, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)

@@ -73,15 +73,15 @@ class Operations:
 
         for k in range(function.n_instructions()):
             kind = kinds[function.instruction_id(k)]
-            into, of = function.instruction_output(k), function.instruction_input(k)
+            into, inputs = function.instruction_output(k), function.instruction_input(k)
             if kind == "CONST":
                 places[into[0]] = once(Operation(NUMBER, value=function.instruction_constant(k)))
             elif kind == "INPUT":
-                places[into[0]] = once(Operation(ARGUMENT, entry=(of[0], of[1])))
+                places[into[0]] = once(Operation(ARGUMENT, entry=(inputs[0], inputs[1])))
             elif kind == "OUTPUT":
-                results[into[1]] = places[of[0]]
+                results[into[1]] = places[inputs[0]]
             else:
-                places[into[0]] = add(Operation(kind, tuple(places[i] for i in of)))
+                places[into[0]] = add(Operation(kind, tuple(places[i] for i in inputs)))
         ends = [0]
         for group in groups:
             ends.append(ends[-1] + group.numel())
@@ -102,9 +102,9 @@ class Operations:
                     continue
                 waiting.pop()
                 if place not in places:
-                    each = items[place]
+                    operation = items[place]
                     places[place] = len(order)
-                    order.append(replace(each, operands=tuple(places[k] for k in each.operands)))
+                    order.append(replace(operation, operands=tuple(places[k] for k in operation.operands)))
         other = copy.copy(self)
         other.items = order
         other.results = [[places[place] for place in group] for group in self.results]

@@ -115,7 +115,7 @@ def recorded(function: Callable[..., Any], arguments: int) -> Recorded:
     """The operations of ``function(xp, *arguments)``, which returns a value or several; argument k is entry (0,
     k)."""
     recorder = Recorder()
-    given = [recorder.add(Operation(ARGUMENT, entry=(0, k))) for k in range(arguments)]
-    results = function(recorder, *given)
+    places = [recorder.add(Operation(ARGUMENT, entry=(0, k))) for k in range(arguments)]
+    results = function(recorder, *places)
     values = results if isinstance(results, tuple) else (results,)
-    return Recorded(recorder.items, [each.place for each in values])
+    return Recorded(recorder.items, [value.place for value in values])

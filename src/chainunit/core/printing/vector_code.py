@@ -35,14 +35,14 @@ class VectorCode:
         self._items, self._results = operations.items, operations.results
         self._varies = _varies(self._items, varying)
         self._forms = forms()
-        entries = [each.entry for each in self._items if each.kind == ARGUMENT]
+        entries = [operation.entry for operation in self._items if operation.kind == ARGUMENT]
         self.columns = [entry for entry in varying if entry in entries]
         self.inputs = [entry for entry in entries if entry not in self.columns]
 
     @cached_property
     def _slots(self) -> dict[int, int]:
         """By place of a uniform value that lanes or results need, its place in ``U``."""
-        needed = {k for k, each in enumerate(self._items) if self._varies[k] for k in each.operands}
+        needed = {k for k, operation in enumerate(self._items) if self._varies[k] for k in operation.operands}
         needed |= {place for group in self._results for place in group}
         slots = [k for k in sorted(needed) if not self._varies[k] and self._items[k].kind != NUMBER]
         return {place: slot for slot, place in enumerate(slots)}
@@ -67,10 +67,10 @@ class VectorCode:
         lines = ["PER_ROW void uniform(const double *in, double *U) {"]
         places = {entry: k for k, entry in enumerate(self.inputs)}
         for k in self._needed(set(self._slots)):
-            each = self._items[k]
-            if each.kind == ARGUMENT:
-                lines.append(f"  const double a{k}=in[{places[each.entry]}];")
-            elif each.kind != NUMBER:
+            operation = self._items[k]
+            if operation.kind == ARGUMENT:
+                lines.append(f"  const double a{k}=in[{places[operation.entry]}];")
+            elif operation.kind != NUMBER:
                 lines.append(f"  const double a{k}={self._text(k, vectors=False)};")
         lines += [f"  U[{slot}]=a{k};" for k, slot in self._slots.items()]
         return "\n".join([*lines, "  (void)in,(void)U;", "}", ""])
@@ -82,20 +82,20 @@ class VectorCode:
         columns = {entry: k for k, entry in enumerate(self.columns)}
         lines = [f"PER_VECTOR void {name}(const double *restrict U, const v *restrict a, v *restrict y) {{"]
         for k in self._needed({place for place in results if self._varies[place]}):
-            each = self._items[k]
+            operation = self._items[k]
             if not self._varies[k]:
                 continue
-            if each.kind == ARGUMENT:
-                lines.append(f"  const v a{k}=a[{columns[each.entry]}];")
+            if operation.kind == ARGUMENT:
+                lines.append(f"  const v a{k}=a[{columns[operation.entry]}];")
             else:
                 lines.append(f"  const v a{k}={self._text(k, vectors=True)};")
         lines += [f"  y[{n}]={self._vector(place)};" for n, place in enumerate(results)]
         return "\n".join([*lines, "  (void)U,(void)a,(void)y;", "}", ""])
 
     def _value(self, place: int, vectors: bool) -> str:
-        each = self._items[place]
-        if each.kind == NUMBER:
-            return number(each.value)
+        operation = self._items[place]
+        if operation.kind == NUMBER:
+            return number(operation.value)
         if vectors and not self._varies[place]:
             return f"U[{self._slots[place]}]"
         return f"a{place}"
@@ -105,19 +105,20 @@ class VectorCode:
         return text if self._varies[place] else f"V({text})"
 
     def _text(self, place: int, vectors: bool) -> str:
-        each = self._items[place]
-        if not vectors or each.kind in _ARITHMETIC:
-            return self._forms[each.kind].format(*(self._value(k, vectors) for k in each.operands))
-        name = _NAMES.get(each.kind, each.kind.lower())
-        return f"{name}_v({','.join(self._vector(k) for k in each.operands)})"
+        operation = self._items[place]
+        if not vectors or operation.kind in _ARITHMETIC:
+            return self._forms[operation.kind].format(*(self._value(k, vectors) for k in operation.operands))
+        name = _NAMES.get(operation.kind, operation.kind.lower())
+        return f"{name}_v({','.join(self._vector(k) for k in operation.operands)})"
 
 
 def _varies(items: Sequence[Operation], varying: Sequence[tuple[int, int]]) -> list[bool]:
     """Whether each operation depends on an argument that varies."""
     varies: list[bool] = []
-    for each in items:
+    for operation in items:
         varies.append(
-            (each.kind == ARGUMENT and each.entry in varying) or any(varies[k] for k in each.operands)
+            (operation.kind == ARGUMENT and operation.entry in varying)
+            or any(varies[k] for k in operation.operands)
         )
     return varies
 
@@ -127,10 +128,10 @@ def _uniform_divisors(operations: Operations, varies: Sequence[bool]) -> Operati
     division takes as long as some ten products. A result changes by a unit in the last place."""
     items = list(operations.items)
     inverses: dict[int, int] = {}
-    for k, each in enumerate(operations.items):
-        if each.kind == "DIV" and varies[k] and not varies[divisor := each.operands[1]]:
+    for k, operation in enumerate(operations.items):
+        if operation.kind == "DIV" and varies[k] and not varies[divisor := operation.operands[1]]:
             if divisor not in inverses:
                 inverses[divisor] = len(items)
                 items.append(Operation("INV", (divisor,)))
-            items[k] = Operation("MUL", (each.operands[0], inverses[divisor]))
+            items[k] = Operation("MUL", (operation.operands[0], inverses[divisor]))
     return operations.rearranged(items)

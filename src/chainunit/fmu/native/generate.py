@@ -38,8 +38,8 @@ def _kernels(model: Model) -> tuple[str, int]:
 
 
 def _programs(interface: Interface) -> Iterator[Program]:
-    for each in kernels_of(interface.trace, interface.derived):
-        yield Program(each.name, each.arguments, each.groups, each.offsets, each.frequency)
+    for kernel in kernels_of(interface.trace, interface.derived):
+        yield Program(kernel.name, kernel.arguments, kernel.groups, kernel.offsets, kernel.frequency)
 
 
 _BEFORE_KERNELS = """\

@@ -73,14 +73,14 @@ def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
             raise InputError(f"platforms = {name}: FMI {fmi}.0 has no folder for it; export with fmi 3")
     here = host()
     if not names:
-        own = compiler()
-        if here is None or own is None:
+        local_compiler = compiler()
+        if here is None or local_compiler is None:
             raise InputError(
                 f"no C compiler ({COMPILERS}) for this machine found: install one, or export with backend python"
             )
         if fmi not in PLATFORMS[here].folders:
             raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with fmi 3 or backend python")
-        return (here,), own
+        return (here,), local_compiler
     # zig comes first, for its old system libraries; the system's compiler knows only this machine
     able = zig_compiler() or (compiler() if set(names) == {here} else None)
     if able is None:
@@ -148,10 +148,10 @@ def _compile(
     sources: Mapping[str, bytes],
     files: Sequence[str],
 ) -> bytes:
-    own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
+    options = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
     link = (*_SHARED, *target_platform.link_options)
     library = identifier + target_platform.suffix
-    return compile_with_kernels(compiler, (*own, *_FLAGS), link, sources, files, library)
+    return compile_with_kernels(compiler, (*options, *_FLAGS), link, sources, files, library)
 
 
 def compile_with_kernels(
@@ -185,14 +185,14 @@ def fat(slices: Sequence[bytes]) -> bytes:
     """One Mach-O file for several processors, each slice on a page of its own (Apple's `fat_header`)."""
     page = 14  # 16 KiB, the page of arm64
     head = struct.pack(">II", 0xCAFEBABE, len(slices))
-    at = 8 + 20 * len(slices)
+    offset = 8 + 20 * len(slices)
     body = b""
     for code in slices:
         magic, processor, subtype = struct.unpack("<III", code[:12])
         if magic != 0xFEEDFACF:
             raise RunError("the C compiler made no 64-bit Mach-O library for macOS")
-        padding = -(at + len(body)) % (1 << page)
+        padding = -(offset + len(body)) % (1 << page)
         body += bytes(padding)
-        head += struct.pack(">IIIII", processor, subtype, at + len(body), len(code), page)
+        head += struct.pack(">IIIII", processor, subtype, offset + len(body), len(code), page)
         body += code
     return head + body

@@ -25,12 +25,12 @@ POINT_NAMES = ("angle", "w", "a", "centroid", "mass", "inertia")
 _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
 
 
-def words(given: Any) -> set[str]:
+def words_in(entry: Any) -> set[str]:
     """All words in the texts of a table."""
-    if isinstance(given, str):
-        return {*_WORD.findall(given)}
-    inside = given.values() if isinstance(given, Mapping) else given if isinstance(given, list) else ()
-    return set().union(*map(words, inside))
+    if isinstance(entry, str):
+        return {*_WORD.findall(entry)}
+    inside = entry.values() if isinstance(entry, Mapping) else entry if isinstance(entry, list) else ()
+    return set().union(*map(words_in, inside))
 
 
 def name_fault(name: str) -> str:
@@ -52,7 +52,7 @@ def model_name(stem: str) -> str:
 
 def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
     """The fault of a table of guides where no joint slides."""
-    if "guides" in data and not any(each["type"] == PRISMATIC for each in joints):
+    if "guides" in data and not any(joint["type"] == PRISMATIC for joint in joints):
         yield "guides", "no joint of the linkage slides; leave the table out"
 
 
@@ -64,12 +64,12 @@ def study_fault(data: Mapping[str, Any]) -> None:
     InputError
         in one line.
     """
-    found = [key for key in _STUDY if key in data]
-    if found and "links" not in data:
+    study_tables = [key for key in _STUDY if key in data]
+    if study_tables and "links" not in data:
         raise InputError(
-            f"{found[0]}: is a table of a study file, and this file has no [links]: run a study file with chainunit "
-            "study; a linkage file has [ground], [driver] and [links]",
-            key=found[0],
+            f"{study_tables[0]}: is a table of a study file, and this file has no [links]: run a study file with "
+            "chainunit study; a linkage file has [ground], [driver] and [links]",
+            key=study_tables[0],
         )
 
 
@@ -78,17 +78,17 @@ def quantity_names(
 ) -> Iterator[Fault]:
     """Names of parameters, inputs and tables that two things share, or that have a meaning already."""
     seen: dict[str, str] = {}
-    own = {f"{quantity}_of_{link['name']}" for link in links for quantity in link.get("own", ())}
+    link_quantities = {f"{quantity}_of_{link['name']}" for link in links for quantity in link.get("own", ())}
     names = [
-        (kind, each["name"])
+        (kind, entry["name"])
         for kind, entries in (("parameters", parameters), ("inputs", inputs))
-        for each in entries
+        for entry in entries
     ]
     for kind, name in (*names, *(("tables", name) for name in tables)):
         key = f"{kind}.{name}"
         if name in (*WORDS, *CONSTANTS, *MOTION):
             yield key, "the name has a meaning in expressions; choose another one"
-        elif name in own or (kind != "tables" and name in reserved):
+        elif name in link_quantities or (kind != "tables" and name in reserved):
             yield key, "is a variable of every linkage; choose another name"
         elif name in seen:
             yield key, f"is a name in [{seen[name]}], too; choose another one"
@@ -162,10 +162,11 @@ def usual_distance(link: str, points: Places, ends: set[tuple[str, ...]]) -> flo
     times the size of the linkage farther than its joints. `ends` are the points of all joints, by link and name; 0
     for a linkage without a size."""
     joined = {
-        name: [at for point, at in those.items() if (name, point) in ends] for name, those in points.items()
+        name: [place for point, place in those.items() if (name, point) in ends]
+        for name, those in points.items()
     }
     size = max((math.dist(a, b) for those in joined.values() for a in those for b in those), default=0.0)
-    return max((math.hypot(*at) for at in joined[link]), default=0.0) + 10.0 * size if size else 0.0
+    return max((math.hypot(*place) for place in joined[link]), default=0.0) + 10.0 * size if size else 0.0
 
 
 _DENSITY = 8000.0
@@ -180,8 +181,8 @@ def usual_inertia(mass: float, points: Iterable[tuple[float, float]]) -> tuple[f
     have a large one.
     """
     ball = math.sqrt(0.4) * (0.75 * mass / (math.pi * _DENSITY)) ** (1.0 / 3.0)
-    at = list(points)
-    size = max((math.dist(a, b) for a in at for b in at), default=0.0)
+    places = list(points)
+    size = max((math.dist(a, b) for a in places for b in places), default=0.0)
     return mass * max(ball / 30.0, size / 200.0) ** 2, mass * (100.0 * max(ball, size)) ** 2
 
 

@@ -92,7 +92,8 @@ def gap_hint(
         return ""
     try:
         apart = [
-            _apart(group, Mechanism(MATH, before, at, derived[: before.derived_count])) for at in (q, *places)
+            _apart(group, Mechanism(MATH, before, place, derived[: before.derived_count]))
+            for place in (q, *places)
         ]
     except (ArithmeticError, ValueError, IndexError):
         return ""
@@ -100,7 +101,7 @@ def gap_hint(
     if isinstance(group, RRP):
         rod = group.first
         wanted = [(rod.name, rod.length, max(apart), math.inf)]
-        words = (
+        gap_text = (
             f": its line is {_mm(apart[0])} from the pin {rod.pin}, {_mm(gap)} more than {rod.name} is long"
         )
     else:
@@ -111,7 +112,7 @@ def gap_hint(
             if apart[0] > far
             else f"less than they differ ({_mm(near)})"
         )
-        words = f": its pins {one.pin} and {other.pin} are {_mm(apart[0])} apart, {_mm(gap)} {missing}"
+        gap_text = f": its pins {one.pin} and {other.pin} are {_mm(apart[0])} apart, {_mm(gap)} {missing}"
         wanted = [
             (a.name, a.length, max(max(apart) - b.length, b.length - min(apart)), min(apart) + b.length)
             for a, b in ((one, other), (other, one))
@@ -123,7 +124,11 @@ def gap_hint(
         if high - low > _ROUNDED * low:
             most = "" if high == math.inf else f" and {_mm(high, -1.0)}"
             fits.append(f"a length of {name} {'between' if most else 'above'} {_mm(low, 1.0)}{most}")
-    return f"{words}; {' or '.join(fits)} closes it all the way" if fits else f"{words}; change both lengths"
+    return (
+        f"{gap_text}; {' or '.join(fits)} closes it all the way"
+        if fits
+        else f"{gap_text}; change both lengths"
+    )
 
 
 def _apart(group: Dyad | RRP, m: Mechanism) -> float:

@@ -123,20 +123,22 @@ class WayRunning(Energies):
 def common_parameters(linear: bool, guides: bool, starts: Mapping[str, float]) -> type:
     """The parameters that a linkage has whatever its file says: of a driver that slides (`linear`) or turns, with
     `guides` or without, and with the given start values by name."""
-    of = WayParameters if linear else CommonParameters
+    parameters = WayParameters if linear else CommonParameters
     if not guides:
-        of = declared_class(of.__name__, (), fields_of(of, without=("guides",)))
-    return with_starts(of, starts)
+        parameters = declared_class(parameters.__name__, (), fields_of(parameters, without=("guides",)))
+    return with_starts(parameters, starts)
 
 
 def field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
     """A quantity of the user's as a field of a declaration."""
     bounds = {key: entry[key] for key in ("min", "max") if entry.get(key) is not None}
-    words = entry.get("description") or entry["name"]
+    description = entry.get("description") or entry["name"]
     return (
         entry["name"],
         Value,
-        quantity(entry["unit"], words, default=entry["value"], tunable=entry.get("tunable", False), **bounds),
+        quantity(
+            entry["unit"], description, default=entry["value"], tunable=entry.get("tunable", False), **bounds
+        ),
     )
 
 
@@ -162,7 +164,7 @@ def with_starts(declared: type, starts: Mapping[str, float]) -> type:
 
 RESERVED = frozenset(
     name
-    for of in (
+    for declared in (
         CommonParameters,
         LinkageMotion,
         PortValues,
@@ -172,6 +174,6 @@ RESERVED = frozenset(
         AddedInertia,
         LoadInput,
     )
-    for name in (*names_of(of), "end_stops", "end_stop_force", "end_stop_torque")
+    for name in (*names_of(declared), "end_stops", "end_stop_force", "end_stop_torque")
 )
 """Names of variables that every machine has."""

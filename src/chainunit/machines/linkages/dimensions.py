@@ -23,18 +23,18 @@ def dimension_of_unit(unit: str) -> Dimension:
 Dimensions = Mapping[str, Dimension | None]
 
 
-def checked_dimension(text: str, known: Dimensions, unit: str | None) -> Dimension | None:
-    """The dimension of an expression; `known` has those of the names, extremes and tables in it, None for one that
-    is not known yet. One of numbers alone takes any dimension, as a number does.
+def checked_dimension(text: str, dimensions: Dimensions, unit: str | None) -> Dimension | None:
+    """The dimension of an expression; `dimensions` has those of the names, extremes and tables in it, None for one
+    that is not known yet. One of numbers alone takes any dimension, as a number does.
 
     Raises
     ------
     InputError
         in one line, for an expression that adds what does not fit together, or is not of the dimension of `unit`.
     """
-    of = expression(text)
-    result = _dimension(of.tree, known, of)
-    if not (of.names or of.extremes or of.tables):
+    parsed = expression(text)
+    result = _dimension(parsed.tree, dimensions, parsed)
+    if not (parsed.names or parsed.extremes or parsed.tables):
         return None
     if unit is not None and result is not None and result != dimension_of_unit(unit):
         remedy = (
@@ -44,42 +44,49 @@ def checked_dimension(text: str, known: Dimensions, unit: str | None) -> Dimensi
     return result
 
 
-def _dimension(node: ast.AST, known: Dimensions, of: Expression) -> Dimension | None:
+def _dimension(node: ast.AST, dimensions: Dimensions, whole_text: Expression) -> Dimension | None:
     match node:
         case ast.Constant():
             return None
         case ast.Name(id=name):
-            return () if name in CONSTANTS else known[name]
+            return () if name in CONSTANTS else dimensions[name]
         case ast.UnaryOp(operand=inner):
-            return _dimension(inner, known, of)
+            return _dimension(inner, dimensions, whole_text)
         case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int() | float() as power)):
-            inside = _dimension(base, known, of)
+            inside = _dimension(base, dimensions, whole_text)
             return None if inside is None else tuple((name, k * power) for name, k in inside)
         case ast.BinOp():
             first, steps = parts_of_chain(node)
-            a = _dimension(first, known, of)
+            a = _dimension(first, dimensions, whole_text)
             for whole, op, right in steps:
-                b = _dimension(right, known, of)
+                b = _dimension(right, dimensions, whole_text)
                 if isinstance(op, ast.Add | ast.Sub):
-                    a = _same(a, b, whole, of)
+                    a = _same(a, b, whole, whole_text)
                 # a number in a product is a pure one
                 elif a is not None or b is not None:
                     a = _product(a or (), b or (), 1.0 if isinstance(op, ast.Mult) else -1.0)
             return a
         case ast.Call(func=ast.Name(id=name), args=[place]) if name in EXTREMES:
-            return known[f"{'max' if name == 'stroke' else name}({ast.unparse(place)})"]
+            return dimensions[f"{'max' if name == 'stroke' else name}({ast.unparse(place)})"]
         case ast.Compare(left=left, comparators=[right]):
-            return _same(_dimension(left, known, of), _dimension(right, known, of), node, of)
+            return _same(
+                _dimension(left, dimensions, whole_text),
+                _dimension(right, dimensions, whole_text),
+                node,
+                whole_text,
+            )
         case ast.Call(func=ast.Name(id="table"), args=[x, ast.Name(id=name)]):
-            _same(_dimension(x, known, of), known[f"x of {name}"], node, of)
-            return known[f"table {name}"]
+            _same(_dimension(x, dimensions, whole_text), dimensions[f"x of {name}"], node, whole_text)
+            return dimensions[f"table {name}"]
         case ast.Call(func=ast.Name(id=name), args=args):
-            inside_all = [_dimension(each, known, of) for each in args]
-            return _of_function(name, inside_all, node, of)
+            inside_all = [_dimension(argument, dimensions, whole_text) for argument in args]
+            return _of_function(name, inside_all, node, whole_text)
     return None
 
 
-def _of_function(name: str, args: list[Dimension | None], node: ast.AST, of: Expression) -> Dimension | None:
+def _of_function(
+    name: str, args: list[Dimension | None], node: ast.AST, parsed: Expression
+) -> Dimension | None:
     first = args[0]
     if name == "sqrt":
         return None if first is None else tuple((unit, 0.5 * k) for unit, k in first)
@@ -88,28 +95,28 @@ def _of_function(name: str, args: list[Dimension | None], node: ast.AST, of: Exp
     if name == "table":  # of numbers, which take any dimension
         return None
     if name in ("step", "positive", "ramp"):
-        for each in args[1:]:
-            first = _same(first, each, node, of)
+        for argument in args[1:]:
+            first = _same(first, argument, node, parsed)
         return first if name == "positive" else ()
     if name == "where":
-        _same(first, args[3], node, of)
-        return _same(args[1], args[2], node, of)
+        _same(first, args[3], node, parsed)
+        return _same(args[1], args[2], node, parsed)
     if name in ("min", "max"):
-        return _same(first, args[1], node, of)
+        return _same(first, args[1], node, parsed)
     if name == "atan2":
-        _same(first, args[1], node, of)
+        _same(first, args[1], node, parsed)
         return ()
     if first:
-        raise InputError(f"is {shown(of.text)}; {name} takes an angle or a ratio, not {_unit(first)}")
+        raise InputError(f"is {shown(parsed.text)}; {name} takes an angle or a ratio, not {_unit(first)}")
     return ()
 
 
-def _same(a: Dimension | None, b: Dimension | None, node: ast.AST, of: Expression) -> Dimension | None:
+def _same(a: Dimension | None, b: Dimension | None, node: ast.AST, parsed: Expression) -> Dimension | None:
     if a is None or b is None:
         return b if a is None else a
     if a != b:
         raise InputError(
-            f"is {shown(of.text)}; in {of.words(node)} the one is in {_unit(a)}, the other in {_unit(b)}"
+            f"is {shown(parsed.text)}; in {parsed.words(node)} the one is in {_unit(a)}, the other in {_unit(b)}"
         )
     return a
 

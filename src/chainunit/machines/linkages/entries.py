@@ -18,7 +18,7 @@ from ...core.quantities import USUAL, Layout, Quantity, Variable, base_units
 from ...mechanism.expressions import CONSTANTS, WORDS, Expression, as_float, expression
 from ...reading.lists import Entry
 from ...reading.tables import UnusualValue
-from .checks import name_fault, words
+from .checks import name_fault, words_in
 from .declarations import CommonParameters
 from .dimensions import Dimensions, checked_dimension, dimension_of_unit
 from .loads import MOTION, OF_POINT
@@ -62,11 +62,11 @@ class EntryReader(Entry):
     ) -> Mapping[str, Any]:
         """A table; faults where it is none."""
         name = key.rpartition(".")[2]
-        given = (self.data if parent is None else parent).get(name, {} if default is None else default)
-        if not isinstance(given, Mapping):
-            self.fault(key, f"is {shown(given)}; must be a table")
+        entry = (self.data if parent is None else parent).get(name, {} if default is None else default)
+        if not isinstance(entry, Mapping):
+            self.fault(key, f"is {shown(entry)}; must be a table")
             return {}
-        return given
+        return entry
 
     def all(self, faults: Iterable[tuple[str, str]]) -> None:
         """Collect faults, each by key and message."""
@@ -75,144 +75,144 @@ class EntryReader(Entry):
 
     def text(self, key: str, default: str, table: Mapping[str, Any] | None = None) -> str:
         """A text of the file, or of one of its tables by the last name of its `key`."""
-        given = (self.data if table is None else table).get(key.rpartition(".")[2], default)
-        if not isinstance(given, str):
-            self.fault(key, f"is {shown(given)}; must be a text")
+        entry = (self.data if table is None else table).get(key.rpartition(".")[2], default)
+        if not isinstance(entry, str):
+            self.fault(key, f"is {shown(entry)}; must be a text")
             return default
-        return given
+        return entry
 
-    def positive(self, key: str, given: Any, unit: str) -> Any:
+    def positive(self, key: str, entry: Any, unit: str) -> Any:
         """An entry that may name inputs; a number must be >= 0."""
-        value = self.entry(key, given, unit, inputs=True)
+        value = self.entry(key, entry, unit, inputs=True)
         if not isinstance(value, str) and value < 0.0:
-            self.fault(key, f"is {shown(given)}; must be >= 0")
+            self.fault(key, f"is {shown(entry)}; must be >= 0")
         return value
 
-    def tables(self, kind: str, known: tuple[str, ...] = ()) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-        """The tables in a table, each behind its name and its full key; their keys are `known`, if any are given."""
-        given = self.table(kind)
-        self.fault_reserved_names(kind, given)
-        for name in given:
+    def tables(self, kind: str, keys: tuple[str, ...] = ()) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+        """The tables in a table, each behind its name and its full key; their keys are `keys`, if any are given."""
+        entries = self.table(kind)
+        self.fault_reserved_names(kind, entries)
+        for name in entries:
             key = f"{kind}.{name}"
-            table = self.table(key, given)
-            if known:
-                self.keys(key, table, known)
+            table = self.table(key, entries)
+            if keys:
+                self.keys(key, table, keys)
             yield name, key, table
 
     def fault_reserved_names(self, key: str, names: Mapping[str, Any]) -> None:
         """Fault names that no variable can have."""
-        for each in names:
-            if wrong := name_fault(each):
-                self.fault(f"{key}.{each}", wrong)
-                self.refused.add(each)
+        for name in names:
+            if wrong := name_fault(name):
+                self.fault(f"{key}.{name}", wrong)
+                self.refused.add(name)
 
-    def doubt(self, variable: Variable, given: Any, value: float) -> None:
-        """Note the `value` of a key, which the file has as `given`, where it is of no usual size."""
-        doubt = UnusualValue.of(variable, given, value)
+    def doubt(self, variable: Variable, entry: Any, value: float) -> None:
+        """Note the `value` of a key, which the file has as `entry`, where it is of no usual size."""
+        doubt = UnusualValue.of(variable, entry, value)
         if doubt is not None and doubt not in self.unusual:
             self.unusual.append(doubt)
 
-    def number(self, key: str, given: Any, unit: str, words: str = "") -> float:
-        """A number, or a text with a unit; `words` are its description. One of an unusual size is noted."""
-        if isinstance(given, bool) or not isinstance(given, int | float | str):
+    def number(self, key: str, entry: Any, unit: str, description: str = "") -> float:
+        """A number, or a text with a unit; `description` are its description. One of an unusual size is noted."""
+        if isinstance(entry, bool) or not isinstance(entry, int | float | str):
             raise InputError(
-                f"{is_given(given)}; must be a number or a text with a unit, such as {_like(unit)}"
+                f"{is_given(entry)}; must be a number or a text with a unit, such as {_like(unit)}"
             )
-        if isinstance(given, str):
-            parts = units.split(given)
+        if isinstance(entry, str):
+            parts = units.split(entry)
             if parts is None:
                 raise InputError(
-                    f"is {shown(given)}; must be a number or a text with a unit, such as {_like(unit)}"
-                    f"{units.spelling(given, unit)}"
+                    f"is {shown(entry)}; must be a number or a text with a unit, such as {_like(unit)}"
+                    f"{units.spelling(entry, unit)}"
                 )
             try:
                 value = units.convert(*parts, unit) if parts[1] else parts[0]
             except ValueError:
-                hint = units.spelling(given, unit)
+                hint = units.spelling(entry, unit)
                 raise InputError(
-                    f"is {shown(given)}{hint or f'; the unit does not fit, write it as {_like(unit)}'}"
+                    f"is {shown(entry)}{hint or f'; the unit does not fit, write it as {_like(unit)}'}"
                 ) from None
         else:
-            value = as_float(given)
-        within(value, given)
-        if unit == "rad" and abs(value) > WHOLE * (1.0 + 1e-12) and not units.has_unit(given):
+            value = as_float(entry)
+        within(value, entry)
+        if unit == "rad" and abs(value) > WHOLE * (1.0 + 1e-12) and not units.has_unit(entry):
             raise InputError(
-                f'is {shown(given)}, more than a turn; {units.IN_RADIANS}, write degrees as "{value:g} deg"'
+                f'is {shown(entry)}, more than a turn; {units.IN_RADIANS}, write degrees as "{value:g} deg"'
             )
         if unit != "rad" and key:
-            self.doubt(sized(key, unit, _USUAL.get(unit), words), given, value)
+            self.doubt(sized(key, unit, _USUAL.get(unit), description), entry, value)
         return value
 
     def limit(self, end: str, whole: Mapping[str, Any], unit: str) -> float:
         """The `end` (min or max) of a parameter; where its unit does not fit that of the value, either may be the
         wrong one, so that both are named."""
-        given = whole[end]
-        parts = units.split(given) if isinstance(given, str) else None
+        bound = whole[end]
+        parts = units.split(bound) if isinstance(bound, str) else None
         if "unit" not in whole and parts is not None and parts[1] and not units.converts(parts[1], unit):
             raise InputError(
-                f"has value = {shown(whole['value'])} and {end} = {shown(given)}, which are of different kinds; "
+                f"has value = {shown(whole['value'])} and {end} = {shown(bound)}, which are of different kinds; "
                 "correct the unit of one of them"
             )
-        return self.number("", given, unit)
+        return self.number("", bound, unit)
 
     def entry(
-        self, key: str, given: Any, unit: str, motion: Known | None = None, inputs: bool = False
+        self, key: str, entry: Any, unit: str, motion: Known | None = None, inputs: bool = False
     ) -> Any:
         """A number in SI units, or the text of an expression, with its unit checked; NaN where it is wrong. `motion`
         are the units of the names that a load knows beside parameters and inputs."""
         with self.at(key):
-            if not isinstance(given, str) or _is_quantity(given):
-                return self.number(key, given, unit)
-            if self.refused & words(given):  # the name itself is faulted where it is given
+            if not isinstance(entry, str) or _is_quantity(entry):
+                return self.number(key, entry, unit)
+            if self.refused & words_in(entry):  # the name itself is faulted where it is given
                 return math.nan
-            known = {**self.units, **(motion or {})}
-            each = expression(given)
-            known |= self.further_units(each, motion is not None)
-            for name in each.names:
-                if name not in known and name not in self.derived:
-                    raise InputError(f"is {shown(given)}; {name} is no parameter{self.note(name, known)}")
+            names = {**self.units, **(motion or {})}
+            parsed = expression(entry)
+            names |= self.further_units(parsed, motion is not None)
+            for name in parsed.names:
+                if name not in names and name not in self.derived:
+                    raise InputError(f"is {shown(entry)}; {name} is no parameter{self.note(name, names)}")
                 if name in self.inputs and not inputs:
                     raise InputError(
-                        f"is {shown(given)}; {name} is an input, and lengths cannot change in a run; use a parameter"
+                        f"is {shown(entry)}; {name} is an input, and lengths cannot change in a run; use a parameter"
                     )
-            self.used |= {*each.names}
-            if each.names == (given.strip(),) and self.units.get(given.strip(), "") is None:
-                self.units[given.strip()] = known[given.strip()] = unit
+            self.used |= {*parsed.names}
+            if parsed.names == (entry.strip(),) and self.units.get(entry.strip(), "") is None:
+                self.units[entry.strip()] = names[entry.strip()] = unit
                 self.derived_dimensions = None
-            checked_dimension(each.text, self.dimensions(known), unit)
-            for width in each.widths:
+            checked_dimension(parsed.text, self.dimensions(names), unit)
+            for width in parsed.widths:
                 if moving := {*width.of.names} & ({*self.inputs} | {*(motion or {})}) or {*width.of.tables}:
                     raise InputError(
-                        f"is {shown(given)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
+                        f"is {shown(entry)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
                         "must be a number or an expression of parameters; a ramp that begins at such a value a is "
                         "ramp(x - a, 0, width)"
                     )
             if motion is None:
-                self.expressed[key, given] = None
-            return given
+                self.expressed[key, entry] = None
+            return entry
         return math.nan
 
     def dimensions(self, units: Known) -> Dimensions:
         """The dimensions of names with these `units`, and of the parameters that are expressions of others."""
 
         def of_units(units: Known) -> Dimensions:
-            return {name: None if each is None else dimension_of_unit(each) for name, each in units.items()}
+            return {name: None if unit is None else dimension_of_unit(unit) for name, unit in units.items()}
 
         if self.derived_dimensions is None:
-            known = dict(of_units(self.units))
+            dimensions = dict(of_units(self.units))
             self.derived_dimensions = {}
             for name, text in self.derived.items():
-                known[name] = None
+                dimensions[name] = None
                 if name not in self.refused:
                     with self.at(f"parameters.{name}"):
-                        known[name] = checked_dimension(text, known, None)
-                self.derived_dimensions[name] = known[name]
+                        dimensions[name] = checked_dimension(text, dimensions, None)
+                self.derived_dimensions[name] = dimensions[name]
         return {**self.derived_dimensions, **of_units(units)}
 
     def start_values(self, parameters: Iterable[Mapping[str, Any]]) -> dict[str, float]:
         """The start values of parameters by name, also of those that are expressions of others. Entries that have no
         finite value with them are faulted."""
-        values = {each["name"]: float(each["value"]) for each in parameters}
+        values = {parameter["name"]: float(parameter["value"]) for parameter in parameters}
 
         def number(key: str, text: str) -> float:
             x = expression(text).number(values)
@@ -228,7 +228,7 @@ class EntryReader(Entry):
                 number(key, text)
         return values
 
-    def further_units(self, given: Expression, in_load: bool) -> dict[str, str | None]:
+    def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of extremes and tables of an expression, by name.
 
         Raises
@@ -236,31 +236,31 @@ class EntryReader(Entry):
         InputError
             in one line, where the entry cannot have them.
         """
-        if given.extremes or given.tables:
+        if parsed.extremes or parsed.tables:
             raise InputError(
-                f"is {shown(given.text)}; extremes and tables over x belong into the force or torque of a load"
+                f"is {shown(parsed.text)}; extremes and tables over x belong into the force or torque of a load"
             )
         return {}
 
-    def note(self, name: str, known: Iterable[str]) -> str:
+    def note(self, name: str, names: Iterable[str]) -> str:
         """A hint on a name that is not known in an expression."""
         if name in MOTION:
             return f"; {name} is known in a {'force' if name in OF_POINT else 'load'} alone"
-        return near_name(name, known)
+        return near_name(name, names)
 
     def vector(
-        self, key: str, given: Any, unit: str, motion: Known | None = None, inputs: bool = False
+        self, key: str, entry: Any, unit: str, motion: Known | None = None, inputs: bool = False
     ) -> list[Any]:
         """Two entries."""
-        if not isinstance(given, list) or len(given) != 2:
-            self.fault(key, f"{is_given(given)}; must be a list of two, along x and y")
+        if not isinstance(entry, list) or len(entry) != 2:
+            self.fault(key, f"{is_given(entry)}; must be a list of two, along x and y")
             return [0.0, 0.0]
-        return [self.entry(key, each, unit, motion, inputs) for each in given]
+        return [self.entry(key, component, unit, motion, inputs) for component in entry]
 
-    def points_in(self, key: str, given: Mapping[str, Any]) -> dict[str, list[Any]]:
+    def points_in(self, key: str, points: Mapping[str, Any]) -> dict[str, list[Any]]:
         """Points by name."""
-        self.fault_reserved_names(key, given)
-        return {name: self.vector(f"{key}.{name}", at, "m") for name, at in given.items()}
+        self.fault_reserved_names(key, points)
+        return {name: self.vector(f"{key}.{name}", place, "m") for name, place in points.items()}
 
     def common(self) -> dict[str, float]:
         """Start values of the parameters that every linkage has."""
@@ -273,9 +273,9 @@ class EntryReader(Entry):
         declared = {v.name: v for v in Layout(CommonParameters).variables}
         entries = [(key, name, self.data.get(key)) for key, name in keys.items()]
         for table, names in tables.items():
-            given = self.table(table)
-            self.keys(table, given, names)
-            entries += [(f"{table}.{key}", f"{table}.{key}", given.get(key)) for key in names]
+            entries_of_table = self.table(table)
+            self.keys(table, entries_of_table, names)
+            entries += [(f"{table}.{key}", f"{table}.{key}", entries_of_table.get(key)) for key in names]
         for key, name, value in entries:
             if value is not None:
                 with self.at(key):
@@ -294,7 +294,7 @@ class EntryReader(Entry):
         self.keys("about", table, names)
         return {key: printable(self.text(f"about.{key}", "", table), 1000) for key in table if key in names}
 
-    def check_parameter(self, key: str, given: Any, text: str) -> None:
+    def check_parameter(self, key: str, entry: Any, text: str) -> None:
         """Fault a parameter that is a wrong expression of other parameters.
 
         Raises
@@ -302,29 +302,29 @@ class EntryReader(Entry):
         InputError
             in one line.
         """
-        if isinstance(given, Mapping):
-            self.keys(key, given, ("value", "description"))
-        of = expression(text)
-        self.further_units(of, False)
-        for each in of.names:
-            if (each not in self.units and each not in self.derived) or each in self.inputs:
-                raise InputError(f"is {shown(text)}; {each} is no parameter{near_name(each, self.units)}")
-        self.used |= {*of.names}
+        if isinstance(entry, Mapping):
+            self.keys(key, entry, ("value", "description"))
+        parsed = expression(text)
+        self.further_units(parsed, False)
+        for name in parsed.names:
+            if (name not in self.units and name not in self.derived) or name in self.inputs:
+                raise InputError(f"is {shown(text)}; {name} is no parameter{near_name(name, self.units)}")
+        self.used |= {*parsed.names}
 
     def expressions(self, table: Mapping[str, Any]) -> None:
         """Take up the parameters that are expressions of others, in any order, and check each."""
         texts = {
-            name: str(given["value"] if isinstance(given, Mapping) else given)
-            for name, given in table.items()
-            if is_expression(given)
+            name: str(entry["value"] if isinstance(entry, Mapping) else entry)
+            for name, entry in table.items()
+            if is_expression(entry)
         }
-        order = TopologicalSorter({name: words(text) & {*texts} for name, text in texts.items()})
+        order = TopologicalSorter({name: words_in(text) & {*texts} for name, text in texts.items()})
         with contextlib.suppress(CycleError):
             order.prepare()
         while ready := order.get_ready():
             for name in ready:
                 key, is_right = f"parameters.{name}", False
-                if not self.refused & words(texts[name]):
+                if not self.refused & words_in(texts[name]):
                     with self.at(key):
                         self.check_parameter(key, table[name], texts[name])
                         is_right = True
@@ -343,19 +343,17 @@ class EntryReader(Entry):
         entries = []
         table = self.table(kind)
         self.fault_reserved_names(kind, table)
-        for name, given in table.items():
-            if kind == "parameters" and is_expression(given):
+        for name, entry in table.items():
+            if kind == "parameters" and is_expression(entry):
                 continue
             key = f"{kind}.{name}"
             if name in (*WORDS, *CONSTANTS, *MOTION):
                 self.refused.add(name)
-            whole = given if isinstance(given, Mapping) else {"value": given}
+            whole = entry if isinstance(entry, Mapping) else {"value": entry}
             self.keys(key, whole, ("value", "unit", "min", "max", "description", "tunable"))
             with self.at(key):
                 value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
-                limits = {
-                    each: self.limit(each, whole, unit or "1") for each in ("min", "max") if each in whole
-                }
+                limits = {end: self.limit(end, whole, unit or "1") for end in ("min", "max") if end in whole}
                 if not limits.get("min", -math.inf) <= value <= limits.get("max", math.inf):
                     ends = [f"{end} = {shown(whole[end])}" for end in limits]
                     raise InputError(f"is {shown(whole['value'])}; must be within {' and '.join(ends)}")
@@ -375,38 +373,38 @@ class EntryReader(Entry):
             self.expressions(table)
         return entries
 
-    def with_unit(self, given: Any, unit: Any) -> tuple[float, str | None]:
+    def with_unit(self, entry: Any, unit: Any) -> tuple[float, str | None]:
         """A value in SI units, and its unit; None where it is told by the first use."""
         if unit is not None:
-            fits = [each for each in UNITS if _same_unit(str(unit), each)]
+            fits = [known_unit for known_unit in UNITS if _same_unit(str(unit), known_unit)]
             if not fits:
                 raise InputError(
                     f"unit = {shown(unit)}: no unit that a linkage knows; known: {', '.join(UNITS)}"
                 )
-            return self.number("", given, fits[0]), fits[0]
-        if isinstance(given, str) and words(given) & {*self.units, *self.table("parameters")}:
+            return self.number("", entry, fits[0]), fits[0]
+        if isinstance(entry, str) and words_in(entry) & {*self.units, *self.table("parameters")}:
             raise InputError(
-                f"is {shown(given)}; must be a number with a unit; a parameter may be an expression"
+                f"is {shown(entry)}; must be a number with a unit; a parameter may be an expression"
             )
-        if isinstance(given, str) and (parts := units.split(given)) and parts[1]:
-            for each in UNITS:
-                if units.converts(parts[1], each):
-                    return within(units.convert(*parts, each), given), each
-            hints = [units.spelling(given, each) for each in UNITS]
+        if isinstance(entry, str) and (parts := units.split(entry)) and parts[1]:
+            for si_unit in UNITS:
+                if units.converts(parts[1], si_unit):
+                    return within(units.convert(*parts, si_unit), entry), si_unit
+            hints = [units.spelling(entry, si_unit) for si_unit in UNITS]
             unknown = f"; the unit is not known; write it as in {_like('m')}"
-            raise InputError(f"is {shown(given)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
-        return self.number("", given, "1"), None
+            raise InputError(f"is {shown(entry)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
+        return self.number("", entry, "1"), None
 
 
-def sized(key: str, unit: str, usual: tuple[float, float] | None, words: str = "") -> Variable:
-    """The value of a key as a variable of these `usual` sizes; `words` are its description."""
-    words = words or units.kind_of(unit)
-    return Variable(key, words, Quantity(unit, words, usual=usual))
+def sized(key: str, unit: str, usual: tuple[float, float] | None, description: str = "") -> Variable:
+    """The value of a key as a variable of these `usual` sizes; `description` are its description."""
+    description = description or units.kind_of(unit)
+    return Variable(key, description, Quantity(unit, description, usual=usual))
 
 
-def is_expression(given: Any) -> bool:
+def is_expression(entry: Any) -> bool:
     """Whether the entry of a parameter is an expression of others, and no number with a unit."""
-    value = given.get("value") if isinstance(given, Mapping) else given
+    value = entry.get("value") if isinstance(entry, Mapping) else entry
     parts = units.split(value) if isinstance(value, str) else (0.0, "")
     if not isinstance(value, str) or (parts is not None and parts[1][:1] not in ("+", "-", "*", "/")):
         return False
@@ -439,11 +437,11 @@ def _is_quantity(text: str) -> bool:
 
 def _is_unit(text: str) -> bool:
     """Whether a text is a unit of a linkage, such as kg*m2 or N/(m s)."""
-    return any(units.converts(text, each) for each in UNITS)
+    return any(units.converts(text, unit) for unit in UNITS)
 
 
-def within(value: float, given: Any) -> float:
-    """A value in SI units, by the text or number that is `given`.
+def within(value: float, entry: Any) -> float:
+    """A value in SI units, by the text or number that is `entry`.
 
     Raises
     ------
@@ -451,13 +449,13 @@ def within(value: float, given: Any) -> float:
         for one that is not finite, or so large that products of such values are not.
     """
     if not abs(value) <= LARGEST:
-        raise InputError(f"is {shown(given)}; must be finite, and <= {LARGEST:g} in size")
+        raise InputError(f"is {shown(entry)}; must be finite, and <= {LARGEST:g} in size")
     return value
 
 
-def is_among(given: Any, names: Collection[str]) -> bool:
+def is_among(entry: Any, names: Collection[str]) -> bool:
     """Whether an entry is one of some names; it may be a list or a table."""
-    return isinstance(given, str) and given in names
+    return isinstance(entry, str) and entry in names
 
 
 def is_given(value: Any) -> str:

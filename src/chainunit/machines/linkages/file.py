@@ -33,7 +33,7 @@ from .checks import (
     study_fault,
     usual_distance,
     usual_inertia,
-    words,
+    words_in,
 )
 from .declarations import RESERVED
 from .entries import is_among, is_given, sized
@@ -136,7 +136,7 @@ class _LinkageReader(LoadReader):
         links = [self.link(name, table) for name, table in self.links().items()]
         joints = self.joints()
         driver, span = self.driver(joints)
-        loads = [self.load(name, given) for name, given in self.table("loads").items()]
+        loads = [self.load(name, entry) for name, entry in self.table("loads").items()]
         common, groups, about = self.common(), self.groups(), self.about()
         self.fault_unused(parameters, inputs, tables)
         derived = [{"name": name} for name in self.derived]
@@ -185,28 +185,28 @@ class _LinkageReader(LoadReader):
 
     def named_points(self, links: list[dict[str, Any]], loads: list[dict[str, Any]]) -> set[tuple[str, ...]]:
         """The points that joints of the file, loads and masses name, by link."""
-        given = [each for each in self.table("joints").values() if isinstance(each, Mapping)]
-        ends = [each.get(key) for each in given for key in ("on", "by")]
+        joints = [joint for joint in self.table("joints").values() if isinstance(joint, Mapping)]
+        ends = [joint.get(key) for joint in joints for key in ("on", "by")]
         named = {tuple(end.split(".")) for end in ends if isinstance(end, str)}
         named |= {tuple(load[key]) for load in loads for key in ("on", "by") if key in load}
         named |= {(link["name"], point) for link in links for point in link["masses"]}
-        lines = [str(each["toward"]).rpartition(".")[2] for each in given if "toward" in each]
+        lines = [str(joint["toward"]).rpartition(".")[2] for joint in joints if "toward" in joint]
         return named | {(link, line) for link in self.points for line in lines}
 
     def groups(self) -> list[Any]:
         """The groups that the file lists, each with its kind, if it is given, and its links."""
-        given, groups = self.data.get("groups", []), []
-        if not isinstance(given, list) or not all(isinstance(each, Mapping) for each in given):
-            self.fault("groups", f"is {shown(given)}; must be tables [[groups]] with kind and links")
+        tables, groups = self.data.get("groups", []), []
+        if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
+            self.fault("groups", f"is {shown(tables)}; must be tables [[groups]] with kind and links")
             return []
         kinds = (*DYADS, "triad", CYLINDER)
-        for k, table in enumerate(given, 1):
+        for k, table in enumerate(tables, 1):
             key = f"groups.{k}"
             self.keys(key, table, ("kind", "links"))
             kind, links = table.get("kind", ""), table.get("links")
             if kind not in ("", *kinds):
                 self.fault(f"{key}.kind", f"is {shown(kind)}; must be one of {', '.join(kinds)}")
-            if not isinstance(links, list) or not links or not all(isinstance(each, str) for each in links):
+            if not isinstance(links, list) or not links or not all(isinstance(link, str) for link in links):
                 self.fault(f"{key}.links", f"{is_given(links)}; must be a list of links")
                 continue
             for link in sorted({*links} - {*self.points}):
@@ -218,17 +218,17 @@ class _LinkageReader(LoadReader):
         self, parameters: list[dict[str, Any]], inputs: list[dict[str, Any]], tables: Mapping[str, Any]
     ) -> None:
         """Fault parameters, inputs and tables that nothing uses; a name in a faulty entry may be meant to be used."""
-        texts = words([self.data[key] for key in self.data if key not in ("parameters", "inputs")])
-        names = (*self.derived, *tables, *(each["name"] for each in (*parameters, *inputs)))
+        texts = words_in([self.data[key] for key in self.data if key not in ("parameters", "inputs")])
+        names = (*self.derived, *tables, *(entry["name"] for entry in (*parameters, *inputs)))
         mentioned = {name for name in names if self.errors and (name in texts or near_name(name, texts))}
         for kind, entries in (("parameters", parameters), ("inputs", inputs)):
-            for each in entries:
-                name = each["name"]
+            for entry in entries:
+                name = entry["name"]
                 if name not in self.used | self.refused | mentioned:
                     self.fault(f"{kind}.{name}", "nothing uses it; use it, or take it out")
-                each["unit"] = each["unit"] or self.units[name] or "1"
+                entry["unit"] = entry["unit"] or self.units[name] or "1"
                 with self.at(f"{kind}.{name}"):
-                    self.in_its_unit(f"{kind}.{name}", self.table(kind)[name], each)
+                    self.in_its_unit(f"{kind}.{name}", self.table(kind)[name], entry)
         for name in self.derived:
             if name not in self.used | mentioned:
                 self.fault(f"parameters.{name}", "nothing uses it; use it, or take it out")
@@ -236,9 +236,9 @@ class _LinkageReader(LoadReader):
             if name not in self.used | self.refused | mentioned:
                 self.fault(f"tables.{name}", "no load uses it; use it, or take it out")
 
-    def in_its_unit(self, key: str, given: Any, entry: Mapping[str, Any]) -> None:
+    def in_its_unit(self, key: str, written: Any, entry: Mapping[str, Any]) -> None:
         """Look at the size of a parameter or an input, whose unit its first use may tell."""
-        whole = given if isinstance(given, Mapping) else {"value": given}
+        whole = written if isinstance(written, Mapping) else {"value": written}
         value = f"{whole['value']} {whole['unit']}" if "unit" in whole else whole["value"]
         self.number(key, value, entry["unit"], entry["description"])
 
@@ -256,7 +256,7 @@ class _LinkageReader(LoadReader):
             self.points[name] = {}
         return links
 
-    def link(self, name: str, given: Any) -> dict[str, Any]:
+    def link(self, name: str, entry: Any) -> dict[str, Any]:
         """A link."""
         key = f"links.{name}"
         table = self.table(key, self.table("links"))
@@ -265,8 +265,10 @@ class _LinkageReader(LoadReader):
         for point in points:
             if point in POINT_NAMES:
                 self.fault(f"{key}.points.{point}", "is a variable of every link; choose another name")
-        is_misspelled = any(near_name(each, ("points",)) for each in table if each not in _LINK_KEYS)
-        has_table = isinstance(given, Mapping) and isinstance(given.get("points", {}), Mapping)
+        is_misspelled = any(
+            near_name(entry_key, ("points",)) for entry_key in table if entry_key not in _LINK_KEYS
+        )
+        has_table = isinstance(entry, Mapping) and isinstance(entry.get("points", {}), Mapping)
         if not points and has_table and not is_misspelled:
             self.fault(key, "has no points; give points = { A = [0, 0], ... } in the frame of the link")
         self.points[name] = points
@@ -300,10 +302,10 @@ class _LinkageReader(LoadReader):
         """A uniform bar between two points: its mass and inertia by section and density."""
         bar = self.table(f"{key}.bar", table)
         self.keys(f"{key}.bar", bar, ("from", "to", "area", "density"))
-        for each in ("mass", "inertia", "centroid"):
-            if each in table:
-                self.fault(f"{key}.{each}", "follows from bar; take one of both out")
-        ends = [bar.get(each) for each in ("from", "to")]
+        for quantity in ("mass", "inertia", "centroid"):
+            if quantity in table:
+                self.fault(f"{key}.{quantity}", "follows from bar; take one of both out")
+        ends = [bar.get(end) for end in ("from", "to")]
         for end in ends:
             if not is_among(end, points):
                 self.fault(f"{key}.bar", f"from and to must be two points of the link: {', '.join(points)}")
@@ -313,9 +315,9 @@ class _LinkageReader(LoadReader):
         (ax, ay), (bx, by) = (points[str(end)] for end in ends)
         area = self.entry(f"{key}.bar.area", bar.get("area"), "m2")
         density = self.entry(f"{key}.bar.density", bar.get("density"), "kg/m3")
-        for each, value in (("area", area), ("density", density)):
-            if not isinstance(value, str) and value <= 0.0 and each in bar:
-                self.fault(f"{key}.bar.{each}", f"is {shown(bar[each])}; must be > 0")
+        for quantity, value in (("area", area), ("density", density)):
+            if not isinstance(value, str) and value <= 0.0 and quantity in bar:
+                self.fault(f"{key}.bar.{quantity}", f"is {shown(bar[quantity])}; must be > 0")
         square = f"((({bx}) - ({ax}))**2 + (({by}) - ({ay}))**2)"
         mass = f"({area}) * ({density}) * sqrt({square})"
         middle = [f"0.5 * (({a}) + ({b}))" for a, b in ((ax, bx), (ay, by))]
@@ -324,23 +326,27 @@ class _LinkageReader(LoadReader):
     def joints(self) -> list[dict[str, Any]]:
         """The joints: the named ones, and a revolute one for each further link in a point of the same name."""
         joints = []
-        for name, key, given in self.tables("joints"):
-            kind = given.get("type", PRISMATIC if "toward" in given else REVOLUTE)
+        for name, key, table in self.tables("joints"):
+            kind = table.get("type", PRISMATIC if "toward" in table else REVOLUTE)
             if kind not in (REVOLUTE, PRISMATIC):
                 drive = "; a gear, a belt or a cam between links is not possible yet" * (kind in _DRIVES)
                 self.fault(f"{key}.type", f'is {shown(kind)}; must be "revolute" or "prismatic"{drive}')
                 continue
             losses = ("pins", _OF_PIN) if kind == REVOLUTE else ("guides", _OF_GUIDE)
-            for each in {*losses[1]} & {*given}:
+            for entry_key in {*losses[1]} & {*table}:
                 self.fault(
-                    f"{key}.{each}",
+                    f"{key}.{entry_key}",
                     f"is not possible for one joint yet; give it in [{losses[0]}], for all of them",
                 )
-            self.keys(key, {each: x for each, x in given.items() if each not in losses[1]}, _JOINT_KEYS)
+            self.keys(
+                key,
+                {entry_key: x for entry_key, x in table.items() if entry_key not in losses[1]},
+                _JOINT_KEYS,
+            )
             ends = []
-            for each in ("on", "by"):
-                with self.at(f"{key}.{each}"):
-                    ends.append(self.end(given.get(each)))
+            for end in ("on", "by"):
+                with self.at(f"{key}.{end}"):
+                    ends.append(self.end(table.get(end)))
             if len(ends) < 2:
                 continue
             if ends[0][0] == ends[1][0]:
@@ -348,12 +354,12 @@ class _LinkageReader(LoadReader):
                 continue
             joint: dict[str, Any] = {"name": name, "type": kind, "on": ends[0], "by": ends[1]}
             if kind == PRISMATIC:
-                joint |= self.sliding(key, given, ends[1])
+                joint |= self.sliding(key, table, ends[1])
             else:
-                for each in ("toward", "angle", "length"):
-                    if each in given:
+                for entry_key in ("toward", "angle", "length"):
+                    if entry_key in table:
                         self.fault(
-                            f"{key}.{each}",
+                            f"{key}.{entry_key}",
                             "belongs to a prismatic joint, and this one is a pin: for a cylinder or a guide give it "
                             f"`toward` with a further point of {ends[1][0]}, on the line of the way",
                         )
@@ -363,10 +369,10 @@ class _LinkageReader(LoadReader):
             self.fault(f"joints.{name}", message)
         return joints + more
 
-    def sliding(self, key: str, given: Mapping[str, Any], by: list[str]) -> dict[str, Any]:
+    def sliding(self, key: str, table: Mapping[str, Any], by: list[str]) -> dict[str, Any]:
         """The keys of a sliding joint."""
         joint: dict[str, Any] = {}
-        toward = given.get("toward")
+        toward = table.get("toward")
         if isinstance(toward, str):
             toward = toward.rpartition(".")[2]
         if not is_among(toward, self.points[by[0]]) or toward == by[1]:
@@ -377,9 +383,9 @@ class _LinkageReader(LoadReader):
                 f"{', '.join(others) or 'add one'}",
             )
         joint["toward"] = toward
-        joint["angle"] = self.entry(f"{key}.angle", given.get("angle", 0.0), "rad")
-        if "length" in given:
-            joint["length"] = self.entry(f"{key}.length", given["length"], "m")
+        joint["angle"] = self.entry(f"{key}.angle", table.get("angle", 0.0), "rad")
+        if "length" in table:
+            joint["length"] = self.entry(f"{key}.length", table["length"], "m")
         return joint
 
     def driver(self, joints: list[dict[str, Any]]) -> tuple[dict[str, Any], list[float] | None]:
@@ -389,21 +395,21 @@ class _LinkageReader(LoadReader):
         if "joint" in table:
             return self.slide(table, joints)
         link = table.get("link")
-        known = [name for name in self.points if name != GROUND]
-        if not is_among(link, known):
-            if known and isinstance(self.data.get("driver", {}), Mapping):
+        links = [name for name in self.points if name != GROUND]
+        if not is_among(link, links):
+            if links and isinstance(self.data.get("driver", {}), Mapping):
                 self.fault(
                     "driver.link" if table else "driver",
-                    f"{is_given(link)}; must be the link that the motor turns{meant(str(link), known)} links: "
-                    f"{', '.join(known)}",
+                    f"{is_given(link)}; must be the link that the motor turns{meant(str(link), links)} links: "
+                    f"{', '.join(links)}",
                 )
             return {}, None
-        own = [j for j in joints if {j["on"][0], j["by"][0]} == {GROUND, link} and j["type"] == REVOLUTE]
-        if len(own) != 1:
+        pivots = [j for j in joints if {j["on"][0], j["by"][0]} == {GROUND, link} and j["type"] == REVOLUTE]
+        if len(pivots) != 1:
             self.fault(
                 "driver.link",
-                f"{link} must have one revolute joint with the ground; it has {len(own)}: give it a point with the "
-                "name of a point in [ground]",
+                f"{link} must have one revolute joint with the ground; it has {len(pivots)}: give it a point with "
+                "the name of a point in [ground]",
             )
             return {}, None
         positive = table.get("positive", "counter-clockwise")
@@ -411,7 +417,7 @@ class _LinkageReader(LoadReader):
             self.fault("driver.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
         zero = self.entry("driver.zero", table.get("zero", 0.0), "rad")
         sense = -1.0 if positive == "clockwise" else 1.0
-        driver = {"joint": own[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}
+        driver = {"joint": pivots[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}
         if "range" not in table:
             return driver, None
         return driver | {"swings": True}, self.span(table, "angle", "rad", '["-20 deg", "75 deg"]')
@@ -420,16 +426,16 @@ class _LinkageReader(LoadReader):
         """The range of the driver, between two values of its `place`."""
         span = [0.0, 0.0]
         with self.at("driver.range"):
-            given = table.get("range")
-            if not isinstance(given, list) or len(given) != 2:
+            limits = table.get("range")
+            if not isinstance(limits, list) or len(limits) != 2:
                 raise InputError(f"must be the least and the most {place} of the driver, such as {example}")
-            span = [self.number("driver.range", each, unit) for each in given]
+            span = [self.number("driver.range", limit, unit) for limit in limits]
             if not span[0] < span[1]:
-                raise InputError(f"is {shown(given)}; must rise, from the least to the most {place}")
+                raise InputError(f"is {shown(limits)}; must rise, from the least to the most {place}")
             if unit == "rad" and span[1] - span[0] > WHOLE * (1.0 + 1e-12):
-                plain = any(isinstance(each, int | float) for each in given)
+                plain = any(isinstance(limit, int | float) for limit in limits)
                 raise InputError(
-                    f"is {shown(given)}, more than a turn; for a driver that turns all the way round leave it out"
+                    f"is {shown(limits)}, more than a turn; for a driver that turns all the way round leave it out"
                     + '; a number without a unit is in radians, write degrees as "10 deg"' * plain
                 )
         return span
@@ -438,10 +444,10 @@ class _LinkageReader(LoadReader):
         self, table: Mapping[str, Any], joints: list[dict[str, Any]]
     ) -> tuple[dict[str, Any], list[float] | None]:
         """A driver that slides."""
-        for each in ("link", "zero", "positive"):
-            if each in table:
+        for name in ("link", "zero", "positive"):
+            if name in table:
                 self.fault(
-                    f"driver.{each}", "belongs to a driver that turns; a driver with a joint slides in it"
+                    f"driver.{name}", "belongs to a driver that turns; a driver with a joint slides in it"
                 )
         sliding = {j["name"]: j for j in joints if j["type"] == PRISMATIC}
         joint = sliding.get(table["joint"]) if isinstance(table["joint"], str) else None
@@ -495,12 +501,12 @@ class _LinkageReader(LoadReader):
             if abs(value) > _LARGEST_START:
                 raise InputError(f"is {shown(table['phi'])}; must be <= {_LARGEST_START:g} in size")
             if span and not driver["linear"] and not span[0] <= value <= span[1]:
-                given = f"is {shown(table['phi'])}" if "phi" in table else "is 0 where it is not given"
+                phi_text = f"is {shown(table['phi'])}" if "phi" in table else "is 0 where it is not given"
                 low, high = (f"{math.degrees(end):g} deg" for end in span)
-                raise InputError(f"{given}; must be an angle in driver.range, from {low} to {high}")
+                raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)
         if driver["linear"]:
-            pose.slide = next(each for each, _ in entries if each.name == driver["joint"]), value
+            pose.slide = next(joint for joint, _ in entries if joint.name == driver["joint"]), value
         else:
             pose.angles[driver["link"]] = number(driver["zero"]) + driver["sense"] * value
         self.refuse()
@@ -521,42 +527,44 @@ class _LinkageReader(LoadReader):
         usual = {link: usual_distance(link, points, ends) for link in points}
         for link in links:
             name, table = link["name"], self.table(f"links.{link['name']}", self.table("links"))
-            places = [(f"points.{point}", table["points"][point], at) for point, at in points[name].items()]
+            places = [
+                (f"points.{point}", table["points"][point], place) for point, place in points[name].items()
+            ]
             if "centroid" in table:
                 x, y = map(number, link["centroid"])
                 places.append(("centroid", table["centroid"], (x, y)))
-            known = {value.name for value in self.unusual}
-            for key, given, place in places:
+            noted = {value.name for value in self.unusual}
+            for key, written, place in places:
                 variable = sized(f"links.{name}.{key}", "m", (0.0, usual[name]))
-                for text, x in zip(given, place, strict=True):
-                    if usual[name] and variable.name not in known:
+                for text, x in zip(written, place, strict=True):
+                    if usual[name] and variable.name not in noted:
                         self.doubt(variable, text, x)
             mass = number(link.get("mass", 0.0))
             if "inertia" in table and mass > 0.0:
-                words = f"inertia of {mass:g} kg about the centroid"
+                description = f"inertia of {mass:g} kg about the centroid"
                 limits = usual_inertia(mass, points[name].values())
-                variable = sized(f"links.{name}.inertia", "kg.m2", limits, words)
+                variable = sized(f"links.{name}.inertia", "kg.m2", limits, description)
                 self.doubt(variable, table["inertia"], number(link["inertia"]))
 
     def given_pose(self, table: Mapping[str, Any], pose: StartPose) -> None:
         """Points, angles and poses that the file gives."""
-        for name, at in self.table("start.points", table).items():
+        for name, entry in self.table("start.points", table).items():
             key = f"start.points.{name}"
             owners = [link for link, points in self.points.items() if name in points and link != GROUND]
-            for where in self.tables_of_point(key, name, at, owners):
+            for where in self.tables_of_point(key, name, entry, owners):
                 pose.places[where[0], where[1]] = where[2]
         for link, angle in self.table("start.angles", table).items():
             with self.at(f"start.angles.{link}"):
                 self.known_link(link)
                 pose.angles[link] = self.number(f"start.angles.{link}", angle, "rad")
-        for link, given in self.table("start.poses", table).items():
+        for link, entry in self.table("start.poses", table).items():
             with self.at(f"start.poses.{link}"):
                 self.known_link(link)
-                if not isinstance(given, list) or len(given) != 3:
+                if not isinstance(entry, list) or len(entry) != 3:
                     raise InputError("must be a list of three: x, y and angle of the frame of the link")
                 x, y, angle = (
                     self.number(f"start.poses.{link}", v, unit)
-                    for v, unit in zip(given, ("m", "m", "rad"), strict=True)
+                    for v, unit in zip(entry, ("m", "m", "rad"), strict=True)
                 )
                 pose.poses[link] = x, y, angle
 
@@ -566,16 +574,16 @@ class _LinkageReader(LoadReader):
             raise InputError(f"{link} is no link{near_name(link, self.points)}")
 
     def tables_of_point(
-        self, key: str, name: str, at: Any, owners: list[str]
+        self, key: str, name: str, entry: Any, owners: list[str]
     ) -> Iterator[tuple[str, str, tuple[float, float]]]:
-        """The places of a point; `at` is a place, or a table of points of the link `name`."""
-        entries = [(name, link, at) for link in owners]
-        if isinstance(at, Mapping):
-            entries = [(point, name, place) for point, place in at.items()]
+        """The places of a point; `entry` is a place, or a table of points of the link `name`."""
+        entries = [(name, link, entry) for link in owners]
+        if isinstance(entry, Mapping):
+            entries = [(point, name, place) for point, place in entry.items()]
         elif not owners:
             self.fault(key, f"{name} is no point of a link")
-        elif not isinstance(at, list) or len(at) != 2:
-            self.fault(key, f"is {shown(at)}; must be a list of two, along x and y")
+        elif not isinstance(entry, list) or len(entry) != 2:
+            self.fault(key, f"is {shown(entry)}; must be a list of two, along x and y")
             return
         for point, link, place in entries:
             with self.at(key):
@@ -583,5 +591,5 @@ class _LinkageReader(LoadReader):
                     raise InputError(f"{point} is no point of {link}")
                 if not isinstance(place, list) or len(place) != 2:
                     raise InputError(f"is {shown(place)}; must be a list of two, along x and y")
-                x, y = (self.number(key, each, "m") for each in place)
+                x, y = (self.number(key, coordinate, "m") for coordinate in place)
                 yield link, point, (x, y)

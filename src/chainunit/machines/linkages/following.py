@@ -85,9 +85,9 @@ class FollowedLinkage:
             except (ArithmeticError, ValueError):
                 raise self._not_closing(derived) from None
             margins_over_way.append(self._margins(m))
-            for each, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
+            for group, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
                 if not margin > LEAST_MARGIN:
-                    raise dead_group(each, self.way.words(q), margin, LEAST_MARGIN)
+                    raise dead_group(group, self.way.words(q), margin, LEAST_MARGIN)
             self._add_angles(angles, m)
         for k, q, least in lows(self._margins_at, margins_over_way, places):
             if not least > LEAST_MARGIN:
@@ -151,13 +151,13 @@ class FollowedLinkage:
         ends = self.closing_range()
         if ends is None:
             return ""
-        words = []
+        bounds = []
         for end, sense in zip(ends, (1.0, -1.0), strict=True):
             unit = "m" if self.way.linear else "deg"
             group = f" (group of {', '.join(end.links)})" if end.links else ""
             place = self.way.inside(end.place, sense if end.links else 0.0)
-            words.append((f"{place} {unit}", group))
-        (low, of_low), (high, of_high) = words
+            bounds.append((f"{place} {unit}", group))
+        (low, of_low), (high, of_high) = bounds
         for_whom = "for a driver that swings, " if self.way.turns else ""
         start = self._start_in_range()
         around = "its start" if start == self.way.start else self.way.words(start)
@@ -212,9 +212,11 @@ class FollowedLinkage:
             passed.append(q)
             margins.append(here)
         # a low between two places may be bad, too
-        found = [q for _, q, least in lows(self._margins_at, margins, passed) if not least > LEAST_MARGIN]
-        if found:
-            bad = min(found, key=lambda q: abs(q - places[0]))
+        bad_places = [
+            q for _, q, least in lows(self._margins_at, margins, passed) if not least > LEAST_MARGIN
+        ]
+        if bad_places:
+            bad = min(bad_places, key=lambda q: abs(q - places[0]))
         if bad is None:
             return None
         return [q for q in passed if abs(q - places[0]) < abs(bad - places[0])][-1], bad

@@ -65,11 +65,11 @@ class LinkGeometry:
 
     def point(self, link: str, point: str) -> Vec2:
         """A point of a link in the frame of the description [m]."""
-        known = self._points.setdefault(link, {})
-        if point not in known:
+        placed = self._points.setdefault(link, {})
+        if point not in placed:
             entries = self.structure.ground if link == GROUND else self.structure.links[link].points
-            known[point] = self.vector(entries[point])
-        return known[point]
+            placed[point] = self.vector(entries[point])
+        return placed[point]
 
     def mass(self, entry: LinkEntry, frame: LinkFrame) -> Mass | None:
         """The body of a link: further masses are parts of it."""
@@ -78,14 +78,14 @@ class LinkGeometry:
         m, c = self.number(entry.mass), self.vector(entry.centroid)
         inertia = self.number(entry.inertia)
         for point, added in entry.masses.items():
-            mass, at = self.number(added), self.point(entry.name, point)
+            mass, place = self.number(added), self.point(entry.name, point)
             total = m + mass
             # a link that is massless as yet has its centroid where the mass is
             share = mass / (total + 1e-300)
-            inertia = inertia + m * share * (at - c).squared()
-            m, c = total, c + (at - c) * share
-        at = frame.coordinates(c)
-        return Mass(m, at.x, inertia, at.y)
+            inertia = inertia + m * share * (place - c).squared()
+            m, c = total, c + (place - c) * share
+        place = frame.coordinates(c)
+        return Mass(m, place.x, inertia, place.y)
 
     def span(self, link: str, start: str, end: str) -> tuple[LinkFrame, Any]:
         """The frame of a link from one of its points to another, and their distance."""
@@ -116,8 +116,8 @@ class LinkGeometry:
     def line_through(self, joint: JointEntry, link: str, point: Vec2) -> Vec2:
         """The place, in the link on the other side, of a point through which the line of a `point` of the link
         goes."""
-        own, other = self.point(link, joint.at(link)), joint.other_link(link)
-        return self.point(other, joint.at(other)) + self.across(joint, point - own, link)
+        start, other = self.point(link, joint.at(link)), joint.other_link(link)
+        return self.point(other, joint.at(other)) + self.across(joint, point - start, link)
 
 
 class RoughPoses:

@@ -61,14 +61,14 @@ class LoadReader(EntryReader):
                 over = "phi" if "phi" in table else "x"
                 places, values = self.columns(key, table, over)
                 of_x, of_value = places[0][1], values[0][1]
-                at = [x for x, _ in places]
+                abscissas = [x for x, _ in places]
                 turns = over == "phi" and of_x == "rad" and "range" not in self.table("driver")
-                if any(b <= a for a, b in pairwise(at)):
+                if any(b <= a for a, b in pairwise(abscissas)):
                     raise InputError(f"{over} must rise" + ", within less than one turn" * turns)
-                if turns and at[-1] - at[0] >= 2.0 * math.pi:
+                if turns and abscissas[-1] - abscissas[0] >= 2.0 * math.pi:
                     raise InputError("phi must rise, within less than one turn: the table repeats itself")
-                self.sizes[name] = len(at)
-                curves[name] = {"over": over, "places": at, "values": [x for x, _ in values]}
+                self.sizes[name] = len(abscissas)
+                curves[name] = {"over": over, "places": abscissas, "values": [x for x, _ in values]}
                 if over == "phi":
                     self.table_units[name] = of_value
                 self.curve_units[name] = of_x, of_value
@@ -99,29 +99,29 @@ class LoadReader(EntryReader):
         linear = "joint" in self.table("driver")
         if over == "phi":
             unit = "m" if linear else "rad"
-            at: list[tuple[float, str | None]] = [(self.number(key, x, unit), unit) for x in places]
+            abscissas: list[tuple[float, str | None]] = [(self.number(key, x, unit), unit) for x in places]
         else:
-            at = self.like(places)
-        return at, self.like(values)
+            abscissas = self.like(places)
+        return abscissas, self.like(values)
 
-    def like(self, given: list[Any]) -> list[tuple[float, str | None]]:
+    def like(self, entries: list[Any]) -> list[tuple[float, str | None]]:
         """Values of one unit, that of the first one."""
-        first = self.with_unit(given[0], None)
+        first = self.with_unit(entries[0], None)
         if first[1] is None:
-            return [self.with_unit(x, None) for x in given]
-        return [(self.number("", x, first[1]), first[1]) for x in given]
+            return [self.with_unit(x, None) for x in entries]
+        return [(self.number("", x, first[1]), first[1]) for x in entries]
 
     def columns_of_file(
-        self, given: Any
+        self, name: Any
     ) -> tuple[list[tuple[float, str | None]], list[tuple[float, str | None]]]:
         """The two columns of a CSV file beside the linkage file, with units in a heading ("way [mm], force [kN]")."""
-        if not isinstance(given, str):
-            raise InputError(f"file is {shown(given)}; must be the name of a CSV file with two columns")
-        file = self.folder / given
+        if not isinstance(name, str):
+            raise InputError(f"file is {shown(name)}; must be the name of a CSV file with two columns")
+        file = self.folder / name
         text = lines_of_table(file, file_text(file))
         lines = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
         if len(lines) > MOST_POINTS + 1:
-            raise InputError(f"{given}: has {len(lines)} rows; {_FEWER}")
+            raise InputError(f"{name}: has {len(lines)} rows; {_FEWER}")
         mark = (
             ";"
             if any(";" in line for line in lines)
@@ -129,26 +129,26 @@ class LoadReader(EntryReader):
             if any("\t" in line for line in lines)
             else ","
         )
-        rows = cells_of(given, lines, mark)
+        rows = cells_of(name, lines, mark)
         if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != 2), None):
             raise InputError(
-                f"{given}: row {wrong} has {len(rows[wrong - 1])} columns; each row must have two columns, x "
+                f"{name}: row {wrong} has {len(rows[wrong - 1])} columns; each row must have two columns, x "
                 "and value"
             )
-        found: list[str | None] = [None, None]
+        column_units: list[str | None] = [None, None]
         scales = [1.0, 1.0]
         if rows and any(_number(cell) is None for cell in rows[0]):
             for k, head in enumerate(rows.pop(0)):
                 match = _HEADING.fullmatch(head)
                 if match and match[2]:
-                    scales[k], found[k] = self.with_unit(f"1 {match[2]}", None)
+                    scales[k], column_units[k] = self.with_unit(f"1 {match[2]}", None)
         if len(rows) < 2:
-            raise InputError(f"{given}: must have two or more rows of numbers")
+            raise InputError(f"{name}: must have two or more rows of numbers")
         commas = [cell for row in rows for cell in row if "," in cell]
         points = any("." in cell for row in rows for cell in row)
         if commas and (mark == "," or points or all(map(_THOUSANDS.fullmatch, commas))):
             raise InputError(
-                f"{given}: {shown(commas[0])} is not clear, as its comma may stand between thousands or before "
+                f"{name}: {shown(commas[0])} is not clear, as its comma may stand between thousands or before "
                 "decimals; write all numbers with a decimal point and without marks between thousands"
             )
         columns: list[list[tuple[float, str | None]]] = [[], []]
@@ -158,29 +158,31 @@ class LoadReader(EntryReader):
                 if value is None or math.isnan(value):
                     # what begins as no number may be of a file that is no table
                     cited = f" {shown(cell)}" if cell.lstrip()[:1] in (*"+-.0123456789",) else ""
-                    raise InputError(f"{given}: row {place} of numbers, column {k + 1}:{cited} is no number")
-                columns[k].append((within(value * scales[k], cell), found[k]))
+                    raise InputError(f"{name}: row {place} of numbers, column {k + 1}:{cited} is no number")
+                columns[k].append((within(value * scales[k], cell), column_units[k]))
         return columns[0], columns[1]
 
     # extremes of the motion
 
-    def further_units(self, given: Expression, in_load: bool) -> dict[str, str | None]:
+    def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of the extremes and tables of an expression, by name; a load may have them."""
         if not in_load:
-            self.count(given)
-            return super().further_units(given, in_load)
-        found: dict[str, str | None] = {each: self.extreme(each, given.text) for each in given.extremes}
-        for name in given.tables:
+            self.count(parsed)
+            return super().further_units(parsed, in_load)
+        units_by_name: dict[str, str | None] = {
+            extreme: self.extreme(extreme, parsed.text) for extreme in parsed.extremes
+        }
+        for name in parsed.tables:
             if name not in self.curve_units:
                 if name in self.refused:
                     continue
                 hint = near_name(name, self.curve_units)
-                raise InputError(f"is {shown(given.text)}; {name} is no table{hint}")
-            found[f"x of {name}"], found[f"table {name}"] = self.curve_units[name]
+                raise InputError(f"is {shown(parsed.text)}; {name} is no table{hint}")
+            units_by_name[f"x of {name}"], units_by_name[f"table {name}"] = self.curve_units[name]
             self.used.add(name)
-        return found
+        return units_by_name
 
-    def count(self, *given: Expression) -> None:
+    def count(self, *expressions: Expression) -> None:
         """Count the points of the tables in the expressions of a load or of a parameter.
 
         Raises
@@ -189,21 +191,21 @@ class LoadReader(EntryReader):
             in one line, where all of the file come to more than `MOST_POINTS` with them.
         """
         before = self.looked_up
-        over_phi = {name for each in given for name in each.names} & {*self.table_units}
-        names = [*over_phi, *(name for each in given for name in each.lookups)]
+        over_phi = {name for parsed in expressions for name in parsed.names} & {*self.table_units}
+        names = [*over_phi, *(name for parsed in expressions for name in parsed.lookups)]
         self.looked_up += sum(self.sizes.get(name, 0) for name in names)
-        self.looked_up += sum(points for each in given for points in each.points)
+        self.looked_up += sum(points for parsed in expressions for points in parsed.points)
         if before <= MOST_POINTS < self.looked_up:
             raise InputError(
                 f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
                 f"{_FEWER}"
             )
 
-    def note(self, name: str, known: Any) -> str:
+    def note(self, name: str, names: Any) -> str:
         """A hint on a name that an expression does not know, such as a table over x."""
         if name in self.curve_units:
             return f"; it is a table over x: write table(x, {name})"
-        return super().note(name, known)
+        return super().note(name, names)
 
     def extreme(self, name: str, text: str) -> str:
         """The unit of an extreme.
@@ -221,8 +223,8 @@ class LoadReader(EntryReader):
             )
         _, link, point, axis = parts_of_extreme(name)
         if link not in self.points or link == GROUND:
-            known = [each for each in self.points if each != GROUND]
-            raise InputError(f"{begin}{link} is no link{meant(link, known)} links: {', '.join(known)}")
+            links = [candidate for candidate in self.points if candidate != GROUND]
+            raise InputError(f"{begin}{link} is no link{meant(link, links)} links: {', '.join(links)}")
         if point and point not in self.points[link]:
             raise InputError(
                 f"{begin}{point} is no point of {link}{meant(point, self.points[link])} its points: "
@@ -234,7 +236,7 @@ class LoadReader(EntryReader):
 
     # loads
 
-    def load(self, name: str, given: Any) -> dict[str, Any]:
+    def load(self, name: str, written: Any) -> dict[str, Any]:
         """A load."""
         key = f"loads.{name}"
         table = self.table(key, self.table("loads"))
@@ -253,10 +255,10 @@ class LoadReader(EntryReader):
             entry = self.entry(f"{key}.torque", torque, "N.m", self.known(_OF_LINK), True)
             self.count_in(key, [entry])
             return load | {"on": [on], "torque": entry}
-        for each in ("on", "by") if kind == "spring" else ("on",):
-            with self.at(f"{key}.{each}"):
-                load[each] = self.end(table.get(each))
-                if kind != "spring" and load[each][0] == GROUND:
+        for end in ("on", "by") if kind == "spring" else ("on",):
+            with self.at(f"{key}.{end}"):
+                load[end] = self.end(table.get(end))
+                if kind != "spring" and load[end][0] == GROUND:
                     raise InputError("acts on the ground; give a point of a link")
         if kind == "spring":
             if "stiffness" not in table and "damping" not in table:
@@ -267,14 +269,14 @@ class LoadReader(EntryReader):
                     'is missing; must be the length at which the spring has no force, such as "200 mm", or 0 for '
                     "one that pulls at every length",
                 )
-            for each, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
-                load[each] = self.positive(f"{key}.{each}", table.get(each, 0.0), unit)
+            for quantity, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
+                load[quantity] = self.positive(f"{key}.{quantity}", table.get(quantity, 0.0), unit)
             return load
         if "on" not in load:
             return load
         force = table.get("force")
         if isinstance(force, list):
-            force = [_placed(each, load["on"]) for each in force]
+            force = [_placed(component, load["on"]) for component in force]
         load["force"] = self.vector(f"{key}.force", force, "N", self.known(_OF_FORCE), True)
         self.count_in(key, load["force"])
         return load
@@ -282,37 +284,37 @@ class LoadReader(EntryReader):
     def count_in(self, key: str, entries: Sequence[float | str]) -> None:
         """Count the points of the tables in a load; faults where they are too many."""
         with self.at(key):
-            self.count(*(expression(each) for each in entries if isinstance(each, str)))
+            self.count(*(expression(entry) for entry in entries if isinstance(entry, str)))
 
     def known(self, motion: Known) -> Known:
         """The units of the names that a load knows beside parameters and inputs."""
         way = {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
         return {**motion, **way, **self.table_units}
 
-    def end(self, given: Any) -> list[str]:
+    def end(self, entry: Any) -> list[str]:
         """A point of a link, as "link.point" or a list of two."""
-        if given is None:
+        if entry is None:
             raise InputError('is missing; must be a link and its point, such as "rod.A"')
-        parts = given.split(".") if isinstance(given, str) else given
+        parts = entry.split(".") if isinstance(entry, str) else entry
         if not isinstance(parts, list) or len(parts) != 2 or not all(isinstance(x, str) for x in parts):
-            raise InputError(f'is {shown(given)}; must be a link and its point, such as "rod.A"')
+            raise InputError(f'is {shown(entry)}; must be a link and its point, such as "rod.A"')
         link, point = parts
         if link not in self.points:
-            raise InputError(f"is {shown(given)}; {link} is no link{near_name(link, self.points)}")
+            raise InputError(f"is {shown(entry)}; {link} is no link{near_name(link, self.points)}")
         if point not in self.points[link]:
-            known = ", ".join(self.points[link]) or "none"
+            points = ", ".join(self.points[link]) or "none"
             raise InputError(
-                f"is {shown(given)}; {point} is no point of {link}{meant(point, self.points[link])} its points: "
-                f"{known}"
+                f"is {shown(entry)}; {point} is no point of {link}{meant(point, self.points[link])} its points: "
+                f"{points}"
             )
         return [link, point]
 
 
-def _placed(given: Any, at: list[str]) -> Any:
+def _placed(entry: Any, place: list[str]) -> Any:
     """An expression in which extremes of the load's own place have the name of this place."""
-    if not isinstance(given, str):
-        return given
-    return _OWN.sub(lambda m: f"{m[1]}({'.'.join([at[0]] if m[2] == 'angle' else at)}.{m[2]})", given)
+    if not isinstance(entry, str):
+        return entry
+    return _OWN.sub(lambda m: f"{m[1]}({'.'.join([place[0]] if m[2] == 'angle' else place)}.{m[2]})", entry)
 
 
 def _number(cell: str) -> float | None:

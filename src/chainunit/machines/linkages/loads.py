@@ -57,8 +57,8 @@ def checked_widths(
     for key, width in widths_of(loads):
         value = width.of.number(values)
         if wrong := width.fault(value):
-            given = ", ".join(f"{name} = {values[name]:.6g}" for name in width.of.names)
-            raise InputError(f"{wrong}{f' ({given})' * bool(given)}", key=key)
+            parameters = ", ".join(f"{name} = {values[name]:.6g}" for name in width.of.names)
+            raise InputError(f"{wrong}{f' ({parameters})' * bool(parameters)}", key=key)
         checked.append((key, width, math.copysign(1.0, value)))
     return tuple(checked)
 
@@ -66,22 +66,22 @@ def checked_widths(
 def requirement_of_width(key: str, width: Width, sign: float, parameters: Collection[str]) -> Requirement:
     """The requirement that a width keeps its sign."""
     subject = f"{'width' if sign > 0.0 else 'fall'} of {width.call} in {key}"
-    given = tuple(name for name in width.of.names if name in parameters)
-    return Requirement(subject, "1", "the function cannot change over it", given)
+    names = tuple(name for name in width.of.names if name in parameters)
+    return Requirement(subject, "1", "the function cannot change over it", names)
 
 
 def loads_by_speed(loads: Sequence[Mapping[str, Any]]) -> list[str]:
     """The names of the forces and torques that depend on the speed: at rest they have their value at the speed 0."""
     speeds = {"w", "vx", "vy", "angle_rate"}
-    found = {key.split(".")[1] for key, text in _texts(loads) if speeds & set(expression(text).names)}
-    return [load["name"] for load in loads if load["name"] in found]
+    fast_loads = {key.split(".")[1] for key, text in _texts(loads) if speeds & set(expression(text).names)}
+    return [load["name"] for load in loads if load["name"] in fast_loads]
 
 
 def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
     """The expressions of forces and torques, each behind its key."""
     for load in loads:
         for key, entries in (("force", load.get("force", ())), ("torque", (load.get("torque", 0.0),))):
-            yield from ((f"loads.{load['name']}.{key}", each) for each in entries if isinstance(each, str))
+            yield from ((f"loads.{load['name']}.{key}", entry) for entry in entries if isinstance(entry, str))
 
 
 class ExtremeName(NamedTuple):
@@ -122,17 +122,17 @@ class ForceLaw(NamedTuple):
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """Force and moment [N, N m], and the dissipated power by speed."""
-        at, link = m.pins[self.point], m.links[self.link]
-        known = _motion(xp, m, w, self) | {
-            "x": at.p.x, "y": at.p.y, "vx": at.p1.x * w, "vy": at.p1.y * w
+        pin, link = m.pins[self.point], m.links[self.link]
+        names = _motion(xp, m, w, self) | {
+            "x": pin.p.x, "y": pin.p.y, "vx": pin.p1.x * w, "vy": pin.p1.y * w
         }  # fmt: skip
-        fx, fy = (value_of(xp, each, known) for each in self.components)
+        fx, fy = (value_of(xp, component, names) for component in self.components)
         force = Vec2(fx, fy)
         if self.axis is not None:
-            own = Vec2(self.axis.dot(force), self.axis.cross(force))
-            force = link.u * own.x + link.u.turned() * own.y
-        moment = (at.p - link.pin.p).cross(force)
-        return Effect((Wrench(self.link, force, moment),), dissipative=-force.dot(at.p1))
+            components = Vec2(self.axis.dot(force), self.axis.cross(force))
+            force = link.u * components.x + link.u.turned() * components.y
+        moment = (pin.p - link.pin.p).cross(force)
+        return Effect((Wrench(self.link, force, moment),), dissipative=-force.dot(pin.p1))
 
 
 class TorqueLaw(NamedTuple):
@@ -154,9 +154,9 @@ class TorqueLaw(NamedTuple):
 
 def _motion(xp: Any, m: Moving, w: Any, load: ForceLaw | TorqueLaw) -> dict[str, Any]:
     """The quantities that both kinds of loads know."""
-    at = {name: table.value(xp, m.q) for name, table in load.tables.items()}
-    known = {**load.values, **at, "phi": m.q, "w": w, "angle_rate": m.links[load.link].t1 * w}
-    return known if load.angle is None else known | {"angle": load.angle(xp, m)}
+    table_values = {name: table.value(xp, m.q) for name, table in load.tables.items()}
+    names = {**load.values, **table_values, "phi": m.q, "w": w, "angle_rate": m.links[load.link].t1 * w}
+    return names if load.angle is None else names | {"angle": load.angle(xp, m)}
 
 
 class SpringDamper(NamedTuple):

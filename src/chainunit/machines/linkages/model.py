@@ -102,14 +102,14 @@ class LinkageDescription(LinkageOutputs):
         check_groups(self.structure, data.get("groups", ()))
         tables = data.get("tables", {})
         self.curves = {
-            name: TableCurve(each["places"], each["values"], each["over"] == "phi" and self.way.turns)
-            for name, each in tables.items()
+            name: TableCurve(table["places"], table["values"], table["over"] == "phi" and self.way.turns)
+            for name, table in tables.items()
         }
-        self.tables = {name: self.curves[name] for name, each in tables.items() if each["over"] == "phi"}
+        self.tables = {name: self.curves[name] for name, table in tables.items() if table["over"] == "phi"}
         self.extremes = extremes_of(data["loads"])
         self.link_turns: dict[str, tuple[float, float]] = {}
         self.Parameters = self._parameters()
-        inputs = [field_of(each) for each in data.get("inputs", ())]
+        inputs = [field_of(entry) for entry in data.get("inputs", ())]
         self.port, motion = ROTATING, cast("type", LinkageMotion)
         if self.way.linear:
             self.port, motion = SLIDING, SLIDING.motion
@@ -135,12 +135,12 @@ class LinkageDescription(LinkageOutputs):
     # declarations
 
     def _parameters(self) -> Any:
-        fields = [field_of(each) for each in self.data.get("parameters", ())]
+        fields = [field_of(entry) for entry in self.data.get("parameters", ())]
         for link in self.data["links"]:
-            own = link.get("own", {})
-            if own:
-                name, words = self.variable("link", link["name"]), f"link {link['name']}"
-                fields.append((name, LinkBody, group(LinkBody, words, default=LinkBody(**own))))
+            quantities = link.get("own", {})
+            if quantities:
+                name, title = self.variable("link", link["name"]), f"link {link['name']}"
+                fields.append((name, LinkBody, group(LinkBody, title, default=LinkBody(**quantities))))
         guides = any(j.kind == PRISMATIC for j in self.structure.joints.values())
         common = common_parameters(self.way.linear, guides, self.data["common"])
         if self.way.swings:
@@ -158,17 +158,17 @@ class LinkageDescription(LinkageOutputs):
         q = variable_of(declared, name).quantity
         low, high = (self._ratio * end for end in self.span)
         ends = " to ".join(f"{math.degrees(end):g} deg" for end in self.span)
-        words = q.template if self.way.linear else f"{q.template}; range of the driver: {ends}"
-        return name, Value, quantity(q.unit, words, default=0.5 * (low + high), min=low, max=high)
+        description = q.template if self.way.linear else f"{q.template}; range of the driver: {ends}"
+        return name, Value, quantity(q.unit, description, default=0.5 * (low + high), min=low, max=high)
 
     def values(self, xp: Any, p: Any, u: Any) -> dict[str, Any]:
         """The quantities that expressions may name."""
-        values = {each["name"]: getattr(p, each["name"]) for each in self.data.get("parameters", ())}
-        values |= {each["name"]: getattr(u, each["name"]) for each in self.data.get("inputs", ())}
+        values = {entry["name"]: getattr(p, entry["name"]) for entry in self.data.get("parameters", ())}
+        values |= {entry["name"]: getattr(u, entry["name"]) for entry in self.data.get("inputs", ())}
         for link in self.data["links"]:
             for quantity_name in link.get("own", {}):
-                own = getattr(p, self.variable("link", link["name"]))
-                values[f"{quantity_name}_of_{link['name']}"] = getattr(own, quantity_name)
+                body = getattr(p, self.variable("link", link["name"]))
+                values[f"{quantity_name}_of_{link['name']}"] = getattr(body, quantity_name)
         # before the extremes are derived, nothing needs them
         derived = getattr(p, "derived", ())
         values |= zip(self.extremes, derived[-len(self.extremes) :], strict=False) if self.extremes else ()
@@ -193,9 +193,9 @@ class LinkageDescription(LinkageOutputs):
         loads["pins"] = PinLosses(p.pins, p.pins.damping)
         if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
-                parts.receivers[each["name"]][0]: parts.geometry.number(each["length"])
-                for each in self.data["joints"]
-                if "length" in each
+                parts.receivers[joint["name"]][0]: parts.geometry.number(joint["length"])
+                for joint in self.data["joints"]
+                if "length" in joint
             }
             loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths)
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)
@@ -205,13 +205,13 @@ class LinkageDescription(LinkageOutputs):
         """An extreme of the motion, by its name in expressions."""
         kind, link, point, axis = parts_of_extreme(name)
         frame, ends = parts.frames[link], not self.way.turns
-        at = frame.coordinates(parts.geometry.point(link, point) if point else ZERO)
+        place = frame.coordinates(parts.geometry.point(link, point) if point else ZERO)
 
         def coordinate(xp: Any, m: Any) -> tuple[Any, Any, Any]:
             moving = m.links[link]
             if axis == "angle":
                 return self.angle(xp, link, description_axis(moving.u, frame), m.q), moving.t1, moving.t2
-            k = moving.beside(at.x, at.y)
+            k = moving.beside(place.x, place.y)
             return getattr(k.p, axis), getattr(k.p1, axis), getattr(k.p2, axis)
 
         return MotionExtreme(coordinate, self.places(), 1.0 if kind == "max" else -1.0, ends)
@@ -289,14 +289,14 @@ class LinkageDescription(LinkageOutputs):
 
     def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
         """The angle of a link for a load; None where the load does not depend on it."""
-        if not any(isinstance(each, str) and "angle" in expression(each).names for each in entries):
+        if not any(isinstance(entry, str) and "angle" in expression(entry).names for entry in entries):
             return None
         frame = parts.frames[link]
         return lambda xp, m: self.angle(xp, link, description_axis(m.links[link].u, frame), m.q)
 
     def _tables_for(self, entries: Sequence[float | str]) -> dict[str, TableCurve]:
         """The tables over the coordinate that a load takes."""
-        names = {name for each in entries if isinstance(each, str) for name in expression(each).names}
+        names = {name for entry in entries if isinstance(entry, str) for name in expression(entry).names}
         return {name: curve for name, curve in self.tables.items() if name in names}
 
     # the way of the driver
@@ -337,11 +337,11 @@ class LinkageDescription(LinkageOutputs):
         try:
             self._followed(p).turns()
         except InputError as error:
-            given = ", ".join(
-                f"{each['name']} = {getattr(p, each['name']):g}{unit_behind(each['unit'])}"
-                for each in self.data.get("parameters", ())
+            values = ", ".join(
+                f"{entry['name']} = {getattr(p, entry['name']):g}{unit_behind(entry['unit'])}"
+                for entry in self.data.get("parameters", ())
             )
-            return f"{error}{f' ({given})' * bool(given)}"
+            return f"{error}{f' ({values})' * bool(values)}"
         return ""
 
     # the model
@@ -375,9 +375,9 @@ class LinkageDescription(LinkageOutputs):
         parts = self.parts(MATH, self.Parameters(), self.Inputs())
         bearings = {self.variable("joint", name): parts.receivers[name][0] for name in self.structure.joints}
         titles = {name: self.variable("joint", name) for name in self.structure.joints}
-        given = tuple(each["name"] for each in data.get("parameters", ()))
+        names = tuple(parameter["name"] for parameter in data.get("parameters", ()))
         groups = self.structure.groups
-        triads = [each for each in groups if each.kind == "triad"]
+        triads = [assur_group for assur_group in groups if assur_group.kind == "triad"]
         demands = (
             (
                 groups,
@@ -391,10 +391,10 @@ class LinkageDescription(LinkageOutputs):
             ),
         )
         required = tuple(
-            Requirement(subject.format(", ".join(each.links)), "1", why, given)
-            for of, subject, why in demands
-            for each in of
-        ) + tuple(requirement_of_width(*each, given) for each in self.widths)
+            Requirement(subject.format(", ".join(assur_group.links)), "1", why, names)
+            for members, subject, why in demands
+            for assur_group in members
+        ) + tuple(requirement_of_width(*width, names) for width in self.widths)
 
         title = data["title"] or data["name"]
         return FileMachine(
@@ -445,9 +445,9 @@ class LinkageDescription(LinkageOutputs):
         for margin in least:
             yield margin, LEAST_MARGIN, math.inf
         last = 0
-        for each in linkage.groups:
-            last += each.derived_count
-            if each.derived_count:
+        for assur_group in linkage.groups:
+            last += assur_group.derived_count
+            if assur_group.derived_count:
                 yield derived[last - 2], -math.inf, MOST_MISFIT
         values = self.values(xp, p, u)
         for _, width, sign in self.widths:

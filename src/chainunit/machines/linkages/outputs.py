@@ -49,11 +49,11 @@ class LinkageOutputs:
         """The declaration of the outputs."""
         fields: list[tuple[str, Any, Any]] = []
         for name, joint in self.structure.joints.items():
-            of: type = GuideReaction if joint.kind == PRISMATIC else Force
-            words = f"joint {name}: on {joint.on[0]} from {joint.by[0]}"
-            fields.append((self.variable("joint", name), of, group(of, words)))
-        for name, of in self.link_outputs.items():
-            fields.append((self.variable("link", name), of, group(of, f"link {name}")))
+            kind: type = GuideReaction if joint.kind == PRISMATIC else Force
+            description = f"joint {name}: on {joint.on[0]} from {joint.by[0]}"
+            fields.append((self.variable("joint", name), kind, group(kind, description)))
+        for name, kind in self.link_outputs.items():
+            fields.append((self.variable("link", name), kind, group(kind, f"link {name}")))
         running = WayRunning if self.structure.driver.linear else Running
         return declared_class("Outputs", (self.port.values, running), fields)
 
@@ -73,12 +73,12 @@ class LinkageOutputs:
         reactions, m, w = s.reactions(a), s.m, s.w
         assert isinstance(m.linkage, DescribedLinkage)
         parts = m.linkage.parts
-        given = sum(
-            s.effects[name_of_load(each)].dissipative
-            for each in self.data["loads"]
-            if each["type"] != "spring"
+        losses = sum(
+            s.effects[name_of_load(load)].dissipative
+            for load in self.data["loads"]
+            if load["type"] != "spring"
         )
-        values: dict[str, Any] = {"load_power": -(given * w)}
+        values: dict[str, Any] = {"load_power": -(losses * w)}
         for name, joint in self.structure.joints.items():
             key, sign = parts.receivers[name]
             if joint.kind == PRISMATIC:
@@ -95,11 +95,11 @@ class LinkageOutputs:
                 "a": moving.t2 * (w * w) + moving.t1 * a,
             }
             for point in link.points:
-                at = frame.coordinates(parts.geometry.point(name, point))
-                fields[point] = point_motion(moving.beside(at.x, at.y), w, a)
+                place = frame.coordinates(parts.geometry.point(name, point))
+                fields[point] = point_motion(moving.beside(place.x, place.y), w, a)
             if link.heavy:
-                at = frame.coordinates(parts.geometry.vector(link.centroid))
-                fields["centroid"] = point_motion(moving.beside(at.x, at.y), w, a)
+                place = frame.coordinates(parts.geometry.vector(link.centroid))
+                fields["centroid"] = point_motion(moving.beside(place.x, place.y), w, a)
             values[self.variable("link", name)] = self.link_outputs[name](**fields)
         return values
 

@@ -45,7 +45,7 @@ class LinkageParts:
         cylinder = first is not None and first.kind == CYLINDER
         self.driver = self._cylinder(first) if first is not None and cylinder else self._driver()
         self.groups: tuple[Group, ...] = tuple(
-            self._group(each) for each in (rest if cylinder else self.structure.groups) if each is not None
+            self._group(group) for group in (rest if cylinder else self.structure.groups) if group is not None
         )
 
     def pin(self, link: str, point: str) -> str:
@@ -75,18 +75,22 @@ class LinkageParts:
                 if self._carriers[pin] == link or (link, name) not in self.structure.marked:
                     continue
                 pin = f"{link}.{name}"
-            at = frame.coordinates(self.geometry.point(link, name))
-            points[pin], self._carriers[pin] = (at.x, at.y), link
+            place = frame.coordinates(self.geometry.point(link, name))
+            points[pin], self._carriers[pin] = (place.x, place.y), link
         return Bar(link, start, length, self.geometry.mass(entry, frame), points)
 
     # joints
 
     def _rail(self, joint: JointEntry, link: str, point: Vec2) -> Rail:
         """The line along which a `point` of the link moves in a link before it."""
-        of = joint.other_link(link)
-        frame = self.frames[of]
-        at = frame.coordinates(self.geometry.line_through(joint, link, point))
-        return Rail(None if of == GROUND else of, at, frame.components(self.geometry.direction(joint, of)))
+        carrier = joint.other_link(link)
+        frame = self.frames[carrier]
+        place = frame.coordinates(self.geometry.line_through(joint, link, point))
+        return Rail(
+            None if carrier == GROUND else carrier,
+            place,
+            frame.components(self.geometry.direction(joint, carrier)),
+        )
 
     def _receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
@@ -206,9 +210,9 @@ class LinkageParts:
             self.sides[first] = math.copysign(1.0, rough)
         return self.sides[first]
 
-    def _slider(self, link: str, rail: JointEntry, at: str) -> tuple[Bar, Rail, str]:
-        """A block whose frame starts at the point `at` on its rail."""
-        point = self.geometry.point(link, at)
+    def _slider(self, link: str, rail: JointEntry, start: str) -> tuple[Bar, Rail, str]:
+        """A block whose frame starts at the point `start` on its rail."""
+        point = self.geometry.point(link, start)
         line = self._rail(rail, link, point)
         bar = self._bar(link, LinkFrame(point, self.geometry.direction(rail, link)))
         return bar, line, self._guide(rail, link)
@@ -259,10 +263,10 @@ class LinkageParts:
         along = self.geometry.direction(g, yoke)
         origin = self.geometry.line_through(s, block, pin)
         rail = self._rail(g, yoke, origin)
-        own = LinkFrame(origin, along)
-        slot = own.components(self.geometry.direction(s, yoke))
+        frame = LinkFrame(origin, along)
+        slot = frame.components(self.geometry.direction(s, yoke))
         in_block = self.geometry.across(s, along, yoke)
-        bars = self._bar(block, LinkFrame(pin, in_block), start), self._bar(yoke, own)
+        bars = self._bar(block, LinkFrame(pin, in_block), start), self._bar(yoke, frame)
         return RPP(*bars, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
 
     def _triad(
@@ -272,7 +276,7 @@ class LinkageParts:
         self._carriers |= {self.pin(ternary, j.at(ternary)): ternary for j in inner if j.kind == REVOLUTE}
         # before the legs: one that slides in it may do so at a point of it
         plate = self._bar(ternary, OWN)
-        built = [self._leg(*each, ternary) for each in zip(legs, outer, inner, strict=True)]
+        built = [self._leg(*ends, ternary) for ends in zip(legs, outer, inner, strict=True)]
         x, y, angle = self.structure.poses[ternary]
         mass = plate.mass or Mass(0.0, 0.0, 0.0, 0.0)
         first, second, third = built
@@ -291,6 +295,6 @@ class LinkageParts:
             return BlockLeg(bar, pin, arm, rail, guide)
         point = self.geometry.point(link, outer.at(link))
         start = self._outer(outer, link)
-        at = self.geometry.line_through(inner, link, point)
+        place = self.geometry.line_through(inner, link, point)
         bar = self._bar(link, LinkFrame(point, self.geometry.direction(inner, link)), start)
-        return SlotLeg(bar, at, self.geometry.direction(inner, ternary), self._guide(inner, link))
+        return SlotLeg(bar, place, self.geometry.direction(inner, ternary), self._guide(inner, link))

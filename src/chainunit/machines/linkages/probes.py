@@ -35,8 +35,10 @@ def repeated_outputs(structure: Structure, variable: Callable[[str, str], str]) 
     )
     repeated: dict[str, str] = {}
 
-    def repeat(end: tuple[str, str], of: tuple[str, str], fields: Iterable[str]) -> None:
-        name, one = (f"{variable('link', link)}{f'.{point}' * bool(point)}" for link, point in (end, of))
+    def repeat(end: tuple[str, str], original: tuple[str, str], fields: Iterable[str]) -> None:
+        name, one = (
+            f"{variable('link', link)}{f'.{point}' * bool(point)}" for link, point in (end, original)
+        )
         repeated.update(
             {f"{name}.{field}": f"{one}.{field}" for field in fields if f"{name}.{field}" not in repeated}
         )
@@ -45,27 +47,27 @@ def repeated_outputs(structure: Structure, variable: Callable[[str, str], str]) 
         points = [(name, point) for point in _points(link)]
         for end in points:
             met = _pinned(structure, end)
-            own = {each for each, _ in met}
-            ranked = [each for each in structure.links if each in own]
-            first = next((each for each in ranked if each in grounded), ranked[0])
+            links = {neighbour for neighbour, _ in met}
+            ranked = [neighbour for neighbour in structure.links if neighbour in links]
+            first = next((neighbour for neighbour in ranked if neighbour in grounded), ranked[0])
             one = next((first, point) for point in _points(structure.links[first]) if (first, point) in met)
             if one != end:
-                repeat(end, one, _PLACE if GROUND in own else _PLACE + _SPEEDS)
+                repeat(end, one, _PLACE if GROUND in links else _PLACE + _SPEEDS)
         if name in _orientation(structure, GROUND):
             for end in points[1:]:
                 repeat(end, points[0], _SPEEDS)
     for name in structure.links:
         alike = _orientation(structure, name)
-        first = next(each for each in structure.links if each in alike)
+        first = next(link for link in structure.links if link in alike)
         if GROUND not in alike and first != name:
             repeat((name, ""), (first, ""), _TURNING)
     # an output that is repeated may repeat one itself
-    for name, of in repeated.items():
-        while of in repeated:
-            of = repeated[of]
-        repeated[name] = of
+    for name, original in repeated.items():
+        while original in repeated:
+            original = repeated[original]
+        repeated[name] = original
     constant = constant_outputs(structure, variable)
-    return {name: of for name, of in repeated.items() if name not in constant}
+    return {name: original for name, original in repeated.items() if name not in constant}
 
 
 def constant_outputs(structure: Structure, variable: Callable[[str, str], str]) -> dict[str, float]:
@@ -73,15 +75,17 @@ def constant_outputs(structure: Structure, variable: Callable[[str, str], str]) 
     rotation of links that cannot turn. `variable` is that of `repeated_outputs`."""
     constant: dict[str, float] = {}
     for name, link in structure.links.items():
-        own = variable("link", name)
+        variable_of_link = variable("link", name)
         if name in _orientation(structure, GROUND):
-            constant |= {f"{own}.{field}": 0.0 for field in _TURNING}
+            constant |= {f"{variable_of_link}.{field}": 0.0 for field in _TURNING}
         for point in _points(link):
-            ground = [at for each, at in _pinned(structure, (name, point)) if each == GROUND]
+            ground = [end for neighbour, end in _pinned(structure, (name, point)) if neighbour == GROUND]
             if ground:
-                constant |= {f"{own}.{point}.{field}": 0.0 for field in _SPEEDS}
+                constant |= {f"{variable_of_link}.{point}.{field}": 0.0 for field in _SPEEDS}
                 place = zip(_PLACE, structure.ground[ground[0]], strict=True)
-                constant |= {f"{own}.{point}.{field}": x for field, x in place if not isinstance(x, str)}
+                constant |= {
+                    f"{variable_of_link}.{point}.{field}": x for field, x in place if not isinstance(x, str)
+                }
     return constant
 
 
@@ -104,7 +108,9 @@ def _pinned(structure: Structure, end: tuple[str, str]) -> set[tuple[str, str]]:
     or a centroid lies in them."""
     pins = [{j.on, j.by} for j in structure.joints.values() if j.kind != PRISMATIC]
     for name, link in structure.links.items():
-        pins += [{(name, _CENTROID), (name, each)} for each, at in link.points.items() if at == link.centroid]
+        pins += [
+            {(name, _CENTROID), (name, pin)} for pin, place in link.points.items() if place == link.centroid
+        ]
     return _connected(end, pins)
 
 

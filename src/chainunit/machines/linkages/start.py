@@ -105,14 +105,14 @@ class StartPose:
             self.places.setdefault((by, by_point), (x - dx, y - dy))
 
     def _pose(self, link: str, points: Mapping[str, Point]) -> None:
-        known = [name for name in points if (link, name) in self.places]
-        if not known:
+        placed = [name for name in points if (link, name) in self.places]
+        if not placed:
             return
-        first = known[0]
+        first = placed[0]
         (px, py), (x, y) = points[first], self.places[link, first]
         if link not in self.angles:
             # the pair of points that lie farthest apart tells the angle best
-            far = max(known, key=lambda name: math.dist(points[name], points[first]))
+            far = max(placed, key=lambda name: math.dist(points[name], points[first]))
             (qx, qy), (u, v) = points[far], self.places[link, far]
             if math.dist((px, py), (qx, qy)) == 0.0 or math.dist((x, y), (u, v)) == 0.0:
                 return

@@ -58,16 +58,16 @@ def _check(
     near, far = (
         sum(
             abs(math.remainder(angle - start, 2.0 * math.pi))
-            for angle, other, start in zip(own, angles[k - 1], rough, strict=True)
+            for angle, other, start in zip(pose, angles[k - 1], rough, strict=True)
             if abs(math.remainder(angle - other, 2.0 * math.pi)) > _SAME
         )
-        for k, own in enumerate(angles)
+        for k, pose in enumerate(angles)
     )
     if near <= _AS_FAR * far:
         return
     number = group.links.index(joint.by[0]) if joint.by[0] in group.links else 0
     key = f"start.angles.{group.links[number]}"
-    ways = [f'"{math.degrees(own[number]):.4g} deg"' for own in angles]
+    ways = [f'"{math.degrees(pose[number]):.4g} deg"' for pose in angles]
     if group.kind != "RPR" and None not in pins:
         key = f"start.points.{joint.by[1]}"
         ways = [f'["{1e3 * pin.p.x:.4g} mm", "{1e3 * pin.p.y:.4g} mm"]' for pin in pins if pin is not None]

@@ -150,10 +150,10 @@ class Structure:
         groups = groups_of([link.name for link in links], joints, driver)
         marked = {
             end
-            for each in groups
-            for joint in (named[j.name] for j in each.joints)
+            for group in groups
+            for joint in (named[j.name] for j in group.joints)
             for end in (joint.on, joint.by)
-            if joint.kind == PRISMATIC or end[0] not in each.links
+            if joint.kind == PRISMATIC or end[0] not in group.links
         }
         if driver.linear:
             marked |= {named[driver.joint].on, named[driver.joint].by}
@@ -185,25 +185,27 @@ def _with_cylinder(links: Sequence[str], joints: Sequence[JointOf], slide: Joint
         where it is not.
     """
     rod, barrel = slide.on[0], slide.by[0]
-    of = {joint.name: joint for joint in joints}
+    joint_by_name = {joint.name: joint for joint in joints}
     merged = [
         joint._replace(**{end: barrel for end in ("on", "by") if getattr(joint, end) == rod})
         for joint in joints
     ]
     groups = decompose([link for link in links if link != rod], merged, "")
-    own = next(group for group in groups if barrel in group.links)
-    others = [each for each in own.links if each != barrel]
-    if own.kind != "RRR":
+    dyad = next(group for group in groups if barrel in group.links)
+    others = [link for link in dyad.links if link != barrel]
+    if dyad.kind != "RRR":
         raise _no_cylinder(barrel, rod, slide)
-    p, c, q = own.joints if own.links[0] == barrel else own.joints[::-1]
-    near, far = (of[p.name].on, of[c.name].on)
-    near = near if near != GROUND else of[p.name].by
-    far = far if far not in others else of[c.name].by
+    p, c, q = dyad.joints if dyad.links[0] == barrel else dyad.joints[::-1]
+    near, far = (joint_by_name[p.name].on, joint_by_name[c.name].on)
+    near = near if near != GROUND else joint_by_name[p.name].by
+    far = far if far not in others else joint_by_name[c.name].by
     grounded = all(GROUND in (joint.on, joint.by) for joint in (p, q))
     if not grounded or {near, far} != {rod, barrel}:
         raise _no_cylinder(barrel, rod, slide)
-    cylinder = AssurGroup(CYLINDER, (near, far, *others), (of[p.name], of[c.name], of[q.name]))
-    return [cylinder, *(group for group in groups if group is not own)]
+    cylinder = AssurGroup(
+        CYLINDER, (near, far, *others), (joint_by_name[p.name], joint_by_name[c.name], joint_by_name[q.name])
+    )
+    return [cylinder, *(group for group in groups if group is not dyad)]
 
 
 def _no_cylinder(barrel: str, rod: str, slide: JointEntry) -> InputError:
@@ -221,7 +223,7 @@ def pin_names(
     """The name of each point by link and point: the point's own where all points of that name meet in revolute
     joints, else with that of the link before it."""
     owners: dict[str, list[str]] = {}
-    for link, points in ((GROUND, ground), *((each.name, each.points) for each in links)):
+    for link, points in ((GROUND, ground), *((entry.name, entry.points) for entry in links)):
         for point in points:
             owners.setdefault(point, []).append(link)
     joined = {frozenset((j.on, j.by)) for j in joints if j.kind == REVOLUTE}
@@ -249,35 +251,35 @@ def check_groups(structure: Structure, listed: Sequence[Any]) -> None:
     InputError
         in one line, with the groups that it has.
     """
-    own = {frozenset(group.links): group.kind for group in structure.groups}
+    kinds = {frozenset(group.links): group.kind for group in structure.groups}
     there = ", ".join(f"{group.kind} ({', '.join(group.links)})" for group in structure.groups)
     for k, (kind, links) in enumerate(listed, 1):
-        found, names = own.get(frozenset(links)), ", ".join(links)
-        if found is None:
+        actual, names = kinds.get(frozenset(links)), ", ".join(links)
+        if actual is None:
             raise InputError(f"{names} is no group; the groups are {there}", f"groups.{k}.links")
-        if kind not in ("", found):
-            raise InputError(f"the links {names} form the group {found}, not {kind}", f"groups.{k}.kind")
+        if kind not in ("", actual):
+            raise InputError(f"the links {names} form the group {actual}, not {kind}", f"groups.{k}.kind")
 
 
 def structure_of(data: Mapping[str, Any]) -> Structure:
     """The structure of a description; see `Structure.of`."""
     links = [
         LinkEntry(
-            each["name"],
-            {name: (x, y) for name, (x, y) in each["points"].items()},
-            each.get("mass", 0.0),
-            each.get("inertia", 0.0),
-            tuple(each.get("centroid", (0.0, 0.0))),
-            each.get("masses", {}),
+            link["name"],
+            {name: (x, y) for name, (x, y) in link["points"].items()},
+            link.get("mass", 0.0),
+            link.get("inertia", 0.0),
+            tuple(link.get("centroid", (0.0, 0.0))),
+            link.get("masses", {}),
         )
-        for each in data["links"]
+        for link in data["links"]
     ]
     joints = [
         JointEntry(
-            each["name"], each["type"], tuple(each["on"]), tuple(each["by"]),
-            each.get("toward", ""), each.get("angle", 0.0),
+            joint["name"], joint["type"], tuple(joint["on"]), tuple(joint["by"]),
+            joint.get("toward", ""), joint.get("angle", 0.0),
         )
-        for each in data["joints"]
+        for joint in data["joints"]
     ]  # fmt: skip
     driver = DriverEntry(**data["driver"])
     start = data["start"]

@@ -29,9 +29,9 @@ class DriverWay:
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> DriverWay:
         """The way of the driver of a description."""
-        driver, given = data["driver"], data.get("range")
+        driver, span = data["driver"], data.get("range")
         name = driver["joint" if driver["linear"] else "link"]
-        limits = None if given is None else (float(given[0]), float(given[1]))
+        limits = None if span is None else (float(span[0]), float(span[1]))
         return cls(driver["linear"], name, data["start"]["value"], limits)
 
     @property
