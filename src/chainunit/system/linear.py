@@ -167,7 +167,8 @@ class LinearModel:
                 row_name = (self.states if name in "AB" else self.outputs)[row].name
                 by = (self.states if name in "AC" else self.inputs)[column].name
                 raise InputError(
-                    f"{self.model}: the derivative of {'der(' + row_name + ')' if name in 'AB' else row_name} by {by} "
+                    f"{self.model}: the derivative of "
+                    f"{'der(' + row_name + ')' if name in 'AB' else row_name} by {by} "
                     "is not defined at this point, a corner of the equations; take a point beside it"
                 )
 

@@ -44,24 +44,24 @@ def checked_dimension(text: str, dimensions: Dimensions, unit: str | None) -> Di
     return result
 
 
-def _dimension(node: ast.AST, dimensions: Dimensions, whole_text: Expression) -> Dimension | None:
+def _dimension(node: ast.AST, dimensions: Dimensions, parsed: Expression) -> Dimension | None:
     match node:
         case ast.Constant():
             return None
         case ast.Name(id=name):
             return () if name in CONSTANTS else dimensions[name]
         case ast.UnaryOp(operand=inner):
-            return _dimension(inner, dimensions, whole_text)
+            return _dimension(inner, dimensions, parsed)
         case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int() | float() as power)):
-            inside = _dimension(base, dimensions, whole_text)
+            inside = _dimension(base, dimensions, parsed)
             return None if inside is None else tuple((name, k * power) for name, k in inside)
         case ast.BinOp():
             first, steps = parts_of_chain(node)
-            a = _dimension(first, dimensions, whole_text)
+            a = _dimension(first, dimensions, parsed)
             for whole, op, right in steps:
-                b = _dimension(right, dimensions, whole_text)
+                b = _dimension(right, dimensions, parsed)
                 if isinstance(op, ast.Add | ast.Sub):
-                    a = _same(a, b, whole, whole_text)
+                    a = _same(a, b, whole, parsed)
                 # a number in a product is a pure one
                 elif a is not None or b is not None:
                     a = _product(a or (), b or (), 1.0 if isinstance(op, ast.Mult) else -1.0)
@@ -70,17 +70,17 @@ def _dimension(node: ast.AST, dimensions: Dimensions, whole_text: Expression) ->
             return dimensions[f"{'max' if name == 'stroke' else name}({ast.unparse(place)})"]
         case ast.Compare(left=left, comparators=[right]):
             return _same(
-                _dimension(left, dimensions, whole_text),
-                _dimension(right, dimensions, whole_text),
+                _dimension(left, dimensions, parsed),
+                _dimension(right, dimensions, parsed),
                 node,
-                whole_text,
+                parsed,
             )
         case ast.Call(func=ast.Name(id="table"), args=[x, ast.Name(id=name)]):
-            _same(_dimension(x, dimensions, whole_text), dimensions[f"x of {name}"], node, whole_text)
+            _same(_dimension(x, dimensions, parsed), dimensions[f"x of {name}"], node, parsed)
             return dimensions[f"table {name}"]
         case ast.Call(func=ast.Name(id=name), args=args):
-            inside_all = [_dimension(argument, dimensions, whole_text) for argument in args]
-            return _of_function(name, inside_all, node, whole_text)
+            inside_all = [_dimension(argument, dimensions, parsed) for argument in args]
+            return _of_function(name, inside_all, node, parsed)
     return None
 
 

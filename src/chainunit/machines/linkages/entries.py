@@ -113,7 +113,7 @@ class EntryReader(Entry):
             self.unusual.append(doubt)
 
     def number(self, key: str, entry: Any, unit: str, description: str = "") -> float:
-        """A number, or a text with a unit; `description` are its description. One of an unusual size is noted."""
+        """A number, or a text with a unit; the variable has this `description`. One of an unusual size is noted."""
         if isinstance(entry, bool) or not isinstance(entry, int | float | str):
             raise InputError(
                 f"{is_given(entry)}; must be a number or a text with a unit, such as {_like(unit)}"
@@ -376,7 +376,7 @@ class EntryReader(Entry):
     def with_unit(self, entry: Any, unit: Any) -> tuple[float, str | None]:
         """A value in SI units, and its unit; None where it is told by the first use."""
         if unit is not None:
-            fits = [known_unit for known_unit in UNITS if _same_unit(str(unit), known_unit)]
+            fits = [si_unit for si_unit in UNITS if _same_unit(str(unit), si_unit)]
             if not fits:
                 raise InputError(
                     f"unit = {shown(unit)}: no unit that a linkage knows; known: {', '.join(UNITS)}"
@@ -397,7 +397,7 @@ class EntryReader(Entry):
 
 
 def sized(key: str, unit: str, usual: tuple[float, float] | None, description: str = "") -> Variable:
-    """The value of a key as a variable of these `usual` sizes; `description` are its description."""
+    """The value of a key as a variable of these `usual` sizes, with this `description`."""
     description = description or units.kind_of(unit)
     return Variable(key, description, Quantity(unit, description, usual=usual))
 

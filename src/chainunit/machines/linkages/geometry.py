@@ -116,8 +116,8 @@ class LinkGeometry:
     def line_through(self, joint: JointEntry, link: str, point: Vec2) -> Vec2:
         """The place, in the link on the other side, of a point through which the line of a `point` of the link
         goes."""
-        start, other = self.point(link, joint.at(link)), joint.other_link(link)
-        return self.point(other, joint.at(other)) + self.across(joint, point - start, link)
+        joint_point, other = self.point(link, joint.at(link)), joint.other_link(link)
+        return self.point(other, joint.at(other)) + self.across(joint, point - joint_point, link)
 
 
 class RoughPoses:
