@@ -63,8 +63,8 @@ def carry_out(
         has_remarks = task.tells_remarks and errors.is_terminal and console.is_terminal
         if whole:
             terminal.show(report, console, remarks=not has_remarks)
-            names = ", ".join(printable(str(path), 500) for path in written)
-            console.print(f"Written: {names}", soft_wrap=True)
+            paths = ", ".join(printable(str(path), 500) for path in written)
+            console.print(f"Written: {paths}", soft_wrap=True)
         else:
             names = ", ".join(printable(str(path.relative_to(output)), 500) for path in written[:_MOST_NAMES])
             names += f" and {len(written) - _MOST_NAMES} more" if len(written) > _MOST_NAMES else ""

@@ -274,9 +274,7 @@ def in_units(figure: Figure, units: Units) -> Figure:
         return replace(original, x=x, y=y, items=tuple(items))
 
     rows = enumerate(figure.panels)
-    return replace(
-        figure, panels=tuple(tuple(original and panel(original, r) for original in row) for r, row in rows)
-    )
+    return replace(figure, panels=tuple(tuple(place and panel(place, r) for place in row) for r, row in rows))
 
 
 def _shared(figure: Figure, on: str, axis: Axis, row: int) -> tuple[Any, ...]:

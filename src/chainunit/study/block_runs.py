@@ -275,8 +275,8 @@ class BlockRuns:
         stop: Any,
         before: Runs | None = None,
     ) -> Runs:
-        """Runs from `begin` to `stop` through events that begin at the `event_times` [s]; `before` are the runs to the
-        events, whose last outputs the events read."""
+        """Runs from `begin` to `stop` through events that begin at the `event_times` [s]; `before` are the runs to
+        the events, whose last outputs the events read."""
         signals = []
         for k, point in enumerate(points):
             read = {name: self._last(before, k, name) for name in point.event.reads}
