@@ -330,9 +330,9 @@ def main() -> None:
     that failed or a file that could not be written, 130 for Ctrl-C, 143 for SIGTERM, and 129 for SIGHUP."""
     written.clear()
     with interrupts.remembered():
-        status, words = interrupts.status(), _INTERRUPTED
+        status, message = interrupts.status(), _INTERRUPTED
         try:
-            status, words = _outcome()
+            status, message = _outcome()
         except KeyboardInterrupt:  # a second one, while the first was told
             pass
         except Exception:
@@ -341,10 +341,10 @@ def main() -> None:
         interrupts.hold()
         if interrupts.received() is not None and status != interrupts.status():
             # a library has turned the interrupt into its own error, or has lost it
-            status, words = interrupts.status(), _INTERRUPTED
-        if words and status == interrupts.status():
-            words = f"{words}; {_told(written)}"
-        _tell(words)
+            status, message = interrupts.status(), _INTERRUPTED
+        if message and status == interrupts.status():
+            message = f"{message}; {_told(written)}"
+        _tell(message)
     sys.exit(status)
 
 
@@ -402,7 +402,7 @@ def _declared(module: str) -> str:
     package = module.partition(".")[0].lower()
     package = {"pil": "pillow"}.get(package, package)
     required = (re.match(r"[\w-]+", line) for line in metadata.requires("chainunit") or ())
-    return package if any(found and found[0].lower() == package for found in required) else ""
+    return package if any(match and match[0].lower() == package for match in required) else ""
 
 
 def _usage(error: Any) -> str:
@@ -414,16 +414,16 @@ def _usage(error: Any) -> str:
     command = f"chainunit{command}"
     missing = error.param if hasattr(error, "param_type") else None
     if missing is not None and missing.param_type_name == "argument":
-        words = f"{missing.name.upper()} is missing: {missing.help}"
+        message = f"{missing.name.upper()} is missing: {missing.help}"
     else:
-        words = error.format_message().replace("Value error, ", "")
-    words = words.removesuffix(".")
-    return f"{words} ({command} --help shows {'its options' if ' ' in command else 'the commands'})"
+        message = error.format_message().replace("Value error, ", "")
+    message = message.removesuffix(".")
+    return f"{message} ({command} --help shows {'its options' if ' ' in command else 'the commands'})"
 
 
-def _tell(words: str) -> None:
+def _tell(message: str) -> None:
     with contextlib.suppress(OSError):
-        for line in words.splitlines():
+        for line in message.splitlines():
             print("chainunit: " + printable(" ".join(line.split()), 2000), file=sys.stderr)
 
 

@@ -46,7 +46,7 @@ class ExportCommand(typer.core.TyperCommand):
         # a module of `machines` adds its own machine: the names are known once all modules are imported
         from ..models import MODELS
 
-        (name,) = (each for each in self.params if each.name == "name")
+        (name,) = (parameter for parameter in self.params if parameter.name == "name")
         name.help = f"A study file or a linkage file (.toml), or one of {', '.join(MODELS)}."  # type: ignore[attr-defined]
         super().format_help(ctx, formatter)
 
@@ -103,9 +103,9 @@ def export(
         of_study = " or .ssp" if whole else ""
         raise InputError(f"-o {file}: must be a file name that ends in .fmu{of_study}")
     if whole and (config or direct):
-        given = f"--config {config}" if config else "--direct"
+        option = f"--config {config}" if config else "--direct"
         raise InputError(
-            f"{given}: is not of a study file, which has its own values; leave it out for {name}"
+            f"{option}: is not of a study file, which has its own values; leave it out for {name}"
         )
     if rods is not None and name != "ChainUnitFlexible":
         raise InputError(f"--rods {rods}: is of ChainUnitFlexible; leave it out for {name}")
@@ -122,7 +122,7 @@ def export(
         else:
             model, start = model_named(name, direct, rods), {}
         file = file or Path(f"{model.name}.fmu")
-        made = write(
+        summary = write(
             model,
             file,
             start,
@@ -132,7 +132,7 @@ def export(
             names=names.value,
             progress=status.update,
         )
-    print(f"{file}: {model.name}, {made}")
+    print(f"{file}: {model.name}, {summary}")
     if whole and loaded:
         _show_remarks(loaded)
 
@@ -153,7 +153,7 @@ def export_ssp(
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
     loaded = study_file(config)
     with terminal_console(stderr=True).status("exporting") as status:
-        made = export_study(
+        summary = export_study(
             loaded,
             output,
             all_inputs=all_inputs,
@@ -161,7 +161,7 @@ def export_ssp(
             backend=backend.value if backend else None,
             progress=status.update,
         )
-    print(f"{output}: {made}")
+    print(f"{output}: {summary}")
     _show_remarks(loaded)
 
 
@@ -169,8 +169,8 @@ def _show_remarks(loaded: Any) -> None:
     """Print the parts of a study that its FMU or package does not have, and the limits of its model."""
     from ..study.package import remarks_on_export
 
-    for words in remarks_on_export(loaded):
-        print(words)
+    for sentence in remarks_on_export(loaded):
+        print(sentence)
 
 
 def _platforms(choice: str | None, fmi: int) -> list[str]:

@@ -305,8 +305,8 @@ class Study(StudyMethods):
         return path
 
     def _warn_of_export(self) -> None:
-        for words in remarks_on_export(self.config):
-            warnings.warn(words, RemarkWarning, stacklevel=3)
+        for sentence in remarks_on_export(self.config):
+            warnings.warn(sentence, RemarkWarning, stacklevel=3)
 
     def live(self, file: str | Path = "live.html") -> Path:
         """Write a page in which the machine runs, as ``chainunit live`` does, without a run here; returns the file.
@@ -338,11 +338,11 @@ class Study(StudyMethods):
 
     def _repr_html_(self) -> str:
         """The text of `repr` with a drawing of the machine, for notebooks."""
-        words = f"<p>{escape(repr(self)[1:-1])}</p>"
+        text = f"<p>{escape(repr(self)[1:-1])}</p>"
         if isinstance(self.machine, ForeignMachine):
-            return words
+            return text
         # the lines of the drawing are dark, and the page of a notebook may be dark, too
-        return f'{words}<div style="background: white; max-width: 60em">{drawing(self.machine)}</div>'
+        return f'{text}<div style="background: white; max-width: 60em">{drawing(self.machine)}</div>'
 
 
 class StudyResult(ReportedResult[Config, StudyRecord]):
@@ -417,9 +417,9 @@ def _as_words(progress: TaskProgress) -> Callable[[str], None]:
 def _plain(value: Any) -> Any:
     """A value from Python in the form that a TOML file would give."""
     if isinstance(value, Mapping):
-        return {str(name): _plain(each) for name, each in value.items()}
+        return {str(name): _plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
+        return [_plain(entry) for entry in value]
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     value = as_text(value)

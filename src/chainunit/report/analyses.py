@@ -12,9 +12,9 @@ from .capability import Contents, capabilities
 @cache
 def analysis_sections() -> Mapping[str, Contents]:
     """All of them, in the order in which a report has them."""
-    others = {name: each for part in capabilities() for name, each in part.contents().items()}
+    others = {name: contents for part in capabilities() for name, contents in part.contents().items()}
     return {
-        **{name: each for name, each in others.items() if each.before == "constant_speed"},
+        **{name: contents for name, contents in others.items() if contents.before == "constant_speed"},
         "constant_speed": Contents("A turn at constant speed", turn.blocks, (turn.PICTURE,)),
         **others,
         "starts": Contents("Starts", starts.blocks),

@@ -23,10 +23,10 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield from sentence(s)
     for part in capabilities():
         yield from part.head(s, study)
-    for of in ("model", "motor"):
-        verdict = s.result["verdict"][of]
+    for subject in ("model", "motor"):
+        verdict = s.result["verdict"][subject]
         if verdict is not None:
-            yield b.Judgement(_HOLDS[verdict["holds"]], s.words(f"verdict.{of}.text"))
+            yield b.Judgement(_HOLDS[verdict["holds"]], s.words(f"verdict.{subject}.text"))
     if slips := s.result["slips"]:
         items = tuple(s.words(f"slips.{i}.said") for i in range(len(slips)))
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
@@ -48,8 +48,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
     for part in capabilities():
         yield from part.answer(s, study)
-    warnings: list[b.Block] = [b.Judgement("warning", each) for each in s.lines("warnings")]
-    warnings += (each for part in capabilities() for each in part.warnings(s))
+    warnings: list[b.Block] = [b.Judgement("warning", warning) for warning in s.lines("warnings")]
+    warnings += (block for part in capabilities() for block in part.warnings(s))
     yield from warnings
     yield from remark_tables(study.warnings, "warnings")
     if answers and not warnings:
@@ -89,12 +89,12 @@ def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:
     families: dict[str, list[str]] = {}
     for name in s.result["answers"][run]:
         families.setdefault(MEASURES[name].of, []).append(name)
-    for of, names in families.items():
+    for family, names in families.items():
         if MEASURES[names[0]].card:
             numbers = [(MEASURES[name].words, number(s, study, run, name)) for name in names]
-            lines = [join(line(f"{words} ", size) for words, size in numbers[2:])] if numbers[2:] else []
-            cards = tuple((size, words) for words, size in numbers[:2])
-            yield b.Card(of_driver(of, study.driver_noun), cards, (*lines, *_worst(s, study, names[0])))
+            lines = [join(line(f"{title} ", size) for title, size in numbers[2:])] if numbers[2:] else []
+            cards = tuple((size, title) for title, size in numbers[:2])
+            yield b.Card(of_driver(family, study.driver_noun), cards, (*lines, *_worst(s, study, names[0])))
 
 
 def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:

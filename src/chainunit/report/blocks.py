@@ -363,14 +363,14 @@ class Source:
             if v.name in entries:
                 full = f"{name}.{v.name}"
                 origin = self.origin(full), self.place(full)
-                words = v.described(self.driver)
+                description = v.described(self.driver)
                 if isinstance(entries[v.name]["value"], list):
                     for i, end in enumerate(("least", "most")):
                         value = self.number(f"{path}.{v.name}", i, as_given=True)
-                        yield GivenValue(full, f"{words}, {end}", value, *origin)
+                        yield GivenValue(full, f"{description}, {end}", value, *origin)
                 else:
                     value = self.number(f"{path}.{v.name}", as_given=True, none="none")
-                    yield GivenValue(full, words, value, *origin)
+                    yield GivenValue(full, description, value, *origin)
 
     def origin(self, path: str) -> str:
         """The origin of the given value at `path`; empty where the result has no origins."""

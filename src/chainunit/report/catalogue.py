@@ -23,8 +23,8 @@ def checked(files: Sequence[Path]) -> Report:
     InputError
         with a line for each fault of all files; see `chainunit.drives.catalogue.check_own`.
     """
-    found = check_own(files)
-    of_kinds = zip(KINDS, (found.motors, found.gears, found.couplings, found.flexible), strict=True)
+    rows = check_own(files)
+    of_kinds = zip(KINDS, (rows.motors, rows.gears, rows.couplings, rows.flexible), strict=True)
     tables = [_contents(kind, items) for kind, items in of_kinds if items]
     names = ", ".join(str(file) for file in files)
     more = "Name the files in a study file: catalogue = [...]."
@@ -38,20 +38,20 @@ def _contents(kind: CatalogueKind, items: Sequence[Any]) -> Table:
     unknown = sum(not item.order_number for item in items)
     rows = [TableRow((name, "-", str(unknown or "-"), TEXTS[name]))]
     for name, variable in kind.variables.items():
-        values = [float(getattr(each, name)) for each in data]
+        values = [float(getattr(entry, name)) for entry in data]
         # of a column that may be left out, the start value 0 stands for a value that is not known
         unknown = values.count(0.0) if variable.quantity.start == 0.0 else 0
-        known = [x for x in values if x or variable.quantity.start != 0.0]
-        rows.append(TableRow((name, _range(variable, known), str(unknown or "-"), variable.description)))
+        sizes = [x for x in values if x or variable.quantity.start != 0.0]
+        rows.append(TableRow((name, _range(variable, sizes), str(unknown or "-"), variable.description)))
     title = f"{len(items)} {kind.plural if len(items) > 1 else kind.plural.removesuffix('s')}"
     return Table(tuple(rows), heads("column", "from, to", "rows without", "meaning"), title, numeric=False)
 
 
 def _range(variable: Variable, values: Iterable[float]) -> str:
-    known = sorted(values)
-    if not known:
+    sizes = sorted(values)
+    if not sizes:
         return "-"
-    ends = dict.fromkeys(number(x, variable.unit, variable.kind) for x in (known[0], known[-1]))
+    ends = dict.fromkeys(number(x, variable.unit, variable.kind) for x in (sizes[0], sizes[-1]))
     return " to ".join(ends)
 
 

@@ -25,9 +25,9 @@ class _Cited:
     """A result whose attributes are pieces; an attribute that is no part of its data is that of the result."""
 
     def __init__(self, result: Any, path: str) -> None:
-        of: Any = type(result)
+        result_type: Any = type(result)
         self._result, self._path = result, path
-        self._parts: dict[str, ResultPart] = {each.attribute: each for each in parts(of)}
+        self._parts: dict[str, ResultPart] = {part.attribute: part for part in parts(result_type)}
 
     def __getattr__(self, name: str) -> Any:
         value, declared = getattr(self._result, name), self._parts.get(name)
@@ -46,14 +46,14 @@ def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
     if isinstance(value, Estimate):
         return Number(finite(value.value), value.unit, value.kind, path)
     if isinstance(value, Mapping):
-        return {key: _piece(each, f"{path}.{key}", unit, kind) for key, each in value.items()}
+        return {key: _piece(entry, f"{path}.{key}", unit, kind) for key, entry in value.items()}
     if unit and (isinstance(value, list | tuple) or bool(getattr(value, "ndim", False))):
         place = path if ".value." in path else f"{path}.value"
-        return [_piece(each, f"{place}.{k}", unit, kind) for k, each in enumerate(value)]
+        return [_piece(entry, f"{place}.{k}", unit, kind) for k, entry in enumerate(value)]
     if unit:
         return Number(value if type(value) is int else finite(value), unit, kind, path)
     if isinstance(value, list | tuple):
-        return [_piece(each, f"{path}.{k}") for k, each in enumerate(value)]
+        return [_piece(entry, f"{path}.{k}") for k, entry in enumerate(value)]
     if isinstance(value, str):
         return Words(str(value), path)
     return _Cited(value, path) if is_dataclass(value) else value

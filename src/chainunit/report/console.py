@@ -63,8 +63,8 @@ def carry_out(
         has_remarks = task.tells_remarks and errors.is_terminal and console.is_terminal
         if whole:
             terminal.show(report, console, remarks=not has_remarks)
-            words = ", ".join(printable(str(path), 500) for path in written)
-            console.print(f"Written: {words}", soft_wrap=True)
+            paths = ", ".join(printable(str(path), 500) for path in written)
+            console.print(f"Written: {paths}", soft_wrap=True)
         else:
             names = ", ".join(printable(str(path.relative_to(output)), 500) for path in written[:_MOST_NAMES])
             names += f" and {len(written) - _MOST_NAMES} more" if len(written) > _MOST_NAMES else ""
@@ -116,8 +116,8 @@ def progress_bar(console: Console) -> Iterator[Callable[[str, float, float], Non
     def report(what: str, done: float, todo: float) -> None:
         bar.start()
         bar.update(task, description=what, completed=done, total=todo)
-        if words := forecast.words(monotonic(), what, done, todo):
-            console.print(printable(words, 500), soft_wrap=True)
+        if sentence := forecast.words(monotonic(), what, done, todo):
+            console.print(printable(sentence, 500), soft_wrap=True)
 
     try:
         yield report
@@ -137,10 +137,10 @@ class Forecast:
         for this amount of work; else empty."""
         if todo != self._todo:
             self._todo, self._begin, self._first, self._is_told = todo, now, done, False
-        spent, made = now - self._begin, done - self._first
-        if self._is_told or spent < _SURE or made <= 0.0:
+        spent, progress = now - self._begin, done - self._first
+        if self._is_told or spent < _SURE or progress <= 0.0:
             return ""
-        left = spent * (todo - done) / made
+        left = spent * (todo - done) / progress
         if left < _LONG:
             return ""
         self._is_told = True

@@ -65,13 +65,13 @@ class _Canvas:
         text: str,
         places: list[Point],
         lines: list[tuple[Point, Point]],
-        own: Collection[tuple[Point, Point]] = (),
+        own_lines: Collection[tuple[Point, Point]] = (),
         **look: Any,
     ) -> None:
         """Draw a label. `places` are the candidates for its middle; it gets the first one that is clear of other
-        labels and of the `lines`, before others one that is nearest to its `own` lines."""
+        labels and of the `lines`, before others one that is nearest to its `own_lines`."""
         boxes = [_box(text, place) for place in places]
-        nearest, nearest_own = _from_lines(boxes, lines), _from_lines(boxes, own)
+        nearest, nearest_own = _from_lines(boxes, lines), _from_lines(boxes, own_lines)
         clear = [
             min(
                 *[_gap(box, other) for other in self.label_boxes],
@@ -82,7 +82,7 @@ class _Canvas:
             for box, from_lines in zip(boxes, nearest, strict=True)
         ]
         free = [k for k, room in enumerate(clear) if room >= 3.0]
-        beside = (k for k in free if own and nearest_own[k] <= nearest[k])
+        beside = (k for k in free if own_lines and nearest_own[k] <= nearest[k])
         # the first of the places that has room enough, else the one with most
         best = next(beside, free[0] if free else int(np.argmax(clear)))
         self.label_boxes.append(boxes[best])
@@ -123,13 +123,13 @@ def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
     of a ground pin."""
     layout, model = machine.model.parameter_layout, machine.model
     marks = {v.name: 1.0 + k / 7919.0 for k, v in enumerate(layout.variables)}
-    of = {value: name for name, value in marks.items()}
+    parameter_names = {value: name for name, value in marks.items()}
     variables = {v.name: v for v in layout.variables}
     marked_linkage = model.linkage(MATH, layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
     values = layout.by_name(machine.p)
 
     def dimension_of(x: Any) -> Dimension | None:
-        name = of.get(abs(float(x)))
+        name = parameter_names.get(abs(float(x)))
         v = variables.get(name or "")
         return None if v is None or v.unit != "m" else Dimension(v.name, v.description, values[v.name])
 
@@ -141,7 +141,7 @@ def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
                 matches["point", bar.name, name] = dimension_of(s)
     for pin, place in marked_linkage.ground.items():
         matches["x", pin], matches["y", pin] = dimension_of(place.x), dimension_of(place.y)
-    return {key: each for key, each in matches.items() if each is not None}
+    return {key: dimension for key, dimension in matches.items() if dimension is not None}
 
 
 def drawing(machine: Machine, phi: float | None = None) -> str:
@@ -160,8 +160,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     ways = linkage.rails(orbit)
     ends = [end for way in ways.values() for end in way]
     to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end]), *ends])
-    at = {name: to_page(place) for name, place in places.items()}
-    links = [_straightened(link, at) for link in linkage.links(whole.linkage, {})]
+    page_points = {name: to_page(place) for name, place in places.items()}
+    links = [_straightened(link, page_points) for link in linkage.links(whole.linkage, {})]
     sizes = dimensions(machine)
     canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
     for way in ways.values():
@@ -169,8 +169,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     if isinstance(crank, Crank):
         # the circle of the crank pin, or its arc
         # a link with its bearing alone, such as a drum or a fan, is a disc of any size
-        radius = math.dist(at[crank.bar.pin], at[crank.end]) or _DISC
-        x, y = at[crank.bar.pin]
+        radius = math.dist(page_points[crank.bar.pin], page_points[crank.end]) or _DISC
+        x, y = page_points[crank.bar.pin]
         look = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
         if machine.model.turns:
             canvas.add("circle", cx=x, cy=y, r=radius, **look)
@@ -179,30 +179,37 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
             canvas.add("polyline", points=" ".join(f"{x:.2f},{y:.2f}" for x, y in arc), **look)
     hanging = linkage.hanging(orbit)
     for pin in whole.linkage.ground:
-        if pin in at:
-            _support(canvas, at[pin], -1.0 if pin in hanging else 1.0)
-    lines = [(at[a], at[b]) for link in links for a, b in _sides(link)]
+        if pin in page_points:
+            _support(canvas, page_points[pin], -1.0 if pin in hanging else 1.0)
+    lines = [(page_points[a], page_points[b]) for link in links for a, b in _sides(link)]
     for link in links:
         colour, weight = _LOOKS[link.look]
         tag, more = ("polygon", {"fill": "#dfe8ee"}) if link.closed else ("polyline", {"fill": "none"})
-        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in (at[joint] for joint in link.joints))
+        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in (page_points[joint] for joint in link.joints))
         canvas.add(tag, points=points, stroke=colour, stroke_width=weight, stroke_linejoin="round",
                    stroke_linecap="round", **more)  # fmt: skip
-    for name, place in at.items():
+    for name, place in page_points.items():
         if any(name in link.joints for link in links):
             canvas.add(
                 "circle", cx=place[0], cy=place[1], r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2
             )
             canvas.label_boxes.append((place[0] - 6, place[1] - 6, place[0] + 6, place[1] + 6))
     for (pin, _), slide in whole.slides.items():
-        _block(canvas, at[pin], math.atan2(-slide.d.y, slide.d.x))
+        _block(canvas, page_points[pin], math.atan2(-slide.d.y, slide.d.x))
     if isinstance(crank, Crank):
-        _angle(canvas, at[crank.bar.pin], phi, radius, math.atan2(crank.start.y, crank.start.x), crank.sense)
-    of = {link.name: link for link in links}
+        _angle(
+            canvas,
+            page_points[crank.bar.pin],
+            phi,
+            radius,
+            math.atan2(crank.start.y, crank.start.x),
+            crank.sense,
+        )
+    drawn_links = {link.name: link for link in links}
     for symbol, link_name in machine.model.angles.items():
-        _swing(canvas, at, of[link_name], symbol)
-    lines += _sizes(canvas, sizes, at, to_page((0.0, 0.0)), whole, hanging)
-    for name, place in at.items():
+        _swing(canvas, page_points, drawn_links[link_name], symbol)
+    lines += _sizes(canvas, sizes, page_points, to_page((0.0, 0.0)), whole, hanging)
+    for name, place in page_points.items():
         if "." in name:  # another name stands at the same place
             continue
         around = [
@@ -213,9 +220,9 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
         if len(link.joints) < 2:
             continue
         size = sizes.get(("link", link.name))
-        words = f"{_short(link.name)} {size.name}" if size else _short(link.name)
-        own = [(at[a], at[b]) for a, b in _sides(link)]
-        canvas.label(words, _beside(link, at), lines, own, fill=_LOOKS[link.look][0])
+        text = f"{_short(link.name)} {size.name}" if size else _short(link.name)
+        sides = [(page_points[a], page_points[b]) for a, b in _sides(link)]
+        canvas.label(text, _beside(link, page_points), lines, sides, fill=_LOOKS[link.look][0])
     _frame(canvas)
     _column(canvas, sizes, whole.linkage.ground)
     return _svg(canvas, f"{machine.model.noun}: pins, links and dimensions")
@@ -245,16 +252,16 @@ def _sides(link: DrawnLink) -> Iterator[tuple[str, str]]:
     yield from pairwise(joints)
 
 
-def _beside(link: DrawnLink, at: Mapping[str, Point]) -> list[Point]:
+def _beside(link: DrawnLink, page_points: Mapping[str, Point]) -> list[Point]:
     """Candidate places for the name of a link: first its middle, in it or beside it, then beside its sides."""
     places = []
     if link.closed:
-        corners = [at[joint] for joint in link.joints]
+        corners = [page_points[joint] for joint in link.joints]
         places = [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
     for t in (0.5, 0.4, 0.6, 0.3, 0.7):
         for away in (18.0, 26.0, 40.0):
             for a, b in _sides(link):
-                (x0, y0), (x1, y1) = at[a], at[b]
+                (x0, y0), (x1, y1) = page_points[a], page_points[b]
                 length = math.hypot(x1 - x0, y1 - y0)
                 # a block has no length, and stands free in any direction
                 turns = (0.5, 0.0, 0.25, 0.75) if length < 1.0 else ()
@@ -269,9 +276,9 @@ def _beside(link: DrawnLink, at: Mapping[str, Point]) -> list[Point]:
     return places
 
 
-def _support(canvas: _Canvas, at: Point, down: float) -> None:
+def _support(canvas: _Canvas, point: Point, down: float) -> None:
     """Draw the bearing of a ground pin: below the pin, or above it where links hang from it."""
-    x, y = at
+    x, y = point
     canvas.add("polygon", points=f"{x:.2f},{y:.2f} {x - 11:.1f},{y + 17 * down:.1f} {x + 11:.1f},{y + 17 * down:.1f}",
                fill="#ffffff", stroke="#777777", stroke_width=1.5)  # fmt: skip
     for k in range(-14, 14, 6):
@@ -282,16 +289,16 @@ def _support(canvas: _Canvas, at: Point, down: float) -> None:
     canvas.label_boxes.append((x - 15, min(y, y + 23 * down), x + 15, max(y, y + 23 * down)))
 
 
-def _angle(canvas: _Canvas, at: Point, phi: float, radius: float, zero: float, sense: float) -> None:
+def _angle(canvas: _Canvas, centre: Point, phi: float, radius: float, zero: float, sense: float) -> None:
     """Draw the crank angle: an arc with an arrow from the direction `zero` [rad], where it is 0; it counts
     counter-clockwise where `sense` is +1."""
 
     def on_arc(angle: float, r: float) -> Point:
-        return at[0] + r * math.cos(zero + sense * angle), at[1] - r * math.sin(zero + sense * angle)
+        return centre[0] + r * math.cos(zero + sense * angle), centre[1] - r * math.sin(zero + sense * angle)
 
     r = min(radius + 14.0, 70.0)
     (x0, y0), (x1, y1), (x2, y2) = on_arc(0.0, r), on_arc(phi, r), on_arc(0.0, r + 8.0)
-    canvas.add("line", x1=at[0], y1=at[1], x2=x2, y2=y2, stroke="#999999", stroke_dasharray="2 3")
+    canvas.add("line", x1=centre[0], y1=centre[1], x2=x2, y2=y2, stroke="#999999", stroke_dasharray="2 3")
     canvas.add("path", d=f"M {x0:.1f} {y0:.1f} A {r:.1f} {r:.1f} 0 0 {int(sense < 0.0)} {x1:.1f} {y1:.1f}",
                fill="none", stroke="#c1440e", stroke_width=1.5, marker_end="url(#drawing-tip)")  # fmt: skip
     for k in range(4):
@@ -316,11 +323,12 @@ def _rail(canvas: _Canvas, a: Point, b: Point) -> None:
                        y2=y + out * across[1] - 5 * along[1], stroke="#777777")  # fmt: skip
 
 
-def _block(canvas: _Canvas, at: Point, angle: float) -> None:
+def _block(canvas: _Canvas, centre: Point, angle: float) -> None:
     """Draw a sliding block with its line at this angle in the picture."""
     c, s = math.cos(angle), math.sin(angle)
     corners = [
-        (at[0] + c * x - s * y, at[1] + s * x + c * y) for x, y in ((-13, -7), (13, -7), (13, 7), (-13, 7))
+        (centre[0] + c * x - s * y, centre[1] + s * x + c * y)
+        for x, y in ((-13, -7), (13, -7), (13, 7), (-13, 7))
     ]
     points = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
     canvas.add("polygon", points=points, fill="none", stroke="#1b1b1b", stroke_width=1.5)
@@ -338,23 +346,23 @@ def _frame(canvas: _Canvas) -> None:
         canvas.add("text", name, x=x + 1.35 * dx, y=y + 1.35 * dy + 4, fill="#555555", text_anchor="middle")
 
 
-def _straightened(link: DrawnLink, at: Mapping[str, Point]) -> DrawnLink:
+def _straightened(link: DrawnLink, page_points: Mapping[str, Point]) -> DrawnLink:
     """The link as it is drawn. A closed link whose pins lie on one line becomes a line from its first pin to the
     furthest one."""
     if not link.closed:
         return link
-    (x0, y0), *others = (at[joint] for joint in link.joints)
+    (x0, y0), *others = (page_points[joint] for joint in link.joints)
     across = [(x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0) for x1, y1 in others for x2, y2 in others]
     if max(map(abs, across)) > 1.0:
         return link
-    joints = sorted(link.joints, key=lambda joint: math.dist(at[link.joints[0]], at[joint]))
+    joints = sorted(link.joints, key=lambda joint: math.dist(page_points[link.joints[0]], page_points[joint]))
     return replace(link, joints=tuple(joints), closed=False)
 
 
-def _swing(canvas: _Canvas, at: Mapping[str, Point], link: DrawnLink, name: str) -> None:
+def _swing(canvas: _Canvas, page_points: Mapping[str, Point], link: DrawnLink, name: str) -> None:
     """Draw the angle of a link from the downward vertical, positive towards +x."""
-    x, y = at[link.joints[0]]
-    end = at[link.joints[-1]]
+    x, y = page_points[link.joints[0]]
+    end = page_points[link.joints[-1]]
     r = 0.45 * math.dist((x, y), end)
     angle = math.atan2(end[0] - x, end[1] - y)
     canvas.add("line", x1=x, y1=y, x2=x, y2=y + r + 14, stroke="#999999", stroke_dasharray="2 3")
@@ -369,7 +377,7 @@ def _swing(canvas: _Canvas, at: Mapping[str, Point], link: DrawnLink, name: str)
 def _sizes(
     canvas: _Canvas,
     sizes: Mapping[tuple[str, ...], Dimension],
-    at: Mapping[str, Point],
+    page_points: Mapping[str, Point],
     origin: Point,
     whole: Mechanism,
     hanging: Collection[str],
@@ -377,21 +385,21 @@ def _sizes(
     """Draw the dimensions that are not the length of a link: places of ground pins from the origin of the frame, and
     places of points along a link. Returns their lines."""
     lines: list[tuple[Point, Point]] = []
-    for (kind, *of), size in sizes.items():
-        if "." in size.name or kind == "link" or of[-1] not in at:
+    for (kind, *names), size in sizes.items():
+        if "." in size.name or kind == "link" or names[-1] not in page_points:
             continue
         if kind == "point":
-            link, point = of
-            a, b = at[whole.topology.links[link][0]], at[point]
+            link, point = names
+            a, b = page_points[whole.topology.links[link][0]], page_points[point]
             length = math.dist(a, b) or 1.0
             off = (-(a[1] - b[1]) / length * 18.0, (a[0] - b[0]) / length * 18.0)
             ends = (a[0] + off[0], a[1] + off[1]), (b[0] + off[0], b[1] + off[1])
         elif kind == "x":
-            x, y = at[of[0]]
-            level = y - 34.0 if of[0] in hanging else y + 62.0
+            x, y = page_points[names[0]]
+            level = y - 34.0 if names[0] in hanging else y + 62.0
             ends = (origin[0], level), (x, level)
         else:
-            x, y = at[of[0]]
+            x, y = page_points[names[0]]
             ends = (x - 44.0, origin[1]), (x - 44.0, y)
         _line(canvas, *ends, size.name)
         lines.append(ends)
@@ -420,16 +428,17 @@ def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground:
     for pin, place in ground.items():
         if "." in getattr(sizes.get(("x", pin)), "name", ""):
             first, second = (
-                number(float(each), "m", "millimetres", 4, full=False) for each in (place.x, place.y)
+                number(float(coordinate), "m", "millimetres", 4, full=False)
+                for coordinate in (place.x, place.y)
             )
             rows.append((pin, f"{first.removesuffix(' mm')}, {second}", "bearing: x, y in the frame"))
     x, y = WIDTH + 4.0, 40.0
     # beside the longest name there is room for the values
     right = max([116.0, *(7.0 * len(name) + 66.0 for name, _, _ in rows)])
-    for name, value, words in rows:
+    for name, value, description in rows:
         canvas.add("text", name, x=x, y=y, font_style="italic", fill="#1b1b1b")
         canvas.add("text", value, x=x + right, y=y, text_anchor="end", fill="#1b1b1b")
-        for line in textwrap.wrap(words, max(16, 36 - int((right - 116.0) / 6.0))):
+        for line in textwrap.wrap(description, max(16, 36 - int((right - 116.0) / 6.0))):
             canvas.add("text", line, x=x + right + 10.0, y=y, fill="#555555", font_size="11.5")
             y += 15.0
         y += 7.0

@@ -168,11 +168,11 @@ class Figure:
 
     def sharing(self, row: int, column: int) -> list[int]:
         """The unbroken rows around `row` in which the panel of this column has the same x axis as that of `row`."""
-        panels = [each[column] for each in self.panels]
-        own = panels[row]
-        if own is None:
+        panels = [panel_row[column] for panel_row in self.panels]
+        reference = panels[row]
+        if reference is None:
             return []
-        alike = [panel is not None and panel.x == own.x for panel in panels]
+        alike = [panel is not None and panel.x == reference.x for panel in panels]
         first = max((r + 1 for r in range(row) if not alike[r]), default=0)
         last = next((r for r in range(row, len(panels)) if not alike[r]), len(panels))
         return list(range(first, last))
@@ -274,7 +274,7 @@ def in_units(figure: Figure, units: Units) -> Figure:
         return replace(original, x=x, y=y, items=tuple(items))
 
     rows = enumerate(figure.panels)
-    return replace(figure, panels=tuple(tuple(each and panel(each, r) for each in row) for r, row in rows))
+    return replace(figure, panels=tuple(tuple(place and panel(place, r) for place in row) for r, row in rows))
 
 
 def _shared(figure: Figure, on: str, axis: Axis, row: int) -> tuple[Any, ...]:

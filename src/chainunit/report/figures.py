@@ -54,7 +54,9 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
             )
             for name, run in runs.items()
         ]
-        slowest, fastest = (float(of([of(curve.x) for curve in curves])) for of in (np.min, np.max))
+        slowest, fastest = (
+            float(extreme([extreme(curve.x) for curve in curves])) for extreme in (np.min, np.max)
+        )
         room = 0.15 * (fastest - slowest)
         low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
         w = np.linspace(low, fastest + room, 301)
@@ -104,8 +106,8 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
     if organs:
         torques["rocker"] = lambda c: c.outputs.rocker.tau
     items: dict[fig.Axis, list[fig.Item]] = {}
-    for of, torque in torques.items():
-        curves = items[fig.Axis(f"{of} torque", "N.m")] = []
+    for part, torque in torques.items():
+        curves = items[fig.Axis(f"{part} torque", "N.m")] = []
         for look, (name, c) in enumerate(study.statics.cycles.items()):
             y = np.broadcast_to(torque(c), c.angle.shape)
             curves.append(fig.Curve(name, np.append(c.angle, 2.0 * math.pi), np.append(y, y[0]), look))
@@ -160,17 +162,18 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
         (time, fig.Axis("speed deviation", "rad/(N.m.s)"), "time", "deviation", "Disturbance step"),
     )
 
-    def items(over: str, of: str) -> Iterator[fig.Item]:
+    def items(over: str, ordinate: str) -> Iterator[fig.Item]:
         yield from (
-            fig.Curve(name, getattr(loop, over), getattr(loop, of), look) for look, (name, loop) in loops
+            fig.Curve(name, getattr(loop, over), getattr(loop, ordinate), look)
+            for look, (name, loop) in loops
         )
-        if of == "gain":
+        if ordinate == "gain":
             yield fig.Mark(1.0, axis="y", look="thin")
-        if of == "phase":
+        if ordinate == "phase":
             yield fig.Mark(-180.0, axis="y", look="thin")
-        if of in ("gain", "phase"):
+        if ordinate in ("gain", "phase"):
             yield fig.Mark(narrowest.crossover, "crossover", look="mark")
-        if of == "phase":
+        if ordinate == "phase":
             margin = narrowest.phase_margin
             yield fig.Label(narrowest.crossover, -180.0 + margin, f"margin {number(margin, 'deg')}", "left")
 
@@ -179,7 +182,11 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
         "The speed loop, linearised",
         "Gain and phase of the open speed loop over the frequency, and the deviation of the motor speed after a step "
         "of the load torque.",
-        (tuple(fig.Panel(x, y, tuple(items(over, of)), title) for x, y, over, of, title in panels),),
+        (
+            tuple(
+                fig.Panel(x, y, tuple(items(over, ordinate)), title) for x, y, over, ordinate, title in panels
+            ),
+        ),
         heights=(1.4,),
     )
 
@@ -205,9 +212,11 @@ def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
     ]
     rows: list[list[fig.Panel | None]] = []
     for group in groups:
-        for k in range(min(3, *(len(each.panels) for each in group))):
-            panels = ((each, each.panels[k][0]) for each in group)
-            rows.append([panel and replace(panel, title="" if k else each.title) for each, panel in panels])
+        for k in range(min(3, *(len(figure.panels) for figure in group))):
+            panels = ((figure, figure.panels[k][0]) for figure in group)
+            rows.append(
+                [panel and replace(panel, title="" if k else figure.title) for figure, panel in panels]
+            )
     widest = max(map(len, rows))
     return fig.Figure(
         "overloads",
@@ -249,11 +258,11 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
         # a quarter turn before the event shows enough of steady running
         before = 0.5 * math.pi / study.config.run.crank_speed
         low = max(low, -before if coasting is None else -min(before, 0.5 * high))
-    marks, words = _marks(study, name, event), run_names.title(study, name)
+    marks, title = _marks(study, name, event), run_names.title(study, name)
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
-        words,
-        f"{capital(driver)} torque, {driver} speed and motor current over time: {words}."
+        title,
+        f"{capital(driver)} torque, {driver} speed and motor current over time: {title}."
         + ("" if event is None else " The event is marked by a dashed line; the loads change in the shade."),
         fig.stacked(
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
@@ -279,16 +288,16 @@ def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool
     """The function that gives the marks in a panel of a run; its argument says whether the marks have words."""
     run = study.runs[name]
 
-    def marks(words: bool) -> list[fig.Item]:
+    def marks(labelled: bool) -> list[fig.Item]:
         if event is not None:
             loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
             changing = _load_change(
                 run, [*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"]
             )
             shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
-            return [*shade, fig.Mark(0.0, words="event" if words else "")]
+            return [*shade, fig.Mark(0.0, words="event" if labelled else "")]
         if name == "start_up" and study.answers:
-            return [fig.Mark(study.steady_begin, words="steady from here" if words else "")]
+            return [fig.Mark(study.steady_begin, words="steady from here" if labelled else "")]
         return []
 
     return marks
@@ -354,9 +363,9 @@ def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
         (f"{of_run}: RMS", -0.2, [steady[pin]["rms"] for pin in pins], 0.14, 0, True, ()),
     ]
     if len(study.pins) > 1:
-        words = tuple(study.title_of(largest[pin]) for pin in pins)
+        titles = tuple(study.title_of(largest[pin]) for pin in pins)
         peaks = [study.pins[largest[pin]][pin]["peak"] for pin in pins]
-        bars.append(("largest peak of all runs", 0.2, peaks, 0.38, 1, False, words))
+        bars.append(("largest peak of all runs", 0.2, peaks, 0.38, 1, False, titles))
     items = tuple(
         fig.Bars(name, places + shift, sizes, height, look, slim=slim, words=beside)
         for name, shift, sizes, height, look, slim, beside in bars

@@ -169,8 +169,8 @@ def marks(block: b.Given) -> str:
     """The legend of the marks that stand beside given values."""
     origins = {value.origin for _, values in block.sections for value in values} - {"", "file", "linkage"}
     others = sorted(origins - _ORIGIN.keys(), key=lambda origin: origin == "declared")
-    words = (f"{o[0]}: {_origin_words(o)}" for o in (*_ORIGIN, *others) if o in origins)
-    return f'<p class="hint marks">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
+    entries = (f"{o[0]}: {_origin_words(o)}" for o in (*_ORIGIN, *others) if o in origins)
+    return f'<p class="hint marks">Not in the study file: {"; ".join(entries)}.</p>' if origins else ""
 
 
 def _kind(block: b.Block) -> str:
@@ -193,16 +193,16 @@ class Page:
     def number(self, n: Number) -> str:
         """A number as an element that holds its place in the result and its value there."""
         if n.value is None:
-            words = f'<span class="none">{escape(n.none)}</span>'
+            text = f'<span class="none">{escape(n.none)}</span>'
         else:
             digits = n.digits or (6 if n.as_given else 3)
             first, *others = forms(n.value, n.unit, n.kind, digits, full=not n.as_given, units=self.units)
-            words = ("▲ " if n.over else "") + self._form(*first)
-            words += "".join(f' <span class="beside">{self._form(*other)}</span>' for other in others)
+            text = ("▲ " if n.over else "") + self._form(*first)
+            text += "".join(f' <span class="beside">{self._form(*other)}</span>' for other in others)
         exact = "no value" if n.value is None else f"{n.value:.9g}" + ("" if n.unit == "1" else f" {n.unit}")
         element = (
             f'<data class="n" data-path="{escape(n.path)}" value="{json.dumps(n.value)}" '
-            f'title="{escape(f"{n.path}: {exact}")}">{words}</data>'
+            f'title="{escape(f"{n.path}: {exact}")}">{text}</data>'
         )
         return f"<strong>{element}</strong>" if n.over else element
 
@@ -240,7 +240,7 @@ class Page:
                 html = [f'<ul class="verdicts">{"".join(html)}</ul>']
             elif kind == "figures" and any(html):
                 html = [_PLOTS.format("".join(html))]
-            parts += [each for each in html if each]
+            parts += [text for text in html if text]
         return "\n".join(parts)
 
     def block(self, block: b.Block) -> str:
@@ -295,7 +295,7 @@ class Page:
         )
         return (
             f'<article class="card"><h3>{escape(card.title)}</h3><div class="figures">{figures}</div>'
-            + "".join(f'<p class="also">{self.line(each)}</p>' for each in card.also)
+            + "".join(f'<p class="also">{self.line(line)}</p>' for line in card.also)
             + "</article>"
         )
 
@@ -344,8 +344,8 @@ class Page:
         share = cell.utilisation.value or 0.0
         width = 100.0 * min(max(share, 0.0), 1.5) / 1.5
         bar = f'<span class="bar" aria-hidden="true"><span style="width:{width:.1f}%"></span></span>'
-        of = f'<span class="of">{self.line(cell.of)}</span>' if cell.of else ""
-        return self.number(cell.utilisation) + bar + of
+        suffix = f'<span class="of">{self.line(cell.of)}</span>' if cell.of else ""
+        return self.number(cell.utilisation) + bar + suffix
 
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
         rows = "".join(

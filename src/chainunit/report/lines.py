@@ -69,7 +69,7 @@ def line(*parts: Line) -> tuple[Piece, ...]:
 
 def join(lines: Iterable[Line], between: str = ", ") -> tuple[Piece, ...]:
     """One line from several lines, with `between` between two of them."""
-    return line(*(part for each in lines for part in (between, each)))[1:]
+    return line(*(part for entry in lines for part in (between, entry)))[1:]
 
 
 def capital(text: str) -> str:

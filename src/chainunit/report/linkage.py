@@ -33,9 +33,9 @@ def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, 
     for connections in turn.topology.groups:
         for joint, carrier, _ in connections.joints:
             if joint in turn.slides and carrier is None:
-                at, d = turn.pins[joint[0]].p, turn.slides[joint].d
+                place, d = turn.pins[joint[0]].p, turn.slides[joint].d
                 s = np.atleast_1d(turn.slides[joint].s)
-                x, y = (np.broadcast_to(v, s.shape) for v in (at.x, at.y))
+                x, y = (np.broadcast_to(v, s.shape) for v in (place.x, place.y))
                 low, high = int(np.argmin(s)), int(np.argmax(s))
                 margin = 0.25 * float(np.ptp(s)) + 1e-9
                 dx, dy = (float(np.atleast_1d(v)[0]) * margin for v in (d.x, d.y))
@@ -48,13 +48,13 @@ def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, 
 def paths(turn: Mechanism, further: str = "") -> dict[str, tuple[Any, Any]]:
     """The paths of all points that are not pins, and of one `further` point [m]; `turn` is the mechanism over the
     whole way of its driver."""
-    topology, at = turn.topology, places(turn)
+    topology, positions = turn.topology, places(turn)
     pins = {pin for pin, _ in topology.joints}
     return {
-        f"path of {point}": at[point]
+        f"path of {point}": positions[point]
         for points in topology.points.values()
         for point in points
-        if point in at and (point not in pins or point == further)
+        if point in positions and (point not in pins or point == further)
     }
 
 
@@ -62,14 +62,14 @@ def hanging(turn: Mechanism) -> tuple[str, ...]:
     """The ground pins from which links hang, so that their supports are drawn above; `turn` is the mechanism over a
     whole turn."""
     low: dict[str, list[float]] = {}
-    at = places(turn)
+    positions = places(turn)
     for pins in turn.topology.links.values():
         for pin in pins:
             if pin in turn.linkage.ground:
-                ends = (end for end in pins if end != pin and end in at)
-                low.setdefault(pin, []).extend(float(np.mean(at[end][1])) for end in ends)
-    span = max(float(np.ptp([np.mean(y) for _, y in at.values()])), 1e-9)
-    return tuple(pin for pin, ends in low.items() if ends and np.mean(ends) < at[pin][1] - 0.1 * span)
+                ends = (end for end in pins if end != pin and end in positions)
+                low.setdefault(pin, []).extend(float(np.mean(positions[end][1])) for end in ends)
+    span = max(float(np.ptp([np.mean(y) for _, y in positions.values()])), 1e-9)
+    return tuple(pin for pin, ends in low.items() if ends and np.mean(ends) < positions[pin][1] - 0.1 * span)
 
 
 def blocks(mechanism: Mechanism) -> dict[str, Any]:

@@ -33,10 +33,10 @@ def load_arrows(state: MachineState) -> Iterator[Arrow]:
             points = {link: pin for link, pin in load.ends if link is not None}
         for wrench in effect.wrenches:
             if wrench.link in points:
-                at = points[wrench.link]
+                joint = points[wrench.link]
                 # a further point of a link at a pin has its place under the name of the pin
-                at = at if at in shown else at.rpartition(".")[2]
-                yield Arrow(title, at, wrench.force.x, wrench.force.y, short=title, load=True)
+                joint = joint if joint in shown else joint.rpartition(".")[2]
+                yield Arrow(title, joint, wrench.force.x, wrench.force.y, short=title, load=True)
 
 
 def loads_on_slides(state: MachineState) -> dict[str, tuple[Any, Any]]:
@@ -48,12 +48,12 @@ def loads_on_slides(state: MachineState) -> dict[str, tuple[Any, Any]]:
     along: dict[str, tuple[Any, Any]] = {}
     for connections in m.topology.groups:
         for joint, carrier, _ in connections.joints:
-            own = [wrench.force for wrench in wrenches if wrench.link == joint[1]]
-            if joint in m.slides and carrier is None and own:
-                slide, at = m.slides[joint], m.pins[joint[0]].p
+            forces = [wrench.force for wrench in wrenches if wrench.link == joint[1]]
+            if joint in m.slides and carrier is None and forces:
+                slide, place = m.slides[joint], m.pins[joint[0]].p
                 way, force = (
                     np.broadcast_to(x, np.shape(m.q))
-                    for x in (slide.d.dot(at), sum(f.dot(slide.d) for f in own))
+                    for x in (slide.d.dot(place), sum(f.dot(slide.d) for f in forces))
                 )
                 along[joint[1]] = way, force
     return along
@@ -72,10 +72,10 @@ def force_over_stroke(
     runs = {name: loads_on_slides(state) for name, state in states.items()}
     panels = []
     for link in next(iter(runs.values()), {}):
-        least = min(float(np.min(of[link][0])) for of in runs.values())
+        least = min(float(np.min(slides[link][0])) for slides in runs.values())
         curves = tuple(
-            fig.Curve(titles[name], of[link][0] - least, of[link][1], look, in_legend=len(runs) > 1)
-            for look, (name, of) in enumerate(runs.items())
+            fig.Curve(titles[name], slides[link][0] - least, slides[link][1], look, in_legend=len(runs) > 1)
+            for look, (name, slides) in enumerate(runs.items())
         )
         x = fig.Axis(f"way of {link} from its least place", "m", "millimetres")
         forces = [0.0, *(end for curve in curves for end in (np.min(curve.y), np.max(curve.y)))]

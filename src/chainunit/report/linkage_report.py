@@ -114,9 +114,9 @@ def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
         "degrees_of_freedom": 1,
         "speed": _entry(f.speed, unit("rad/s")),
         **_forces_of(f),
-        "groups": {name: _of(f, each, ("margin_at",)) for name, each in f.groups.items()},
-        "strokes": {name: _of(f, each, at_driver) for name, each in f.strokes.items()},
-        "swings": {name: _of(f, each, at_driver) for name, each in f.swings.items()},
+        "groups": {name: _of(f, group, ("margin_at",)) for name, group in f.groups.items()},
+        "strokes": {name: _of(f, stroke, at_driver) for name, stroke in f.strokes.items()},
+        "swings": {name: _of(f, swing, at_driver) for name, swing in f.swings.items()},
         "dead_centres": {name: _entry(places, unit("rad")) for name, places in f.dead_centres.items()},
         "angles": angles,
         "points": points,
@@ -130,14 +130,17 @@ def _forces_of(f: LinkageFindings) -> dict[str, Any]:
     """Effort at the driver, and reactions."""
     return {
         "turn": _of(f, f.turn, Layout(type(f.turn)).names),
-        "joints": {name: _of(f, each, ("peak_at",)) for name, each in f.joints.items()},
+        "joints": {name: _of(f, joint, ("peak_at",)) for name, joint in f.joints.items()},
     }
 
 
 def _over_the_way(f: LinkageFindings) -> dict[str, Any]:
     """Effort and inertia at each place."""
     unit = f.machine.model.driver_port.unit
-    return {name: array_entry(f.outputs[name], unit(of)) for name, of in (("tau", "N.m"), ("J", "kg.m2"))}
+    return {
+        name: array_entry(f.outputs[name], unit(rotary_unit))
+        for name, rotary_unit in (("tau", "N.m"), ("J", "kg.m2"))
+    }
 
 
 def _opening(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
@@ -153,12 +156,12 @@ def _opening(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
 
 
 def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
-    for path, motions, of in (
+    for path, motions, nouns in (
         ("strokes", f.strokes, ("sliding joint", "stroke", "way")),
         ("swings", f.swings, ("link", "swing", "angle")),
     ):
         if motions:
-            yield _ends(s, f, path, *of)
+            yield _ends(s, f, path, *nouns)
             yield from _reversals(s, f, path)
     if f.machine.model.turns and (f.strokes or f.swings):
         yield b.Text(
@@ -169,17 +172,15 @@ def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
         )
     still = [name for name in f.description.structure.links if name not in f.swings]
     turning = [name for name in still if f.description.link_turns[name][0]]
-    for links, words in (
+    for links, phrases in (
         (turning, ("turns all the way round", "turn all the way round")),
         ([name for name in still if name not in turning], ("does not turn", "do not turn")),
     ):
         if links:
-            yield b.Text(line(join(map(Name, links)), f" {words[len(links) > 1]}."))
+            yield b.Text(line(join(map(Name, links)), f" {phrases[len(links) > 1]}."))
     names = Layout(GroupTurn).names
     rows = (
-        b.TableRow(
-            (join(map(Name, name.split(", "))), *(s.number(f"groups.{name}.{each}") for each in names))
-        )
+        b.TableRow((join(map(Name, name.split(", "))), *(s.number(f"groups.{name}.{key}") for key in names)))
         for name in f.groups
     )
     if f.groups:
@@ -209,7 +210,7 @@ def _ends(s: b.Source, f: LinkageFindings, path: str, head: str, whole: str, way
                     *(s.number(f"{path}.{name}.{key}") for _, key in columns)))
         for name in s.result[path]
     )  # fmt: skip
-    heads = [b.Column(words, form="long" if key == "forth" else "both") for words, key in columns]
+    heads = [b.Column(title, form="long" if key == "forth" else "both") for title, key in columns]
     return b.Table(rows, (b.Column(head), *heads), title=f"{capital(whole)}{' and dead centres' * turns}")
 
 
@@ -298,7 +299,7 @@ def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
         title = f"{capital(effort)}, power and {inertia_word} at the driver{on}"
         yield b.Table(s.rows(type(f.turn), f"{path}turn"), title=title, central=True)
         rows = (
-            b.TableRow((_title(f, name), *(s.number(f"{path}joints.{name}.{each}") for each in names)))
+            b.TableRow((_title(f, name), *(s.number(f"{path}joints.{name}.{key}") for key in names)))
             for name in f.joints
         )
         heads = b.heads("joint", "largest force", "at", "RMS", "largest moment")
@@ -330,17 +331,19 @@ def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.B
                 (
                     axis,
                     tuple(
-                        fig.Curve(way or axis.label, f.q, of(each), look, in_legend=bool(way) and k == 0)
-                        for look, (way, each) in enumerate(ways.items())
+                        fig.Curve(
+                            way or axis.label, f.q, reader(findings), look, in_legend=bool(way) and k == 0
+                        )
+                        for look, (way, findings) in enumerate(ways.items())
                     ),
                 )
-                for k, (axis, of) in enumerate(panels)
+                for k, (axis, reader) in enumerate(panels)
             ),
         ),
         file=PICTURES[1],
     )
     yield from linkage_loads.force_over_stroke(
-        {way: _state(f, f.q, each.speed) for way, each in ways.items()},
+        {way: _state(f, f.q, findings.speed) for way, findings in ways.items()},
         {way: f"on the way {way}" if way else "a turn at constant speed" for way in ways},
         PICTURES[3],
     )
@@ -349,14 +352,14 @@ def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.B
             fig.Curve(
                 name,
                 f.q,
-                np.hypot(each.outputs[f"{v}.fx"], each.outputs[f"{v}.fy"]),
+                np.hypot(findings.outputs[f"{v}.fx"], findings.outputs[f"{v}.fy"]),
                 look=k,
                 in_legend=way != "back",
             )
             for k, name in enumerate(f.joints)
             for v in [f.description.variable("joint", name)]
         )
-        for way, each in ways.items()
+        for way, findings in ways.items()
     }
     yield fig.Figure(
         "linkage-reactions", "Reactions over the way of the driver",

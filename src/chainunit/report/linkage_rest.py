@@ -30,15 +30,15 @@ _AT_DRIVER = frozenset(("place", "end", "holding", "stiffness", "inertia", "fric
 
 def rest_data(f: LinkageFindings) -> dict[str, Any]:
     """The data of a linkage at rest."""
-    found, unit = f.rest, f.machine.model.driver_port.unit
+    equilibria, unit = f.rest, f.machine.model.driver_port.unit
 
     def data(x: Any) -> dict[str, Any]:
         return {
-            name: each | {"unit": unit(each["unit"])} if name in _AT_DRIVER else each
-            for name, each in as_data(x).items()
+            name: entry | {"unit": unit(entry["unit"])} if name in _AT_DRIVER else entry
+            for name, entry in as_data(x).items()
         }
 
-    rest = found.rest
+    rest = equilibria.rest
     columns = (
         ("driver", rest.q, "rad"),
         ("holding", rest.holding, "N.m"),
@@ -46,24 +46,25 @@ def rest_data(f: LinkageFindings) -> dict[str, Any]:
     )
     potential = {} if rest.potential is None else {"potential": array_entry(rest.potential, "J")}
     return {
-        "equilibria": [data(each) for each in found.places],
-        "summary": data(found.summary),
-        "indifferent": found.indifferent,
-        "repeats": found.repeats,
-        "without_potential": [name.removeprefix("loads.") for name in found.driven],
+        "equilibria": [data(equilibrium) for equilibrium in equilibria.places],
+        "summary": data(equilibria.summary),
+        "indifferent": equilibria.indifferent,
+        "repeats": equilibria.repeats,
+        "without_potential": [name.removeprefix("loads.") for name in equilibria.driven],
         "by_speed": loads_by_speed(f.description.data["loads"]),
-        "over_the_way": {name: array_entry(x, unit(of)) for name, x, of in columns} | potential,
+        "over_the_way": {name: array_entry(x, unit(rotary_unit)) for name, x, rotary_unit in columns}
+        | potential,
     }
 
 
 def at_rest(s: b.Source, f: LinkageFindings, file: str) -> Iterator[b.Block]:
     """The section of the report; `file` is the name of its picture."""
-    found = f.rest
+    equilibria = f.rest
     effort = "force" if f.machine.model.slides else "torque"
-    if found.indifferent:
+    if equilibria.indifferent:
         yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
         return
-    if bool(np.all(np.abs(found.rest.holding) <= found.rest.friction)):
+    if bool(np.all(np.abs(equilibria.rest.holding) <= equilibria.rest.friction)):
         text = "At rest the machine stays wherever it is: friction of pins and guides holds more, at most {most}, "
         text += f"than the holding {effort}, at most {{holding}}."
         most = {"most": s.number("rest.summary.friction"), "holding": s.number("rest.summary.peak")}
@@ -83,13 +84,13 @@ def at_rest(s: b.Source, f: LinkageFindings, file: str) -> Iterator[b.Block]:
 
 def _table(s: b.Source, f: LinkageFindings, effort: str) -> b.Table:
     rows = []
-    for k, each in enumerate(f.rest.places):
+    for k, equilibrium in enumerate(f.rest.places):
         path = f"rest.equilibria.{k}"
         place: Line = s.number(f"{path}.place")
-        if each.kind == INDIFFERENT:
+        if equilibrium.kind == INDIFFERENT:
             place = line(place, " to ", s.number(f"{path}.end"))
         keys = ("stiffness", "natural_frequency", "inertia", "potential", "friction")
-        name = f"{k + 1}: {_KINDS[each.kind]}"
+        name = f"{k + 1}: {_KINDS[equilibrium.kind]}"
         rows.append(b.TableRow((name, place, *(s.number(f"{path}.{key}") for key in keys))))
     columns = (
         *b.heads("equilibrium", "at", "stiffness", "natural frequency"),
@@ -106,9 +107,9 @@ def _names(names: Collection[str]) -> Line:
 
 def _notes(s: b.Source, f: LinkageFindings, effort: str) -> Iterator[b.Block]:
     """What the numbers do not say by themselves."""
-    data, found = s.result["rest"], f.rest
-    for k, each in enumerate(found.places):
-        if each.kind == STOP:
+    data, equilibria = s.result["rest"], f.rest
+    for k, equilibrium in enumerate(equilibria.places):
+        if equilibrium.kind == STOP:
             path = f"rest.equilibria.{k}"
             yield b.Text(
                 s.line(f"On its stop at {{{path}.place}} the driver rests with {{{path}.holding}} on it.")
@@ -133,19 +134,19 @@ def _notes(s: b.Source, f: LinkageFindings, effort: str) -> Iterator[b.Block]:
             "note",
             "long",
         )
-    if not found.repeats:
+    if not equilibria.repeats:
         yield b.Text(
             "The loads are not the same after a turn: the way is half a turn to either side of the start.",
             "note",
         )
-    elif found.rest.potential is None:
+    elif equilibria.rest.potential is None:
         yield b.Text(
             s.line(
                 "A turn takes {rest.summary.work} from the driver, without friction: no potential belongs to a place."
             ),
             "note",
         )
-    if found.summary.friction:
+    if equilibria.summary.friction:
         yield b.Text(
             s.line(
                 f"The holding {effort} is without friction. Where friction of pins and guides holds more, at most "
@@ -192,7 +193,7 @@ def _marks(f: LinkageFindings, values: Any, named: bool) -> Iterator[fig.Item]:
     rest = f.rest.rest
     low, high = float(rest.q[0]), float(rest.q[-1])
     for look, kind in enumerate(_MARKERS, 1):
-        places = [each.place for each in f.rest.places if each.kind == kind]
+        places = [equilibrium.place for equilibrium in f.rest.places if equilibrium.kind == kind]
         if f.machine.model.turns:  # on the turn that is drawn
             places = [low + (x - low) % (high - low) for x in places]
         if places:
@@ -205,6 +206,6 @@ def _marks(f: LinkageFindings, values: Any, named: bool) -> Iterator[fig.Item]:
                 has_line=False,
                 in_legend=named,
             )
-    for each in f.rest.places:
-        if each.kind == INDIFFERENT:
-            yield fig.Shade(each.place, each.end, _KINDS[INDIFFERENT] if named else "")
+    for equilibrium in f.rest.places:
+        if equilibrium.kind == INDIFFERENT:
+            yield fig.Shade(equilibrium.place, equilibrium.end, _KINDS[INDIFFERENT] if named else "")

@@ -31,7 +31,9 @@ def markdown(report: Report, pictures: Collection[str]) -> str:
         lines += block_lines(block, units, pictures)
     for section in report.sections:
         inside = [
-            text for each in of_form(section.blocks, "long") for text in block_lines(each, units, pictures)
+            text
+            for long_block in of_form(section.blocks, "long")
+            for text in block_lines(long_block, units, pictures)
         ]
         if inside:
             lines += [f"## {section.heading}", "", *inside]

@@ -134,7 +134,7 @@ def _run(run: Clip, reach: float, units: Units) -> dict[str, Any]:
         "joints": {
             name: {"x": _list(x, reach, 5), "y": _list(y, reach, 5)} for name, (x, y) in run.joints.items()
         },
-        "readings": [_reading(each, units) for each in run.readings],
+        "readings": [_reading(reading, units) for reading in run.readings],
         "blocks": {name: _list(np.degrees(angle), 360.0, 5) for name, angle in run.blocks.items()},
         "loads": {name: _list(load, None, 3) for name, load in run.loads.items()},
         "largest": _list(largest, None, 4)[0],

@@ -61,10 +61,10 @@ class ProgressBar:
             return
         self._last, self._task = now, what
         share = min(max(done / total, 0.0), 1.0) if total > 0.0 else 0.0
-        words = printable(what)
+        title = printable(what)
         self._publish(
-            f"{words}: {share:.0%}",
-            f'<progress max="1" value="{share:.4f}" style="width: 20em"></progress> {escape(words)}, {now:.0f} s',
+            f"{title}: {share:.0%}",
+            f'<progress max="1" value="{share:.4f}" style="width: 20em"></progress> {escape(title)}, {now:.0f} s',
         )
 
     def close(self) -> None:

@@ -138,8 +138,8 @@ def _above(figure: Figure) -> int:
     """Room for words above the panels [px]."""
     panels = [panel for _, _, panel in figure.all_panels()]
     marks = [item for panel in panels for item in panel.items if isinstance(item, Mark) and item.words]
-    words = 82 if any(mark.upright for mark in marks) else 18 if marks else 0
-    return words + (18 if any(panel.title for panel in panels) else 0)
+    room = 82 if any(mark.upright for mark in marks) else 18 if marks else 0
+    return room + (18 if any(panel.title for panel in panels) else 0)
 
 
 def _legend_rows(figure: Figure, width: float = 0.0) -> int:
@@ -248,8 +248,8 @@ class _Drawing:
             self._draw(item, panel, x, y)
 
     def _words(self, xref: str, yref: str, x: float, y: float, text: str, **more: Any) -> None:
-        at = {"x": x, "y": y, "xref": xref, "yref": yref}
-        self.annotations.append({**at, "text": text, "showarrow": False, "font": {"size": 12}, **more})
+        place = {"x": x, "y": y, "xref": xref, "yref": yref}
+        self.annotations.append({**place, "text": text, "showarrow": False, "font": {"size": 12}, **more})
 
     def _trace(self, kind: str, **properties: Any) -> None:
         self.traces.append(
@@ -343,7 +343,7 @@ class _Drawing:
         colour = INK if bars.slim else look["color"]
         self._trace(
             "bar",
-            y=[float(at) for at in bars.at], x=_small(bars.size), orientation="h", width=bars.height,
+            y=[float(position) for position in bars.at], x=_small(bars.size), orientation="h", width=bars.height,
             marker={"color": colour, "line": {"color": INK, "width": 0.8}, "pattern": pattern},
             text=list(bars.words) or None, textposition="outside" if bars.words else None, cliponaxis=False,
             hovertemplate=f"{bars.name}: %{{x:.4g}} {panel.x.unit}<extra></extra>",

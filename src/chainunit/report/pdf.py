@@ -81,15 +81,15 @@ class _PrintedPage(Page):
         parts = []
         for kind, together in groupby(blocks, _group):
             group = list(together)
-            wide = [each for each in group if kind != _FIGURES or _is_wide(each)]
+            wide = [block for block in group if kind != _FIGURES or _is_wide(block)]
             if kind == _FIGURES:
                 # the flattest first: it fits on the page that has begun
                 wide.sort(key=self._height)
             texts = list(filter(None, map(self.block, wide)))
             parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == _WARNINGS and texts else texts
-            if narrow := "".join(self.block(each) for each in group if each not in wide):
+            if narrow := "".join(self.block(block) for block in group if block not in wide):
                 parts.append(f'<div class="prints">{narrow}</div>')
-        return _BEGIN.sub(lambda found: found[1] + found[2].upper(), "\n".join(parts))
+        return _BEGIN.sub(lambda match: match[1] + match[2].upper(), "\n".join(parts))
 
     def _value(self, value: b.GivenValue) -> str:
         """A given value in running text."""
@@ -190,20 +190,20 @@ def write(sheet: Sheet, pictures: Mapping[str, Path], file: Path) -> Path:
 def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
     """The sheet as a page of HTML, from which the PDF is made."""
     page = _PrintedPage(sheet.units, pictures)
-    own = [*_numbered(page, sheet.sections, ("both", "long", "sheet"))]
+    sheet_sections = [*_numbered(page, sheet.sections, ("both", "long", "sheet"))]
     annex = [*_numbered(page, sheet.annex, ("both", "long"), "A")]
     contents = "".join(
-        f'<li><a href="#{_place(number)}"><span>{number}</span> {escape(each.heading)}</a></li>'
-        for number, each, _ in (*own, *annex)
+        f'<li><a href="#{_place(number)}"><span>{number}</span> {escape(section.heading)}</a></li>'
+        for number, section, _ in (*sheet_sections, *annex)
     )
     sections = (
-        f'<div class="on-sheet">{"".join(starmap(_section, own))}</div>'
+        f'<div class="on-sheet">{"".join(starmap(_section, sheet_sections))}</div>'
         f'<div class="annex">{"".join(starmap(_section, annex))}</div>'
     )
     labels = [f"<th>{escape(name)}</th><td>{escape(value)}</td>" for name, value in sheet.block.items()]
     half = (len(labels) + 1) // 2
     rows = "".join(f"<tr>{a}{z}</tr>" for a, z in zip_longest(labels[:half], labels[half:], fillvalue=""))
-    signed = "".join(f"<td><span>{each}</span></td>" for each in _SIGNED)
+    signed = "".join(f"<td><span>{role}</span></td>" for role in _SIGNED)
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{escape(sheet.title)}</title>'
         f"<style>{resource('page.css')}{resource('pdf.css')}</style></head><body>"
@@ -218,9 +218,9 @@ def _numbered(
 ) -> Iterator[tuple[str, b.Section, str]]:
     """The sections that are not empty on paper, with their blocks of these `forms`: each with its number before it
     and its text behind it."""
-    texts = ((each, page.blocks([x for x in each.blocks if x.form in forms])) for each in sections)
-    for n, (each, text) in enumerate(filter(itemgetter(1), texts), 1):
-        yield f"{letter}{n}", each, text
+    texts = ((section, page.blocks([x for x in section.blocks if x.form in forms])) for section in sections)
+    for n, (section, text) in enumerate(filter(itemgetter(1), texts), 1):
+        yield f"{letter}{n}", section, text
 
 
 def _place(number: str) -> str:

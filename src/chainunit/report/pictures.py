@@ -40,6 +40,6 @@ class Pictures:
             if needs(study):
                 figures = draw(s, study)
                 yield from (
-                    replace(each, file=file)
-                    for each in ([figures] if isinstance(figures, Figure) else figures)
+                    replace(figure, file=file)
+                    for figure in ([figures] if isinstance(figures, Figure) else figures)
                 )

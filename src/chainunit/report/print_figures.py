@@ -57,7 +57,7 @@ def write(figures: Iterable[Figure], folder: Path, units: Units, are_small: bool
     """Draw every figure that has a file into `folder`; returns the files. If they `are_small`, they have few
     centimetres on paper."""
     size = _SMALL if are_small else 1.0
-    plots = {each.file: partial(_figure, each, units, size) for each in figures if each.file}
+    plots = {figure.file: partial(_figure, figure, units, size) for figure in figures if figure.file}
     return draw(plots, folder, {"axes.labelsize": _LABELS} if are_small else None)
 
 

@@ -86,8 +86,10 @@ def _with_key(name: str) -> Iterator[KeyTable]:
     """The tables that have a key of this name, or keys below it, cut down to these keys. The name may begin with that
     of the table or of its type, as in run.crank_speed."""
     for table in key_tables():
-        own = {name, *(name.removeprefix(f"{part}.") for part in (table.name, table.of) if part)}
-        keys = tuple(key for key in table.keys if any(f"{key.name}.".startswith(f"{each}.") for each in own))
+        names = {name, *(name.removeprefix(f"{part}.") for part in (table.name, table.of) if part)}
+        keys = tuple(
+            key for key in table.keys if any(f"{key.name}.".startswith(f"{prefix}.") for prefix in names)
+        )
         if keys:
             yield dataclasses.replace(table, keys=keys)
 
@@ -128,17 +130,20 @@ def reference(
     ]
     sections += [Section(name, f"FMU {name}", tuple(_variables(model))) for name, model in MODELS.items()]
     sections += [
-        Section(f"result-{name}", f"result.json: {name}", (_parts(of),))
-        for name, of in _results(contents).items()
+        Section(f"result-{name}", f"result.json: {name}", (_parts(result_type),))
+        for name, result_type in _results(contents).items()
     ]
     sections.append(Section("remarks", "Warnings and notes of a study", tuple(_remarks())))
-    for name, words, options in commands:
-        rows = tuple(TableRow((option, words)) for option, words in options)
+    for name, description, options in commands:
+        rows = tuple(TableRow((option, meaning)) for option, meaning in options)
         sections.append(
             Section(
                 f"command-{name}",
                 f"chainunit {name}".strip(),
-                (Text(words), *((Table(rows, heads("option", "meaning"), numeric=False),) if rows else ())),
+                (
+                    Text(description),
+                    *((Table(rows, heads("option", "meaning"), numeric=False),) if rows else ()),
+                ),
             )
         )
     return Report("Reference", "reference", {}, (), tuple(sections))
@@ -146,14 +151,21 @@ def reference(
 
 def _results(contents: Mapping[str, type | None]) -> dict[str, type]:
     """The declared results by their names: the results of the analyses of a study, and of other commands."""
-    returned = ((each.name, get_type_hints(each.find)["return"]) for each in all_analyses())
-    found = {name: results_in(hint)[1] for name, hint in returned}
-    return {name: of for name, of in (found | dict(contents)).items() if of is not None}
+    returned = ((analysis.name, get_type_hints(analysis.find)["return"]) for analysis in all_analyses())
+    results = {name: results_in(hint)[1] for name, hint in returned}
+    return {
+        name: result_type
+        for name, result_type in (results | dict(contents)).items()
+        if result_type is not None
+    }
 
 
-def _parts(of: type) -> Table:
+def _parts(result_type: type) -> Table:
     """A row for each part of a result."""
-    rows = (TableRow((name or "(the number)", unit or "-", words)) for name, unit, words in documented(of))
+    rows = (
+        TableRow((name or "(the number)", unit or "-", description))
+        for name, unit, description in documented(result_type)
+    )
     return Table(tuple(rows), heads("name", "unit", "meaning"), numeric=False)
 
 
@@ -164,14 +176,14 @@ def _remarks() -> Iterator[Block]:
     rows = (
         TableRow(
             (
-                each.code,
-                each.severity,
-                of_driver(" ".join(each.sentences)),
-                of_driver(each.remedy) or "-",
-                ", ".join(f"{name} [{size.unit}]" for name, size in each.sizes.items()) or "-",
+                remark.code,
+                remark.severity,
+                of_driver(" ".join(remark.sentences)),
+                of_driver(remark.remedy) or "-",
+                ", ".join(f"{name} [{size.unit}]" for name, size in remark.sizes.items()) or "-",
             )
         )
-        for each in declared_remarks()
+        for remark in declared_remarks()
     )
     yield Table(tuple(rows), heads("code", "severity", "sentences", "remedy", "numbers"), numeric=False)
 

@@ -115,7 +115,7 @@ class ReportedResult(Generic[Question, Outcome]):
     def figures(self) -> Mapping[str, ResultFigure]:
         """The figures of the report by name: a notebook shows one, and its `save` writes it into a file."""
         report = self._report
-        return Named({each.name: ResultFigure(each, report.units) for each in report.figures})
+        return Named({figure.name: ResultFigure(figure, report.units) for figure in report.figures})
 
     def to_json(self) -> str:
         """All numbers with their units, as the text of the file of numbers."""

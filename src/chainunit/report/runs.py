@@ -42,7 +42,7 @@ def _begin(s: b.Source, study: StudyRecord, run: str, phase: Phase) -> Iterator[
     title = study.title_of(run)
     numbers = [(v, s.number(f"{run}.{v.name}")) for v in measures_of(phase)]
     rows = [(v.described(study.driver_noun), size) for v, size in numbers if size.value is not None]
-    sizes = join((line(f"{words} ", size) for words, size in rows), "; ")
+    sizes = join((line(f"{description} ", size) for description, size in rows), "; ")
     yield b.Text(line(f"{capital(title)}: ", sizes, "."), form="short")
     end = f", and of the end of the start-up, from {100.0 * STARTED:g} % of the speed on"
     head = f"Demands of the {title} on the drive{end if phase is Phase.SETTLING else ''}"
@@ -56,9 +56,15 @@ def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: s
     names = list(dict.fromkeys(name for section in rows for name in sections[section]))
     cells = (
         b.TableRow(
-            (words, *(s.number(f"{path}.{of}.{name}") if name in sections[of] else "" for name in names))
+            (
+                row_title,
+                *(
+                    s.number(f"{path}.{section}.{name}") if name in sections[section] else ""
+                    for name in names
+                ),
+            )
         )
-        for of, words in rows.items()
+        for section, row_title in rows.items()
     )
     return b.Table(tuple(cells), b.heads(first, *map(spoken, names)), title=title, **more)
 
@@ -143,9 +149,11 @@ def _pins(study: StudyRecord) -> b.Table:
 
     def row(pin: str) -> b.TableRow:
         worst = hardest_run(study.pins, pin)
-        own = (Number(tables[pin][size], "N", path=f"runs.pins.{reference}.{pin}.{size}") for size in sizes)
+        numbers = (
+            Number(tables[pin][size], "N", path=f"runs.pins.{reference}.{pin}.{size}") for size in sizes
+        )
         return b.TableRow(
-            (pin, *own, _peak(study, pin), study.title_of(worst), run_names.short(study, worst))
+            (pin, *numbers, _peak(study, pin), study.title_of(worst), run_names.short(study, worst))
         )
 
     columns = (

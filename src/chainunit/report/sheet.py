@@ -31,22 +31,24 @@ _LABELS = ("project", "author", "date", "revision")
 def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     """The sheet of a study with this report."""
     s = b.Source(report.result, study.driver_noun)
-    given = {section.name: section for section in report.sections}
-    sheets = [name for part in capabilities() for name in part.on_sheet() if name in given]
+    report_sections = {section.name: section for section in report.sections}
+    sheets = [name for part in capabilities() for name in part.on_sheet() if name in report_sections]
     sections = [
-        *(given[name] for name in _FIRST if name in given),
-        *(_on_sheet(given[name]) for name in sheets),
-        b.Section("assumptions", "Assumptions: values that no file gives", tuple(_assumed(given, study))),
-        *([_basis(s, study)] if "basis" in given else []),
+        *(report_sections[name] for name in _FIRST if name in report_sections),
+        *(_on_sheet(report_sections[name]) for name in sheets),
+        b.Section(
+            "assumptions", "Assumptions: values that no file gives", tuple(_assumed(report_sections, study))
+        ),
+        *([_basis(s, study)] if "basis" in report_sections else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
     # what was not checked, and what is assumed, stand on the sheet
     shown = {*_FIRST, *sheets, "basis", "live", "motion", "not_checked", "plots", "given"}
-    annex = [_without_figures(each) for each in report.sections if each.name not in shown]
+    annex = [_without_figures(section) for section in report.sections if section.name not in shown]
     annex.append(b.Section("plots", "Plots", tuple(report.figures)))
-    if "given" in given:
-        annex.append(_not_assumed(given["given"], study))
-    if "basis" in given:
+    if "given" in report_sections:
+        annex.append(_not_assumed(report_sections["given"], study))
+    if "basis" in report_sections:
         annex.append(b.Section("software", "Models and software", (software(s),)))
     return Sheet(
         report.title or capital(report.kind),
@@ -61,19 +63,21 @@ def _on_sheet(section: b.Section) -> b.Section:
     """A section for the sheet: without its figures, which repeat numbers of its tables, and with its blocks of the
     form ``sheet``, if it has some, in place of its long ones."""
     texts = _without_figures(section).blocks
-    if any(each.form == "sheet" for each in texts):
+    if any(block.form == "sheet" for block in texts):
         texts = tuple(b.of_form(texts, "sheet"))
     return replace(section, blocks=texts)
 
 
 def _without_figures(section: b.Section) -> b.Section:
     """A section without its figures, which stand together."""
-    return replace(section, blocks=tuple(each for each in section.blocks if not isinstance(each, Figure)))
+    return replace(section, blocks=tuple(block for block in section.blocks if not isinstance(block, Figure)))
 
 
 def _basis(s: b.Source, study: StudyRecord) -> b.Section:
     """Basis and validity, with the speed up to which the numbers hold at its head."""
-    head = (b.Text(each, "note", "long") for part in capabilities() for each in part.up_to_speed(s, study))
+    head = (
+        b.Text(sentence, "note", "long") for part in capabilities() for sentence in part.up_to_speed(s, study)
+    )
     return b.Section("basis", "Basis and validity", (*_speed(s, study), *head, *basis(s, study)))
 
 
@@ -81,15 +85,15 @@ def _speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The speed of the runs, and the reach of rigid links."""
     if not s.result["answers"]:
         return
-    words = f"The runs ask for a speed of the {study.driver_noun} of {{=run.crank_speed:4}}."
+    text = f"The runs ask for a speed of the {study.driver_noun} of {{=run.crank_speed:4}}."
     if study.drive.foreign_machine or not study.drive.machine.model.sides:
-        words += " No highest speed was computed up to which the numbers hold"
-        words += (
+        text += " No highest speed was computed up to which the numbers hold"
+        text += (
             "."
             if study.drive.foreign_machine
             else ": rigid links set none. Another speed asks for another study."
         )
-    yield b.Text(s.line(words), "note", "long")
+    yield b.Text(s.line(text), "note", "long")
 
 
 def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
@@ -104,23 +108,23 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
     }
 
 
-def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
+def _assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
     """The values that the files leave out, but those that were chosen, which are the answer, and those of a motor of
     a catalogue beside its surroundings."""
-    for block in given["given"].blocks if "given" in given else ():
+    for block in report_sections["given"].blocks if "given" in report_sections else ():
         if isinstance(block, b.Given):
             yield _kept(block, study, are_assumed=True)
     if study.plate is not None:
-        words = 'Values of the motor and chosen values: section "Other given values" of the annex.'
-        yield b.Text(words, "note", "long")
+        text = 'Values of the motor and chosen values: section "Other given values" of the annex.'
+        yield b.Text(text, "note", "long")
 
 
 def _not_assumed(section: b.Section, study: StudyRecord) -> b.Section:
     """The section of given values without those that the sheet lists as assumptions; a value of an event that no file
     gives stands at the first of the events that have it."""
     blocks = (
-        _once(_kept(each, study, are_assumed=False)) if isinstance(each, b.Given) else each
-        for each in section.blocks
+        _once(_kept(block, study, are_assumed=False)) if isinstance(block, b.Given) else block
+        for block in section.blocks
     )
     return replace(section, heading="Other given values", blocks=tuple(blocks))
 
@@ -131,12 +135,12 @@ def _once(block: b.Given) -> b.Given:
     sections = []
     for title, values in block.sections:
         kept = []
-        for each in values:
-            number = each.value.value if isinstance(each.value, Number) else each.value
-            key = each.description, number
-            is_default = each.name.startswith("event.") and each.origin == "declared"
+        for value in values:
+            number = value.value.value if isinstance(value.value, Number) else value.value
+            key = value.description, number
+            is_default = value.name.startswith("event.") and value.origin == "declared"
             if not is_default or key not in earlier:
-                kept.append(each)
+                kept.append(value)
             if is_default:
                 earlier.add(key)
         if kept:
@@ -146,9 +150,9 @@ def _once(block: b.Given) -> b.Given:
 
 def _kept(block: b.Given, study: StudyRecord, are_assumed: bool) -> b.Given:
     kept = (
-        (title, tuple(each for each in values if _is_assumed(each, study) == are_assumed))
+        (title, tuple(value for value in values if _is_assumed(value, study) == are_assumed))
         for title, used in block.sections
-        if (values := [each for each in used if _is_used(each, study)])
+        if (values := [value for value in used if _is_used(value, study)])
     )
     return b.Given(tuple((title, values) for title, values in kept if values))
 
@@ -158,25 +162,25 @@ def _is_assumed(value: b.GivenValue, study: StudyRecord) -> bool:
     chosen = "" if study.proposal is None else study.proposal.name
     if value.origin in ("", "file", "linkage", chosen) or not isinstance(value.value, Number):
         return False
-    of, _, name = value.name.partition(".")
-    if of == "event" or study.plate is None:
-        return of != "event"
-    return of != "motor" or name.startswith("ambient.")
+    table, _, name = value.name.partition(".")
+    if table == "event" or study.plate is None:
+        return table != "event"
+    return table != "motor" or name.startswith("ambient.")
 
 
 def _is_used(value: b.GivenValue, study: StudyRecord) -> bool:
     """Whether a value is of the files, or not of a starter that the motor of a catalogue does without."""
-    of, _, name = value.name.partition(".")
-    if value.origin == "file" or study.plate is None or of not in ("motor", "starter"):
+    table, _, name = value.name.partition(".")
+    if value.origin == "file" or study.plate is None or table not in ("motor", "starter"):
         return True
     start = study.config.drive.start
     return _OF_START.get(name.partition(".")[0], start) == start
 
 
 def _unchecked(study: StudyRecord) -> Iterator[b.Block]:
-    lines: list[Line] = [each for part in capabilities() for each in part.unchecked(study)]
+    lines: list[Line] = [sentence for part in capabilities() for sentence in part.unchecked(study)]
     yield b.Text(
         "The following was not computed, and the numbers above say nothing about it:", "lead", "long"
     )
-    for each in (*lines, *_BEYOND):
-        yield b.Text(line("– ", each), "note", "long")
+    for sentence in (*lines, *_BEYOND):
+        yield b.Text(line("– ", sentence), "note", "long")

@@ -37,12 +37,14 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
     s = b.Source(as_dict(study) if result is None else result, study.driver_noun)
     with shown_in(study.config.units):
         sections = [
-            b.Section(name, each.heading, tuple(each.blocks(s, study)), beside=name == QUESTION)
-            for name, each in _sections().items()
-            if name not in analysis_sections() or (each.analysis or name) in study.findings
+            b.Section(name, contents.heading, tuple(contents.blocks(s, study)), beside=name == QUESTION)
+            for name, contents in _sections().items()
+            if name not in analysis_sections() or (contents.analysis or name) in study.findings
         ]
         # an analysis may have nothing to show
-        sections = [each for each in sections if each.blocks or each.name not in analysis_sections()]
+        sections = [
+            section for section in sections if section.blocks or section.name not in analysis_sections()
+        ]
         return b.Report(
             study.config.title,
             study.kind,
@@ -102,8 +104,8 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             turns="turn" if study.config.run.turns == 1.0 else "turns",
         )
     if names := study.overloads:
-        words = "; ".join(run_names.title(study, name) for name in names)
-        question += line(f" Then come overloads, each by itself: {words}.")
+        titles = "; ".join(run_names.title(study, name) for name in names)
+        question += line(f" Then come overloads, each by itself: {titles}.")
     for part in capabilities():
         question = line(question, part.question(s, study))
     yield b.Text(question, form="long")
@@ -112,7 +114,11 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     given_names = [("run", "crank_speed"), *([] if is_chosen else [("machine", "ratio")])]
     rows = [
         *([] if is_chosen else [b.TableRow(("motor", s.words("motor.title")))]),
-        *(row for of, name in given_names for row in s.rows(type(parts[of]), of, only=name, as_given=True)),
+        *(
+            row
+            for table, name in given_names
+            for row in s.rows(type(parts[table]), table, only=name, as_given=True)
+        ),
         *s.rows(type(feed), "feed", as_given=True),
     ]
     yield b.Table(tuple(rows), title="In short", form="long")
@@ -144,7 +150,7 @@ def _values(s: b.Source, section: GivenSection, unused_names: Iterable[str]) -> 
             if value.name not in unused_names:
                 yield value
     for key, choice in section.choices.items():
-        name, place = (".".join(filter(None, (of, key))) for of in (section.name, section.place))
+        name, place = (".".join(filter(None, (prefix, key))) for prefix in (section.name, section.place))
         if isinstance(choice, str):
             content: b.Content = s.words(place)
         elif isinstance(choice, bool):
@@ -182,7 +188,7 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 def basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The notes on a study, and its energy certificate."""
-    yield from (b.Text(each, "note") for each in s.lines("notes"))
+    yield from (b.Text(note, "note") for note in s.lines("notes"))
     yield from answer.remark_tables(study.notes, "notes")
     if s.result["certificate"]:
         yield from _certificate(s, study, s.result["certificate"])
@@ -209,12 +215,12 @@ def software(s: b.Source) -> b.Table:
 def _certificate(
     s: b.Source, study: StudyRecord, certificate: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[b.Block]:
-    words = (
+    method = (
         "The energy that the motor gave to the shaft, computed in the motor, is compared with the energy that the "
         "machine stored and dissipated, computed in the machine. The table shows the missing share of the energy "
         "moved."
     )
-    yield b.Text(words, "note", "long")
+    yield b.Text(method, "note", "long")
     titles = {run: study.title_of(run) for run in certificate}
     yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for shares in certificate.values() for name in shares):
@@ -245,7 +251,7 @@ def _sections() -> Mapping[str, Contents]:
         "answer": Contents("The answer", answer.blocks),
         QUESTION: Contents("The question", _question),
         "live": Contents("Try it", _live),
-        **{name: each for name, each in analysis_sections().items() if each.before == "runs"},
+        **{name: contents for name, contents in analysis_sections().items() if contents.before == "runs"},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
         **analysis_sections(),
@@ -258,4 +264,4 @@ def _sections() -> Mapping[str, Contents]:
 
 def pictures() -> tuple[str, ...]:
     """The files of all figures that a report may have."""
-    return (DRAWING, *(picture for each in _sections().values() for picture in each.pictures))
+    return (DRAWING, *(picture for contents in _sections().values() for picture in contents.pictures))

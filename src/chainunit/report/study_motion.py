@@ -35,7 +35,7 @@ def motion(study: StudyRecord) -> Animation:
     spans = (float(np.ptp(run["time"].values)) for run in study.runs.values())
     interval = max(interval, sum(spans) / MOST)
     supplements = (part.supplement(study) for part in capabilities())
-    supplement = next((each for each in supplements if each is not None), Supplement(study))
+    supplement = next((candidate for candidate in supplements if candidate is not None), Supplement(study))
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
     whole = machine.state(machine.inputs({"phi": angles * machine.ratio})).m
     paths, crank = linkage.paths(whole), whole.linkage.driver

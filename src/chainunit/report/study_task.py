@@ -48,7 +48,7 @@ def _with_sheet(record: StudyRecord, report: Report, folder: Path, of_report: li
     def sheet_file() -> list[Path]:
         with TemporaryDirectory() as small, atomic_file(folder / pdf.NAME) as part:
             drawn = print_figures.write(report.figures, Path(small), report.units, are_small=True)
-            pdf.write(sheet(record, report), {each.name: each for each in drawn}, part)
+            pdf.write(sheet(record, report), {picture.name: picture for picture in drawn}, part)
         return [folder / pdf.NAME]
 
     return [*_writers(record, report, folder, of_report), sheet_file]

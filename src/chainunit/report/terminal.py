@@ -70,13 +70,13 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
             _show_table(block, console, report.units)
             title = ""
         elif (prefix := _LAST.get(_role(block))) is not None:
-            last += [prefix + words for words in _sentences(block, report.units)]
+            last += [prefix + sentence for sentence in _sentences(block, report.units)]
         elif remarks or _role(block) != "remark":
             prefix = "Remark: " if _role(block) == "remark" else ""
-            for words in _sentences(block, report.units):
-                console.print(prefix + words, soft_wrap=True)
-    for words in last:
-        console.print(words, soft_wrap=True)
+            for sentence in _sentences(block, report.units):
+                console.print(prefix + sentence, soft_wrap=True)
+    for sentence in last:
+        console.print(sentence, soft_wrap=True)
 
 
 _LINES, _WARNINGS, _ROWS = 45, 5, 3
@@ -88,12 +88,12 @@ def screen(report: Report, console: Console, rest: str) -> None:
     where the rest is (`rest`)."""
     blocks = report.screen
     last = [
-        _LAST[_role(each)] + words
-        for each in blocks
-        if _role(each) in _LAST
-        for words in _sentences(each, report.units)
+        _LAST[_role(block)] + sentence
+        for block in blocks
+        if _role(block) in _LAST
+        for sentence in _sentences(block, report.units)
     ]
-    warnings = [each for each in last if each.startswith(_LAST["warning"])][:_WARNINGS]
+    warnings = [sentence for sentence in last if sentence.startswith(_LAST["warning"])][:_WARNINGS]
     if len(last) > len(warnings):
         rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
     end = [line_of(warning, console.width - 1) + "\n" for warning in warnings]
@@ -107,8 +107,8 @@ def screen(report: Report, console: Console, rest: str) -> None:
             text = _first_rows(block, console, report.units, _lines, room - _lines(title), _ROWS)
             text, title = (title + text, "") if text else ("", title)
         else:
-            words = _with_units("\n".join(_sentences(block, report.units)))
-            text = _printed(console, partial(console.print, words)).replace(_KEPT, " ")
+            paragraph = _with_units("\n".join(_sentences(block, report.units)))
+            text = _printed(console, partial(console.print, paragraph)).replace(_KEPT, " ")
         if text.strip() and _lines(text) <= room:
             console.file.write(text)
             room -= _lines(text)
@@ -176,15 +176,15 @@ _GRADES = ("good", "partly", "bad", "alarm")
 def judgements(report: Report) -> list[str]:
     """The judgements of the answer; of a report without one the first sentence."""
     blocks = report.blocks("short")
-    graded = [each for each in blocks if _role(each) in _GRADES]
-    first = [each for each in blocks if _role(each) == "plain"][:1]
-    return [words for each in graded or first for words in _sentences(each, report.units)]
+    graded = [block for block in blocks if _role(block) in _GRADES]
+    first = [block for block in blocks if _role(block) == "plain"][:1]
+    return [sentence for block in graded or first for sentence in _sentences(block, report.units)]
 
 
 def remarks(report: Report, role: str) -> list[str]:
     """The warnings of a report (`role` "warning") or its notes ("note"), a sentence each."""
-    blocks = [each for each in report.blocks("short") if _role(each) == role]
-    return [words for each in blocks for words in _sentences(each, report.units)]
+    blocks = [block for block in report.blocks("short") if _role(block) == role]
+    return [sentence for block in blocks for sentence in _sentences(block, report.units)]
 
 
 _MOST_LETTERS = 1990
@@ -224,7 +224,7 @@ def _role(block: Block) -> str:
 
 def _sentences(block: Block, units: Units) -> list[str]:
     if isinstance(block, Judgement):
-        return [plain_line(each, units) for each in block.items or (block.line,)]
+        return [plain_line(item, units) for item in block.items or (block.line,)]
     return [plain_line(block.line, units)] if isinstance(block, Text) else []
 
 
@@ -267,11 +267,11 @@ def _parted(table: Table, places: Sequence[int], units: Units, room: int) -> lis
     def width(i: int) -> int:
         return max(len(part) for cell in cells(i) for part in _parts(cell, units)) + 3
 
-    words = {
+    word_widths = {
         i: max(len(word) for cell in cells(i) for word in plain_cell(cell, units).split() or [""])
         for i in places
     }
-    if sum(words.values()) + 3 * len(words) + 1 <= room:
+    if sum(word_widths.values()) + 3 * len(word_widths) + 1 <= room:
         return [list(places)]
     parts: list[list[int]] = [[first]]
     for i in others:
@@ -315,10 +315,10 @@ def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[
     texts = [[plain_cell(cell, units) for cell in column] for column in columns]
     widths = [max(map(len, column)) for column in texts]
     whole = [max(len(part) for cell in column for part in _parts(cell, units)) for column in columns]
-    words = [max(len(word) for text in column for word in text.split() or [""]) for column in texts]
-    heads = [max(len(each) for each in (*column[0].split(), *column[1:], "")) for column in texts]
+    word_widths = [max(len(word) for text in column for word in text.split() or [""]) for column in texts]
+    heads = [max(len(piece) for piece in (*column[0].split(), *column[1:], "")) for column in texts]
     borders = 3 * len(columns) + 1
-    for least in (heads, whole, words):
+    for least in (heads, whole, word_widths):
         while sum(widths) + borders > room:
             wide = [k for k, width in enumerate(widths) if width > least[k]]
             if not wide:

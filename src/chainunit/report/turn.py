@@ -36,7 +36,7 @@ def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
     turn = TurnFindings.of_study(study)
-    bars = f", of {words}" if (words := study.drive.machine.in_place) else ""
+    bars = f", of {substitute}" if (substitute := study.drive.machine.in_place) else ""
     lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the {driver}, without a motor" + bars + ".")
     yield b.Text(lead, "lead", "long")
     yield b.Table(
@@ -74,14 +74,16 @@ def _figure(turn: TurnFindings, angle: fig.Axis, bars: str, driver: str) -> fig.
 
 def _reactions(turn: TurnFindings) -> fig.Panel:
     pins, items = turn.pins, []
-    for look, shift, words, size, angle in (
+    for look, shift, title, size, angle in (
         (1, -0.2, "with feed", "peak", "angle"),
         (2, 0.2, "without feed", "peak_free", "angle_free"),
     ):
         peaks = [(getattr(r, size), getattr(r, angle)) for r in pins.values()]
-        places = tuple(f"{number_words(peak, 'N')} at {number_words(at, 'rad')}" for peak, at in peaks)
-        at = np.arange(len(pins)) + shift
-        items.append(fig.Bars(words, at, [peak for peak, _ in peaks], 0.38, look, words=places))
+        places = tuple(
+            f"{number_words(peak, 'N')} at {number_words(peak_angle, 'rad')}" for peak, peak_angle in peaks
+        )
+        positions = np.arange(len(pins)) + shift
+        items.append(fig.Bars(title, positions, [peak for peak, _ in peaks], 0.38, look, words=places))
     # 30 % of room for the words beside the bars
     largest = max(max(r.peak, r.peak_free) for r in pins.values())
     x = fig.Axis("largest reaction", "N", low=0.0, high=1.3 * largest)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def is_examined(part: str, findings: Mapping[str, Findings]) -> bool:
     """Whether one of the findings of a study examines that part of the line."""
-    return any(each.examines == part for each in findings.values())
+    return any(entry.examines == part for entry in findings.values())
 
 
 @dataclass(frozen=True)

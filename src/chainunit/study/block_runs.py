@@ -55,8 +55,8 @@ class RunFault:
     said: str = ""
 
     def __str__(self) -> str:
-        at = f"at t = {self.time:g} s: " if math.isfinite(self.time) else ""
-        return self.said or f"{at}{self.cause.value}"
+        instant = f"at t = {self.time:g} s: " if math.isfinite(self.time) else ""
+        return self.said or f"{instant}{self.cause.value}"
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ class BlockRuns:
     ) -> None:
         self.rig = rig
         self.system = CompiledSystem(rig.graph)
-        known = self.system.model.parameter_layout.names
-        self._varying = [name for name in varying if name in known]
+        parameter_names = self.system.model.parameter_layout.names
+        self._varying = [name for name in varying if name in parameter_names]
         self._events, self._start = events, start
         self._inputs = self.system.inputs | rig.normal
         self._given_states = states
@@ -204,12 +204,12 @@ class BlockRuns:
 
     def runs(self, points: Sequence[RunPoint]) -> Iterator[EventRun]:
         """The runs of the points, in order."""
-        made = self._from_rest if self._start is None else self._from_start
+        maker = self._from_rest if self._start is None else self._from_start
         for first in range(0, len(points), BLOCK):
             block = points[first : first + BLOCK]
             # runs that end at nearly the same time share a vector
             order = sorted(range(len(block)), key=lambda k: block[k].lead + block[k].duration)
-            runs = made([block[k] for k in order])
+            runs = maker([block[k] for k in order])
             yield from (run for _, run in sorted(zip(order, runs, strict=True), key=itemgetter(0)))
 
     def _from_start(self, points: Sequence[RunPoint]) -> Iterator[EventRun]:
@@ -271,16 +271,16 @@ class BlockRuns:
         points: Sequence[RunPoint],
         states: Any,
         begin: Any,
-        at: Any,
+        event_times: Any,
         stop: Any,
         before: Runs | None = None,
     ) -> Runs:
-        """Runs from `begin` to `stop` through events that begin `at` these times [s]; `before` are the runs to the
-        events, whose last outputs the events read."""
+        """Runs from `begin` to `stop` through events that begin at the `event_times` [s]; `before` are the runs to
+        the events, whose last outputs the events read."""
         signals = []
         for k, point in enumerate(points):
             read = {name: self._last(before, k, name) for name in point.event.reads}
-            changed = point.rig.event_signals(point.event, float(at[k]), read)
+            changed = point.rig.event_signals(point.event, float(event_times[k]), read)
             signals.append({**point.rig.normal, **changed})
         limits = [[point.limit for point in points], [math.inf] * len(points)]
         return self._run(points, states, begin, stop, signals, np.array(limits))

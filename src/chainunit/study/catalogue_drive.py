@@ -103,8 +103,8 @@ def catalogue_drive(
 def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> Transmission:
     """The gear of a study with that ratio; its efficiency is the typical one of its kind and stages, unless the file
     gives one."""
-    gear, given = tables.gear, tables.given
-    if "gear.efficiency" in given:
+    gear, given_keys = tables.gear, tables.given
+    if "gear.efficiency" in given_keys:
         return replace(gear, ratio=ratio)
     return replace(
         gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, _is_made(tables, offer))

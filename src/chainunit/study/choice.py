@@ -53,7 +53,7 @@ def choose_for(
     tables, plans, source = config.drive, config.plans, config.motor
     if source is None:
         proposals = (part.drive(config, folder, progress, backend) for part in registered())
-        proposal: DriveProposal = next(each for each in proposals if each is not None)
+        proposal: DriveProposal = next(candidate for candidate in proposals if candidate is not None)
         return Choice(_with_line(proposal.drive, plans, turn), proposal.tables, proposal)
     source.check(tables, plans)
     added = sum(part.shaft_inertia(plans[part.name]) for part in registered())

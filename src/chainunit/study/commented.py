@@ -26,18 +26,18 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
     lines = text.splitlines()
     types = [str(event["type"]) for event in toml(text).get("event", [])]
     settings = [*statements(text)]
-    names = {name for each in settings for name in each.keys}
+    names = {name for statement in settings for name in statement.keys}
     below: dict[int, list[str]] = {}
-    for table, group in groupby(settings, key=lambda each: each.table):
-        own = [*group]
+    for table, group in groupby(settings, key=lambda statement: statement.table):
+        table_statements = [*group]
         keys = {f"{table}.{key.name}".lstrip("."): key for key in _keys(table, machine, types)}
-        for each in own:
-            _comment(lines, each, keys)
-        below[own[-1].last] = [_line(key) for name, key in keys.items() if name not in names]
+        for statement in table_statements:
+            _comment(lines, statement, keys)
+        below[table_statements[-1].last] = [_line(key) for name, key in keys.items() if name not in names]
     result = [f"#:schema {FILE}"]
     for number, line in enumerate(lines, 1):
         result += [line, *below.get(number, [])]
-    for absent in _absent({each.table.split(".")[0] for each in settings}, machine):
+    for absent in _absent({statement.table.split(".")[0] for statement in settings}, machine):
         title = f"{absent.title}: {absent.of}" if absent.of else absent.title
         result += ["", f"{f'# {absent.bracketed}':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
     return "\n".join(result) + "\n"
@@ -47,22 +47,23 @@ def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
     """The keys of a table of the file; of an event, those of its type."""
     name, _, number = table.partition(".")
     begins = {
-        each: each.removesuffix(NAME) if each.endswith(f".{NAME}") else f"{each}." for each in entry_tables()
+        table_name: table_name.removesuffix(NAME) if table_name.endswith(f".{NAME}") else f"{table_name}."
+        for table_name in entry_tables()
     }
-    name = next((each for each, begin in begins.items() if table.startswith(begin)), name)
-    of = types[int(number) - 1] if name == "event" else machine
-    for each in key_tables():
-        if each.name == name and each.of in ("", of):
-            yield from (key for key in each.keys if not key.name.startswith(_OF_OTHERS))
+    name = next((table_name for table_name, begin in begins.items() if table.startswith(begin)), name)
+    model = types[int(number) - 1] if name == "event" else machine
+    for key_table in key_tables():
+        if key_table.name == name and key_table.of in ("", model):
+            yield from (key for key in key_table.keys if not key.name.startswith(_OF_OTHERS))
 
 
 def _absent(present: set[str], machine: str) -> Iterable[KeyTable]:
     return (
-        each
-        for each in key_tables()
-        if each.name
-        and each.name.removesuffix(f".{NAME}") not in {*present, "event"}
-        and each.of in ("", machine, *MOTORS)
+        key_table
+        for key_table in key_tables()
+        if key_table.name
+        and key_table.name.removesuffix(f".{NAME}") not in {*present, "event"}
+        and key_table.of in ("", machine, *MOTORS)
     )
 
 

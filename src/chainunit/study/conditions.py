@@ -38,8 +38,8 @@ class _Joined(Condition):
     """``allOf`` or ``anyOf``"""
 
     def holds(self, data: Mapping[str, Any]) -> bool:
-        found = (part.holds(data) for part in self.parts)
-        return all(found) if self.word == "allOf" else any(found)
+        results = (part.holds(data) for part in self.parts)
+        return all(results) if self.word == "allOf" else any(results)
 
     def schema(self) -> Schema:
         return {self.word: [part.schema() for part in self.parts]}
@@ -99,17 +99,19 @@ def given(path: str) -> Condition:
 def is_one_of(path: str, *values: str | bool) -> Condition:
     """Whether a key has one of these values, which are all texts or all true and false."""
     # 1 is no true value in a file
-    known = {(type(value), value) for value in values}
+    allowed = {(type(value), value) for value in values}
     return _Value(
         path,
-        lambda value: isinstance(value, str | bool) and (type(value), value) in known,
+        lambda value: isinstance(value, str | bool) and (type(value), value) in allowed,
         {"enum": [*values]},
     )
 
 
 def ends_with(path: str, ending: str) -> Condition:
     """Whether the text of a key ends so, in small or capital letters."""
-    letters = "".join(f"[{each}{each.upper()}]" if each.isalpha() else rf"\{each}" for each in ending)
+    letters = "".join(
+        f"[{letter}{letter.upper()}]" if letter.isalpha() else rf"\{letter}" for letter in ending
+    )
     form = {"type": "string", "pattern": f"{letters}$"}
     return _Value(path, lambda value: isinstance(value, str) and value.lower().endswith(ending), form)
 

@@ -280,12 +280,12 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(unusual_values(kinds, {"event": tables}))
-        given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
+        given_names, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
         linkage, lines = linkage_lines(data, source)
         contents = FileContents(
             source,
-            given,
-            of_example=names - given - {"title"},
+            given_names,
+            of_example=names - given_names - {"title"},
             choices=_choices(form, parts),
             unusual=unusual,
             tables=data,
@@ -333,8 +333,8 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
     tables, values = _read_sections(sections, checked, faults)
     faults.add(check_order(values))
     of_study: dict[str, Any] = {
-        name: values[name] if name in data or not each.optional else None
-        for name, each in sections.items()
+        name: values[name] if name in data or not section.optional else None
+        for name, section in sections.items()
         if name not in _OF_PARTS
     }
     catalogues: tuple[Path, ...] = ()
@@ -355,8 +355,8 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
         with faults.collected():
             plans[capability.name] = capability.plan(reading)
     faults.refuse()
-    for name, own in of_study.items():
-        of_study[name] = None if own is None else sections[name].completed(own, reading)
+    for name, table in of_study.items():
+        of_study[name] = None if table is None else sections[name].completed(table, reading)
     for capability in registered():
         machine = capability.machine(machine, of_study)
     config = Config(
@@ -388,9 +388,14 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
 
 
 def _motor(
-    tables: Mapping[str, Any], parts: Parts, checked: Any, own: Any, plate: CatalogueMotor | None, source: str
+    tables: Mapping[str, Any],
+    parts: Parts,
+    checked: Any,
+    parameters: Any,
+    plate: CatalogueMotor | None,
+    source: str,
 ) -> MotorSource | None:
-    """The motor of a file, `own` parameters or one that it names; None where a capability chooses it."""
+    """The motor of a file, one of these `parameters` or one that it names; None where a capability chooses it."""
     if motor_is_left(tables):
         return None
     if parts.file:
@@ -398,7 +403,7 @@ def _motor(
         return ForeignMotor(beside(parts.file, source), names, checked.system.motor_parameters)
     if plate is not None:
         return NamedMotor(plate)
-    return OwnMotor(parts.motor, own)
+    return OwnMotor(parts.motor, parameters)
 
 
 def _read_sections(
@@ -413,25 +418,25 @@ def _read_sections(
         with faults.collected():
             tables[name] = section.form.values(getattr(checked, name))
         layout = Layout(section.declaration)
-        own = {key: x for key, x in tables[name].items() if key in layout.names}
-        values[name] = layout.from_names(own, section.default)
+        quantities = {key: x for key, x in tables[name].items() if key in layout.names}
+        values[name] = layout.from_names(quantities, section.default)
     return tables, values
 
 
 def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     """All values of a file that are no quantities of a table."""
-    known = {name: getattr(checked, name) for name in all_choices()}
+    choices = {name: getattr(checked, name) for name in all_choices()}
     for name, section in parts.sections.items():
         table = getattr(checked, name)
-        known |= {f"{name}.{key}": getattr(table, key) for key in section.keys}
+        choices |= {f"{name}.{key}": getattr(table, key) for key in section.keys}
         if section.form.instead is not None:
             others = {v.name: getattr(table, v.name) for v in variables(section.form.instead)}
-            known |= {f"{name}.{key}": x for key, x in others.items() if x is not None}
-    known |= {"system.machine": checked.system.machine, "system.motor": parts.named_motor}
+            choices |= {f"{name}.{key}": x for key, x in others.items() if x is not None}
+    choices |= {"system.machine": checked.system.machine, "system.motor": parts.named_motor}
     for table in ("machine_names", "motor_names"):
         names = given_values(getattr(checked.system, table))
-        known |= {f"system.{table}.{name}": x for name, x in names.items()}
-    return known
+        choices |= {f"system.{table}.{name}": x for name, x in names.items()}
+    return choices
 
 
 def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "") -> Iterator[str]:
@@ -446,30 +451,32 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
             yield prefix + name
 
 
-def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
+def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
     make: Any = ForeignMachine if isinstance(parts.machine, ForeignModel) else machine_of
     if of_papers:
         with refusal_prefix("ratios: ", "ratios"):
-            return of_ratios(lambda lengths: make(parts.machine, given | lengths), filled(Ratios, of_papers))
+            return of_ratios(
+                lambda lengths: make(parts.machine, parameters | lengths), filled(Ratios, of_papers)
+            )
     try:
-        return make(parts.machine, given)
+        return make(parts.machine, parameters)
     except InputError as error:
         names = error.names if isinstance(error, GeometryError) else ()
         model = parts.machine
         spoil = {}
         if isinstance(error, GeometryError):
-            spoil = causes(admits(model), given, model.parameter_layout, model.Parameters())
+            spoil = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
         # the value that spoils the machine, and not one whose range that value sets
-        key = next((f"machine.{name}" for name in (*spoil, *names) if name in given), "machine")
+        key = next((f"machine.{name}" for name in (*spoil, *names) if name in parameters), "machine")
         ranges = f"; with all other values as they are, {', or '.join(spoil.values())}" if spoil else ""
-        line = f"machine: {error}{_taken_over(error, model, given)}{ranges}"
+        line = f"machine: {error}{_taken_over(error, model, parameters)}{ranges}"
         raise InputError(line, key=key) from error
 
 
-def _taken_over(error: InputError, machine: MachineModel, given: Mapping[str, float]) -> str:
+def _taken_over(error: InputError, machine: MachineModel, parameters: Mapping[str, float]) -> str:
     """Words to follow a refusal: the lengths behind it that neither file nor example give."""
     names = error.names if isinstance(error, GeometryError) else ()
     declared = Layout(machine.Parameters).by_name(machine.Parameters())
-    taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in given]
+    taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in parameters]
     return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""

@@ -113,7 +113,9 @@ NAMED: Mapping[str, tuple[str, str]] = {
 }
 """The quantities that are no single reduction: unit and description."""
 RANGE = "range"
-_WORDS = {name: each.words for name, each in REDUCTIONS.items()} | {RANGE: "largest less least value"}
+_WORDS = {name: reduction.words for name, reduction in REDUCTIONS.items()} | {
+    RANGE: "largest less least value"
+}
 _FORM = re.compile(r"(\w+)\((.+)\)")
 
 
@@ -129,8 +131,8 @@ def cycle_quantity(name: str, model: Model) -> CycleQuantity:
         return _named(name, model)
     form = _FORM.fullmatch(name)
     if form is None or form[1] not in _WORDS:
-        known = [*NAMED, *(f"{each}(...)" for each in _WORDS)]
-        raise InputError(f"{shown(name)}: must be one of {', '.join(known)}{near_name(name, NAMED)}")
+        names = [*NAMED, *(f"{reduction}(...)" for reduction in _WORDS)]
+        raise InputError(f"{shown(name)}: must be one of {', '.join(names)}{near_name(name, NAMED)}")
     reduction, column = form.groups()
     columns = {v.name: v for v in columns_of(model)}
     if column not in columns:
@@ -139,25 +141,25 @@ def cycle_quantity(name: str, model: Model) -> CycleQuantity:
             f"y(PIN) and its outputs{near_name(column, columns)}"
         )
     variable = columns[column]
-    words = f"{_WORDS[reduction]}, {variable.description}"
+    description = f"{_WORDS[reduction]}, {variable.description}"
     if reduction == RANGE:
         pair = (Integrand(column, "max"), Integrand(column, "min"))
-        return CycleQuantity(name, variable.unit, words, pair, _difference, reduction=reduction)
+        return CycleQuantity(name, variable.unit, description, pair, _difference, reduction=reduction)
     one = (Integrand(column, reduction),)
-    return CycleQuantity(name, variable.unit, words, one, _only, reduction=reduction)
+    return CycleQuantity(name, variable.unit, description, one, _only, reduction=reduction)
 
 
 def _named(name: str, model: Model) -> CycleQuantity:
-    of = partial(CycleQuantity, name, *NAMED[name], reduction=name)
+    named_quantity = partial(CycleQuantity, name, *NAMED[name], reduction=name)
     if name == "installed_power":
-        return of((Integrand("tau", "rms"), Integrand("tau", "peak")), _installed_power)
+        return named_quantity((Integrand("tau", "rms"), Integrand("tau", "peak")), _installed_power)
     if name == "energy_per_year":
-        return of((Integrand("power", "mean"),), _energy_per_year, "energy")
+        return named_quantity((Integrand("power", "mean"),), _energy_per_year, "energy")
     axis = {"box.width": "x", "box.height": "y"}[name]
     pins = [v.name for v in columns_of(model) if v.name.startswith(f"{axis}(")]
     if not pins:
         raise InputError(f"{name}: the pins of the {model.name} have no places of their own; leave it out")
-    return of(tuple(Integrand(pin, end) for end in ("max", "min") for pin in pins), _extent)
+    return named_quantity(tuple(Integrand(pin, end) for end in ("max", "min") for pin in pins), _extent)
 
 
 def evaluate(
@@ -192,23 +194,23 @@ def evaluate(
     """
     import xarray as xr
 
-    own = dict(values or {})
-    ratio = own.get("ratio", machine.ratio)
+    further_values = dict(values or {})
+    ratio = further_values.get("ratio", machine.ratio)
     if not isinstance(ratio, xr.DataArray) and np.ndim(ratio):
         ratio = xr.DataArray(np.asarray(ratio, float), dims="ratio")
     angle = xr.DataArray(np.arange(angles) * (2.0 * math.pi / angles), dims="angle")
     w = crank_speed * ratio
     loads = machine.model.feed_layout.by_name(machine.model.Feed() if feed is None else feed)
     reduce: dict[str, list[str]] = {}
-    for each in (integrand for q in quantities for integrand in q.integrands):
-        names = reduce.setdefault(each.column, [])
-        if each.reduction not in names:
-            names.append(each.reduction)
-    points = {**loads, "a": 0.0, **own, "phi": angle * ratio, "w": w}
+    for integrand in (integrand for q in quantities for integrand in q.integrands):
+        names = reduce.setdefault(integrand.column, [])
+        if integrand.reduction not in names:
+            names.append(integrand.reduction)
+    points = {**loads, "a": 0.0, **further_values, "phi": angle * ratio, "w": w}
     table = machine.batch(points, over="angle", reduce=reduce, **options)
     results: dict[str, Any] = {}
     for q in quantities:
-        parts = xr.broadcast(*(table[each.name] for each in q.integrands))
+        parts = xr.broadcast(*(table[integrand.name] for integrand in q.integrands))
         value = q.combine(parts, w, basis or CycleBasis())
         result = value if isinstance(value, xr.DataArray) else parts[0].copy(data=value)
         results[q.name] = result.assign_attrs(units=q.unit, long_name=q.description)

@@ -28,8 +28,8 @@ def export_drive(
 def with_files(drive: Drive, files: Mapping[str, Path]) -> System:
     """The system of the FMU `files` of the models of a drive; their start values may be different ones."""
     # the machine in the feed-forward is the same FMU as the machine
-    known = {"model": files["machine"], **files}
-    components = {name: replace(c, file=known[name]) for name, c in drive.graph.components.items()}
+    component_files = {"model": files["machine"], **files}
+    components = {name: replace(c, file=component_files[name]) for name, c in drive.graph.components.items()}
     return replace(drive.graph, components=components)
 
 

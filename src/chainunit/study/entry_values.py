@@ -14,11 +14,11 @@ from ..core.quantities import variable_of
 from ..reading.tables import to_number
 
 
-def _admitted(given: Any) -> Any:
+def _admitted(value: Any) -> Any:
     """A number or a text; its quantity, and so its unit, stand in another key."""
-    is_number = isinstance(given, int | float) and not isinstance(given, bool) and math.isfinite(given)
-    if is_number or isinstance(given, str):
-        return given
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if is_number or isinstance(value, str):
+        return value
     raise PydanticCustomError("number_or_text", "must be a number, or a text with a unit")
 
 
@@ -26,15 +26,15 @@ Entered = Annotated[Any, BeforeValidator(_admitted)]
 """A number, or a text with a unit."""
 
 
-def _file_names(given: Any) -> Any:
+def _file_names(value: Any) -> Any:
     """A name of a file, or a list of names."""
-    if isinstance(given, str):
-        return given
-    are_names = isinstance(given, list) and all(isinstance(name, str) and name for name in given)
-    if are_names and 0 < len(given) <= MOST_FILES:
-        return given
-    words = "must be the name of a file, or a list of at least one and at most {most} names of files"
-    raise PydanticCustomError("file_names", words, {"most": MOST_FILES})
+    if isinstance(value, str):
+        return value
+    are_names = isinstance(value, list) and all(isinstance(name, str) and name for name in value)
+    if are_names and 0 < len(value) <= MOST_FILES:
+        return value
+    message = "must be the name of a file, or a list of at least one and at most {most} names of files"
+    raise PydanticCustomError("file_names", message, {"most": MOST_FILES})
 
 
 MOST_FILES = 100

@@ -50,10 +50,10 @@ class EventType(type):
     """The type of all types of events."""
 
 
-def _reduced(of: Any) -> str | tuple[Any, tuple[Any, ...]]:
+def _reduced(event_type: Any) -> str | tuple[Any, tuple[Any, ...]]:
     """A type of event as pickle stores it: by its name, or by the call that makes it."""
-    maker = vars(of).get("maker")
-    return of.__qualname__ if maker is None else maker
+    maker = vars(event_type).get("maker")
+    return event_type.__qualname__ if maker is None else maker
 
 
 copyreg.pickle(EventType, _reduced)
@@ -166,8 +166,8 @@ class Event(metaclass=EventType):
         """The reason, in words, why a system without the inputs of the event leaves the event out."""
         return f"the system has no {' or '.join(self.inputs(self.side))}"
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
-        """Values of the inputs that the event changes, from its begin `at` [s] on.
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
+        """Values of the inputs that the event changes, from its `begin` [s] on.
 
         `normal` has the values of all inputs in steady running, `state` the values of the outputs `reads` at the
         begin.

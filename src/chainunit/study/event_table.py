@@ -59,18 +59,20 @@ def read_events(tables: Sequence[Any], machine: MachineModel | None = None) -> d
     faults = Faults()
 
     def read(entry: Entry, number: int) -> None:
-        of = _type(entry)
-        entry.title += f" ({of.kind})"
-        of, side = _with_input(of, entry), _side(of, entry)
-        if "side" not in entry.given and of.has_side:
+        event_type = _type(entry)
+        entry.title += f" ({event_type.kind})"
+        event_type, side = _with_input(event_type, entry), _side(event_type, entry)
+        if "side" not in entry.given and event_type.has_side:
             if machine is None or machine.sides:
                 entry.fault("side", 'must be given, "left" or "right"')
             else:
                 line = f"{entry.title}: the {machine.name} has no sides; {inputs_of(machine)}"
                 entry.add([InputError(line, entry.place)])
-        usual = of.on(side).name if side or not of.has_side else of.kind
+        usual = event_type.on(side).name if side or not event_type.has_side else event_type.kind
         name = _name(entry, usual, events)
-        events[name] = of.on(side, _parameters(of, entry.given, f"event.{name}.", f"{entry.place}."), name)
+        events[name] = event_type.on(
+            side, _parameters(event_type, entry.given, f"event.{name}.", f"{entry.place}."), name
+        )
 
     read_entries(enumerate(tables, 1), "event", faults, read, "event")
     faults.refuse()
@@ -110,8 +112,14 @@ class RandomEvent:
     def identity(self) -> dict[str, Any]:
         """All values on which a drawn event depends."""
         fixed = Layout(type(self.p)).by_name(self.p)
-        own = {"input": self.of.acts_on[0]} if self.of.has_input else {}
-        return {"type": self.of.kind, **own, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}
+        input_entry = {"input": self.of.acts_on[0]} if self.of.has_input else {}
+        return {
+            "type": self.of.kind,
+            **input_entry,
+            "side": self.side,
+            "p": fixed,
+            "ranges": dict(self.ranges),
+        }
 
 
 PLACED = ("crank_angle", "turns")
@@ -128,25 +136,25 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
         see `read_events`.
     """
     entry = Entry(where, {"type": Jam.kind, **table})
-    of = _with_input(_type(entry), entry)
-    if of.from_rest:
-        entry.wrong("type", of.kind, "must be an event in steady running")
+    event_type = _with_input(_type(entry), entry)
+    if event_type.from_rest:
+        entry.wrong("type", event_type.kind, "must be an event in steady running")
         entry.refuse()
     for name in (*PLACED, "name"):
         if name in table:
             entry.fault(name, "is not of random overloads, which come at any crank angle")
-    ranges = {name: ends for name, ends in of.draws.items() if name not in table}
-    given = [v for v in variables(of.Parameters) if isinstance(table.get(v.name), list)]
-    for v in given:
+    ranges = {name: ends for name, ends in event_type.draws.items() if name not in table}
+    range_variables = [v for v in variables(event_type.Parameters) if isinstance(table.get(v.name), list)]
+    for v in range_variables:
         ranges[v.name] = _range(entry, v)
-    drawn = {*ranges, *(v.name for v in given), *PLACED, "name", "input"}
-    ordered = {name: ranges[name] for name in Layout(of.Parameters).names if name in ranges}
-    side = _side(of, entry)
+    drawn = {*ranges, *(v.name for v in range_variables), *PLACED, "name", "input"}
+    ordered = {name: ranges[name] for name in Layout(event_type.Parameters).names if name in ranges}
+    side = _side(event_type, entry)
     with entry.collected():
         fixed = {name: value for name, value in table.items() if name not in drawn}
-        p = _parameters(of, fixed, f"{where}.")
+        p = _parameters(event_type, fixed, f"{where}.")
     entry.refuse()
-    return RandomEvent(of, side, p, ordered)
+    return RandomEvent(event_type, side, p, ordered)
 
 
 def _range(entry: Entry, variable: Variable) -> tuple[float, float]:
@@ -163,35 +171,35 @@ def _range(entry: Entry, variable: Variable) -> tuple[float, float]:
 
 def _type(entry: Entry) -> type[Event]:
     """The type that the table names."""
-    of = entry.choice("type", TYPES)
+    event_type = entry.choice("type", TYPES)
     entry.refuse()
-    assert of is not None
-    return of
+    assert event_type is not None
+    return event_type
 
 
-def _with_input(of: type[Event], entry: Entry) -> type[Event]:
+def _with_input(event_type: type[Event], entry: Entry) -> type[Event]:
     """The type for the input that the table names."""
     name = entry.given.get("input")
-    if of.has_input and isinstance(name, str) and name:
-        return of.of_input(name)
-    if of.has_input and name is None:
+    if event_type.has_input and isinstance(name, str) and name:
+        return event_type.of_input(name)
+    if event_type.has_input and name is None:
         entry.fault("input", "must be given, the name of an input, as [feed] has it")
-    elif of.has_input:
+    elif event_type.has_input:
         entry.wrong("input", name, "must be the name of an input, as [feed] has it")
     elif name is not None:
         entry.fault("input", "this event has none; leave it out")
-    return of
+    return event_type
 
 
-def _side(of: type[Event], entry: Entry) -> AnySide:
+def _side(event_type: type[Event], entry: Entry) -> AnySide:
     """The side that the table names; empty, with a fault, for a wrong one."""
-    given = entry.given.get("side", "")
-    if "side" in entry.given and not of.has_side:
+    side = entry.given.get("side", "")
+    if "side" in entry.given and not event_type.has_side:
         entry.fault("side", "this event has none; leave it out")
-    elif "side" in entry.given and given not in SIDES:
-        entry.wrong("side", given, f'must be "left" or "right"{near_name(str(given), SIDES)}')
+    elif "side" in entry.given and side not in SIDES:
+        entry.wrong("side", side, f'must be "left" or "right"{near_name(str(side), SIDES)}')
     else:
-        return given
+        return side
     return ""
 
 
@@ -200,12 +208,12 @@ def _name(entry: Entry, usual: str, others: Mapping[str, Event]) -> str:
     if "name" in entry.given:
         name = entry.given["name"]
         if not isinstance(name, str) or not _NAME.fullmatch(name) or name.endswith("_coasting"):
-            words = f"must be small letters, digits and _, at most {LONGEST_NAME}, with a letter first"
+            message = f"must be small letters, digits and _, at most {LONGEST_NAME}, with a letter first"
         elif name in others or name in RESERVED:
-            words = "is the name of another run; give it another"
+            message = "is the name of another run; give it another"
         else:
             return name
-        entry.wrong("name", name, words)
+        entry.wrong("name", name, message)
     numbers = (usual if k == 1 else f"{usual}_{k}" for k in range(1, len(others) + 2))
     return next(name for name in numbers if name not in others)
 
@@ -221,9 +229,11 @@ def _form(declared: type) -> type[BaseModel]:
     return schema(declared, "event", "", **texts)
 
 
-def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:
+def _parameters(event_type: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:
     """The quantities of an event. A refusal begins with `prefix`, and its key with `place` or, without it,
     with `prefix`."""
-    own = {name: x for name, x in table.items() if name not in _TEXTS}
+    quantities = {name: x for name, x in table.items() if name not in _TEXTS}
     with each_refusal(lambda fault: InputError(f"{prefix}{fault}", (place or prefix) + fault.key)):
-        return instance(of.Parameters, given_values(read_table(_form(of.Parameters), own)))
+        return instance(
+            event_type.Parameters, given_values(read_table(_form(event_type.Parameters), quantities))
+        )

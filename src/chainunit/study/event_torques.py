@@ -18,11 +18,11 @@ def from_event_on(study: StudyRecord, name: str) -> xr.Dataset:
     return study.runs[name].sel(time=slice(study.event[name], None))
 
 
-def peaks_in_events(study: StudyRecord, *roles: Role, of: PeakOf = on_coupling) -> dict[str, float]:
+def peaks_in_events(study: StudyRecord, *roles: Role, peak_of: PeakOf = on_coupling) -> dict[str, float]:
     """Peak torque in each event with one of these `roles`, or in every event without `roles` [N m]."""
     events = study.config.events
     return {
-        name: of(study.drive, from_event_on(study, name))
+        name: peak_of(study.drive, from_event_on(study, name))
         for name in study.event
         if name in study.runs and (not roles or events[name].role in roles)
     }
@@ -39,12 +39,12 @@ def gear_peaks(study: StudyRecord) -> dict[str, float]:
     for name in study.event:
         if name in study.runs:
             is_switched = events[name].from_rest or events[name].role is Role.DISTURBANCE
-            of = quasi_static_peak if is_switched else at_gear
-            peaks[name] = of(study.drive, from_event_on(study, name))
+            peak_of = quasi_static_peak if is_switched else at_gear
+            peaks[name] = peak_of(study.drive, from_event_on(study, name))
     return peaks
 
 
-def running_peak(study: StudyRecord, of: PeakOf = on_coupling) -> DutyPeak:
+def running_peak(study: StudyRecord, peak_of: PeakOf = on_coupling) -> DutyPeak:
     """The largest torque of normal duty without the starts: of steady running, of events that may last, and of the
     runs from which a drive was chosen."""
     events = study.config.events
@@ -53,7 +53,7 @@ def running_peak(study: StudyRecord, of: PeakOf = on_coupling) -> DutyPeak:
         for name in study.event
         if name in study.runs and events[name].role is Role.DUTY and not events[name].from_rest
     ]
-    peaks = [duty_peak(study.drive, [(STEADY, study.steady), *lasting], of)]
+    peaks = [duty_peak(study.drive, [(STEADY, study.steady), *lasting], peak_of)]
     if study.proposal is not None and study.proposal.duty is not None:
         peaks.append(study.proposal.duty)
     return max(peaks, key=lambda peak: peak.torque)

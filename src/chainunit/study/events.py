@@ -52,13 +52,13 @@ class Jam(Event):
             usual=(1e-4, 60.0),
         )
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The force on the web, added to that of normal running."""
         (name,), p = self.inputs(self.side), self.p
-        return {name: _pulses(normal[name], p.force, self._begins(at), p.rise, p.duration)}
+        return {name: _pulses(normal[name], p.force, self._begins(begin), p.rise, p.duration)}
 
-    def _begins(self, at: float) -> list[float]:
-        return [at]
+    def _begins(self, begin: float) -> list[float]:
+        return [begin]
 
 
 class Lumps(Jam):
@@ -80,8 +80,8 @@ class Lumps(Jam):
     def _period(self) -> Any:
         return 2.0 * self.p.rise + self.p.duration + self.p.pause
 
-    def _begins(self, at: float) -> list[float]:
-        return [at + k * self._period for k in range(int(self.p.number))]
+    def _begins(self, begin: float) -> list[float]:
+        return [begin + k * self._period for k in range(int(self.p.number))]
 
 
 _LOADS = ("material_mass", "processing_force")
@@ -132,9 +132,9 @@ class Empties(Event):
         """True: the side of the event carries no material."""
         return True
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The material and the processing force of the side fall to zero."""
-        return {name: Profile(normal[name], ((at, self.p.shift, 0.0),)) for name in self.inputs(self.side)}
+        return {name: Profile(normal[name], ((begin, self.p.shift, 0.0),)) for name in self.inputs(self.side)}
 
 
 class OneSidedFeed(Event):
@@ -163,21 +163,22 @@ class OneSidedFeed(Event):
             ends[here] = normal[here] + share * normal[there]
         return ends
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """Material and processing force leave one side for the other, at the same time."""
         return {
-            name: Profile(normal[name], ((at, self.p.shift, end),)) for name, end in self.ends(normal).items()
+            name: Profile(normal[name], ((begin, self.p.shift, end),))
+            for name, end in self.ends(normal).items()
         }
 
 
 def one_sided_event(events: Mapping[str, Event], side: SideName) -> Event:
     """The event of all feed on that side: the one among the `events` of a study, else that of the example."""
-    own = (
+    matches = (
         event
         for event in events.values()
         if (event.kind, event.side) == (OneSidedFeed.kind, side) and event.empties
     )
-    return next(own, OneSidedFeed.on(side))
+    return next(matches, OneSidedFeed.on(side))
 
 
 class LoadedStart(OneSidedFeed):
@@ -192,7 +193,7 @@ class LoadedStart(OneSidedFeed):
         """Quantities of the feed in the start. The start begins at rest and is followed as long as the
         start-up."""
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The feed on one side from rest on."""
         return dict(self.ends(normal))
 
@@ -221,7 +222,7 @@ class Blocked(Event):
             "N.m.s/rad", "damping of the stop that blocks the rocker", default=2e3, min=0.0, max=1e9
         )
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The stop, at the angle at which the rocker stands."""
         return {
             "stop.stiffness": self.p.stiffness,
@@ -280,12 +281,12 @@ class Dip(Event):
         """See `Event`: a DC motor has its own supply."""
         return "this motor's drive has no line voltage of its own"
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The voltage falls and comes back within a millisecond."""
         edge = 1e-3
         whole = normal["voltage"]
-        low = (at, edge, (1.0 - self.p.depth) * whole)
-        return {"voltage": Profile(whole, (low, (at + self.p.duration, edge, whole)))}
+        low = (begin, edge, (1.0 - self.p.depth) * whole)
+        return {"voltage": Profile(whole, (low, (begin + self.p.duration, edge, whole)))}
 
 
 class Interruption(Event):
@@ -315,10 +316,10 @@ class Interruption(Event):
         motor before it switches on."""
         return "this motor's drive has no contactor on the line"
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The contactor opens and closes."""
         usual = normal["contactor"]
-        changes = ((at, CONTACTOR_EDGE, 0.0), (at + self.p.duration, CONTACTOR_EDGE, usual))
+        changes = ((begin, CONTACTOR_EDGE, 0.0), (begin + self.p.duration, CONTACTOR_EDGE, usual))
         return {"contactor": Profile(usual, changes)}
 
 
@@ -340,10 +341,10 @@ class HardCut(Event):
             "s", "time for which the stack is hard", default=1.5, min=1e-3, max=1e4, usual=(1e-2, 600.0)
         )
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The resistance of the hard stack in place of the usual resistance; it changes within 10 ms."""
         edge, usual = 1e-2, normal["cut_force"]
-        changes = ((at, edge, self.p.force), (at + self.p.duration, edge, usual))
+        changes = ((begin, edge, self.p.force), (begin + self.p.duration, edge, usual))
         return {"cut_force": Profile(usual, changes)}
 
 
@@ -370,10 +371,10 @@ class Overload(Event):
             "s", "time in which it rises and falls", default=0.005, min=1e-4, max=1e4, usual=(1e-4, 60.0)
         )
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The torque of the material, added to that of normal running."""
         p = self.p
-        return {"load": _pulses(normal["load"], p.torque, [at], p.rise, p.duration)}
+        return {"load": _pulses(normal["load"], p.torque, [begin], p.rise, p.duration)}
 
 
 class Surge(Event):
@@ -408,10 +409,10 @@ class Surge(Event):
             "" if normal[name] else f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
         )
 
-    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The multiple of the input in place of that of normal running."""
         p, (name,) = self.p, self.acts_on
-        return {name: _pulses(normal[name], (p.factor - 1.0) * normal[name], [at], p.rise, p.duration)}
+        return {name: _pulses(normal[name], (p.factor - 1.0) * normal[name], [begin], p.rise, p.duration)}
 
 
 @cache
@@ -424,5 +425,5 @@ def _surge_of(name: str) -> type[Event]:
         "heading": f"surge of {name}",
         "maker": (_surge_of, (name,)),
     }
-    of: Any = EventType("SurgeOfInput", (Surge,), members)
-    return of
+    event_type: Any = EventType("SurgeOfInput", (Surge,), members)
+    return event_type

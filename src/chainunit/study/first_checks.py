@@ -31,20 +31,24 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
     parts = None
     with faults.collected():
         parts = parts_of(data, source)
-    known = parts or Parts(MACHINES["ChamberForces"], MOTORS["DcMotor"])
+    usable_parts = parts or Parts(MACHINES["ChamberForces"], MOTORS["DcMotor"])
     readable = data if parts else {name: x for name, x in data.items() if name not in _OF_MACHINE}
-    places = {f"{table}.{key}": x for table, each in known.sections.items() for key, x in each.places.items()}
+    places = {
+        f"{table}.{key}": x
+        for table, section in usable_parts.sections.items()
+        for key, x in section.places.items()
+    }
 
     def placed(fault: InputError) -> InputError:
         """The refusal of an unknown key, with the place at which the file has it."""
-        words = places.get(fault.key)
-        return InputError(f"{fault}; {words}", fault.key) if words else fault
+        place = places.get(fault.key)
+        return InputError(f"{fault}; {place}", fault.key) if place else fault
 
     with faults.collected(), each_refusal(placed):
-        read_table(known.form, readable)
+        read_table(usable_parts.form, readable)
     with faults.collected():
         if isinstance(data.get("event", []), list):
-            read_events(data.get("event", []), known.machine if parts else None)
+            read_events(data.get("event", []), usable_parts.machine if parts else None)
     for table, section in all_sections().items():
         for key in section.random_events:
             with faults.collected():

@@ -47,12 +47,12 @@ def foreign_model(file: Path, names: Mapping[str, str]) -> ForeignModel:
         see `chainunit.system.foreign_component`.
     """
     component = foreign_component(file, "machine", names)
-    own = component.connectors.values()
+    connectors = component.connectors.values()
     shaft = {v for terminal in component.terminals.values() for v in terminal.members.values()}
-    parameters = [_GEAR, *(c for c in own if c.causality == "parameter" and c.name != "ratio")]
+    parameters = [_GEAR, *(c for c in connectors if c.causality == "parameter" and c.name != "ratio")]
     if ratio := component.connectors.get("ratio"):
         parameters[0] = replace(ratio, most=_GEAR.most, least=_GEAR.least)
-    feed = _declared("Feed", [c for c in own if c.causality == "input" and c.name not in shaft])
+    feed = _declared("Feed", [c for c in connectors if c.causality == "input" and c.name not in shaft])
     return ForeignModel(
         name=component.title,
         description=component.description or component.title,
@@ -84,8 +84,8 @@ def _declared(title: str, connectors: Iterable[Connector]) -> type:
         if not inside[0].name:
             fields.append((head, Value, _quantity(inside[0])))
         else:
-            of = _declared(f"{title}_{head}", [c for c in inside if c.name])
-            fields.append((head, of, group(of, head, default=of())))
+            group_type = _declared(f"{title}_{head}", [c for c in inside if c.name])
+            fields.append((head, group_type, group(group_type, head, default=group_type())))
     declared: type = declared_class(title, (), fields)
     return declared
 
@@ -94,10 +94,10 @@ def _quantity(c: Connector) -> Any:
     """The declaration of one variable; an unknown unit is given in the description."""
     try:
         base_units(c.unit or "1")
-        unit, words = c.unit or "1", c.description
+        unit, description = c.unit or "1", c.description
     except ValueError:
-        unit, words = "1", f"{c.description} [{c.unit}]"
-    return quantity(unit, words, default=c.start, min=c.least, max=c.most, type=c.type)
+        unit, description = "1", f"{c.description} [{c.unit}]"
+    return quantity(unit, description, default=c.start, min=c.least, max=c.most, type=c.type)
 
 
 class ForeignMachine(Machine):
@@ -114,8 +114,8 @@ class ForeignMachine(Machine):
     def component(self) -> FmuComponent:
         """The FMU with these parameters."""
         names = self.model.component.connectors
-        own: FmuComponent = self.model.component
-        return replace(own, start={name: x for name, x in self.by_name.items() if name in names})
+        component: FmuComponent = self.model.component
+        return replace(component, start={name: x for name, x in self.by_name.items() if name in names})
 
     def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
         """See `Machine`: torque `tau` [N m] and inertia `J` [kg m2] at the motor. The FMU alone is run at the

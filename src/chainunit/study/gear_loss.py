@@ -94,7 +94,7 @@ class GearAnalysis(Analysis):
         drive, gear = study.drive, study.config.drive.gear
         window = study.window(Phase.STEADY, study.steady)
         squared = window.mean(lambda drive, run: run[drive.motor_speed].values ** 2)
-        warm = [each.gear_loss for each in study.findings.values() if each.gear_loss is not None]
+        warm = [findings.gear_loss for findings in study.findings.values() if findings.gear_loss is not None]
         total, net = warm[0] if warm else drive.gear_friction * squared, study.answers[STEADY].power_mean
         if net is None:
             return None

@@ -94,16 +94,18 @@ def _of_study(file: FileContents) -> dict[str, Any]:
 def _system(choices: Mapping[str, Any], *, is_chosen: bool) -> dict[str, Any]:
     """Names of machine and motor, and the names of our variables in their FMUs; without the motor where it
     `is_chosen`."""
-    own = {name.removeprefix("system."): x for name, x in choices.items() if name.startswith("system.")}
-    return {name: x for name, x in own.items() if x and (name != "motor" or not is_chosen)}
+    system_choices = {
+        name.removeprefix("system."): x for name, x in choices.items() if name.startswith("system.")
+    }
+    return {name: x for name, x in system_choices.items() if x and (name != "motor" or not is_chosen)}
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     config = study.config
     randoms = {
-        key: each
+        key: random_event
         for part in registered()
-        for key, each in part.random_events(config.plans[part.name]).items()
+        for key, random_event in part.random_events(config.plans[part.name]).items()
     }
     for name, section in all_sections().items():
         values = config.table(name)

@@ -47,10 +47,10 @@ def inverter_need(study: StudyRecord) -> InverterNeed | None:
     named = (("start_up", study.start), *study.answers.items())
     peaks = {study.title_of(name): a.current_peak for name, a in named if a and a.current_peak is not None}
     lasting: list[float] = []
-    if found := StartFindings.found_in(study):
-        worst = max(found.starts, key=lambda start: start.current)
+    if findings := StartFindings.found_in(study):
+        worst = max(findings.starts, key=lambda start: start.current)
         peaks[f"a start from {number(worst.angle, 'rad')}"] = worst.current
-        lasting = [start.long_current for start in found.starts]
+        lasting = [start.long_current for start in findings.starts]
     steady = study.answers.get(STEADY)
     need = need_of(rated, None if steady is None else steady.current_rms, lasting, peaks, overload)
     chosen = None if study.proposal is None else study.proposal.inverter_current

@@ -71,10 +71,10 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
     steady, start = study.answers.get(STEADY), study.start
     if steady is None or start is None:
         return {}
-    time, found = start.start_time, StartFindings.found_in(study)
-    if found is not None:
+    time, findings = start.start_time, StartFindings.found_in(study)
+    if findings is not None:
         # the worst crank angle counts
-        others = longest_of(found.starts)
+        others = longest_of(findings.starts)
         time = None if others is None or time is None else max(time, others)
     config, permitted = study.config, study.config.permitted_temperature[1]
     return given_motor(
@@ -128,9 +128,9 @@ def lasts(study: StudyRecord) -> bool:
 def _no_judgement(study: StudyRecord, speed: str) -> str:
     """Words on a motor that is not told as one that keeps the speed, though the mean `speed` is near: it does not
     start from another angle, or its turns are not steady; empty where neither is so."""
-    found, driver = StartFindings.found_in(study), study.driver_noun
-    if found is not None and found.stuck:
-        where = " and ".join(number(each.angle, "rad") for each in found.stuck)
+    findings, driver = StartFindings.found_in(study), study.driver_noun
+    if findings is not None and findings.stuck:
+        where = " and ".join(number(start.angle, "rad") for start in findings.stuck)
         return f"The motor does NOT bring the {driver} to its speed from {where}, though it turns at {speed} here"
     if lasts(study):
         return ""

@@ -122,12 +122,12 @@ class KeyTable:
 def entry_tables() -> dict[str, TableList]:
     """The declarations of the lists of tables in a table, by the names of table and key; and of the tables whose
     names the file chooses, by the name of the table that holds them and `NAME`."""
-    found: dict[str, TableList] = {}
+    table_lists: dict[str, TableList] = {}
     for table, section in all_sections().items():
-        found |= {f"{table}.{key}": entry for key, entry in section.entries.items()}
+        table_lists |= {f"{table}.{key}": entry for key, entry in section.entries.items()}
         if section.named is not None:
-            found[f"{table}.{NAME}"] = section.named
-    return found
+            table_lists[f"{table}.{NAME}"] = section.named
+    return table_lists
 
 
 @cache
@@ -144,8 +144,8 @@ def key_tables() -> tuple[KeyTable, ...]:
         ),
         KeyTable("system", "Machine and motor", tuple(_of_system())),
         *(
-            KeyTable("machine", of.noun.capitalize(), tuple(_of_machine(name, "machine")), name)
-            for name, of in MACHINES.items()
+            KeyTable("machine", model.noun.capitalize(), tuple(_of_machine(name, "machine")), name)
+            for name, model in MACHINES.items()
         ),
         KeyTable("ratios", "The papers' ratios", tuple(quantity_keys(Ratios, Ratios())), "ChamberForces"),
         *(
@@ -160,14 +160,17 @@ def key_tables() -> tuple[KeyTable, ...]:
         ),
         *(KeyTable(name, entry.title, tuple(_of_entry(entry))) for name, entry in entry_tables().items()),
         KeyTable("report", "Report", tuple(_of_report())),
-        *(KeyTable("event", _first_sentence(of), tuple(_of_event(of)), name) for name, of in TYPES.items()),
+        *(
+            KeyTable("event", _first_sentence(event_type), tuple(_of_event(event_type)), name)
+            for name, event_type in TYPES.items()
+        ),
     )
 
 
 def catalogue_columns() -> tuple[KeyTable, ...]:
     """The columns of catalogues, and keys of their tables [[motor]], [[gear]] and so on."""
     texts = tuple(
-        Key(name, words, sort="text", follows=LEFT_OUT.get(name, "")) for name, words in TEXTS.items()
+        Key(name, meaning, sort="text", follows=LEFT_OUT.get(name, "")) for name, meaning in TEXTS.items()
     )
     return tuple(
         KeyTable(
@@ -192,9 +195,9 @@ def quantity_keys(
 ) -> Iterator[Key]:
     """Keys of declared quantities. `values` are the values of a file that leaves them out, and `sources` says by key
     where they come from."""
-    known = Layout(declared).by_name(values) if values is not None else {}
+    values_by_name = Layout(declared).by_name(values) if values is not None else {}
     for v in variables(declared):
-        value = known.get(v.name, v.quantity.start)
+        value = values_by_name.get(v.name, v.quantity.start)
         left_out = "" if value is None else shortest_text(value, v.unit, v.kind)
         if value is not None and v.type != "Real":
             left_out = written(value, v.type)
@@ -236,17 +239,17 @@ def _of_section(name: str, section: FileSection) -> Iterator[Key]:
 def _of_system() -> Iterator[Key]:
     machines = tuple(f'"{name}"' for name in MACHINES)
     motors = tuple(f'"{name}"' for name in MOTORS)
-    words = {
+    choices = {
         "machine": (*machines, "a linkage file (.toml)", "an FMU (.fmu)"),
         "motor": (*motors, "a designation of the catalogue", "an FMU (.fmu)"),
     }
     for name, field in SystemTable.model_fields.items():
-        if name in words:
+        if name in choices:
             left_out, follows = ('"ChamberForces"', "") if name == "machine" else ("", "the example's")
             yield Key(
                 name,
                 str(field.description),
-                words=words[name],
+                words=choices[name],
                 sort="text",
                 left_out=left_out,
                 follows=follows,
@@ -257,28 +260,28 @@ def _of_system() -> Iterator[Key]:
             inner: Any = field.annotation
             for key, below in inner.model_fields.items():
                 named = isinstance(below.annotation, type) and hasattr(below.annotation, "model_fields")
-                for each in below.annotation.model_fields if named else ("",):
-                    full = f"{key}.{each}" if each else key
+                for member in below.annotation.model_fields if named else ("",):
+                    full = f"{key}.{member}" if member else key
                     yield Key(f"{name}.{full}", f"name of {full} in the FMU", sort="text")
 
 
 def _of_report() -> Iterator[Key]:
     for kind, names in UNITS.items():
-        words = tuple(f'"{name}"' for name in names)
-        yield Key(f"units.{kind}", f"unit of each {kind} in the report", words=words, sort="text")
+        choices = tuple(f'"{name}"' for name in names)
+        yield Key(f"units.{kind}", f"unit of each {kind} in the report", words=choices, sort="text")
     for name, field in ReportTable.model_fields.items():
         if name != "units":
             yield Key(name, str(field.description), sort="text")
 
 
-def _of_event(of: type[Event]) -> Iterator[Key]:
-    yield Key("type", "type of the event", words=(f'"{of.kind}"',), sort="text")
-    if of.has_side:
+def _of_event(event_type: type[Event]) -> Iterator[Key]:
+    yield Key("type", "type of the event", words=(f'"{event_type.kind}"',), sort="text")
+    if event_type.has_side:
         yield Key("side", "side that it comes on", words=('"left"', '"right"'), sort="text")
-    if of.has_input:
+    if event_type.has_input:
         yield Key("input", "input of the machine that rises, as [feed] has it", sort="text")
     yield Key("name", "name of its run, in small letters, digits and _", sort="text", follows="type and side")
-    yield from quantity_keys(of.Parameters, of.Parameters())
+    yield from quantity_keys(event_type.Parameters, event_type.Parameters())
 
 
 def _of_entry(entry: TableList) -> Iterator[Key]:
@@ -299,18 +302,18 @@ def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
     while typing.get_origin(base) is typing.Annotated:
         base, *inner = typing.get_args(base)
         more += inner
-    items = next((each for each in more if isinstance(each, Variable)), None)
-    lengths = [limit.max_length for each in more for limit in getattr(each, "metadata", ())]
-    words: tuple[str, ...] = ()
+    items = next((extra for extra in more if isinstance(extra, Variable)), None)
+    lengths = [limit.max_length for extra in more for limit in getattr(extra, "metadata", ())]
+    choices: tuple[str, ...] = ()
     sort: typing.Literal["text", "texts", "switch", "list", "table", "value"] = "text"
     if base is Any:
         sort = "value"
     elif isinstance(base, types.UnionType):
         sort = "texts"
     elif typing.get_origin(base) is typing.Literal:
-        words = tuple(f'"{word}"' for word in typing.get_args(base))
+        choices = tuple(f'"{word}"' for word in typing.get_args(base))
     elif base is bool:
-        words, sort = ("true", "false"), "switch"
+        choices, sort = ("true", "false"), "switch"
     elif typing.get_origin(base) in (list, dict):
         sort = "list" if typing.get_origin(base) is list else "table"
     shown = (
@@ -319,7 +322,7 @@ def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
     return Key(
         name,
         str(field.description),
-        words=words,
+        words=choices,
         sort=sort,
         left_out=shown if sort != "table" else "",
         items=items,
@@ -327,5 +330,5 @@ def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
     )
 
 
-def _first_sentence(of: type) -> str:
-    return (of.__doc__ or "").split(".")[0]
+def _first_sentence(cls: type) -> str:
+    return (cls.__doc__ or "").split(".")[0]

@@ -103,14 +103,14 @@ def linearize(
 
 def linear_point(
     name: str,
-    at: At = None,
+    operating_point: At = None,
     values: Path | None = None,
     *,
     inverse: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> LinearPoint:
-    """The point of a file or a model by its name; `values` is the study file that gives the values of a named model.
-    See `linearize`."""
+    """The point of a file or a model by its name; `operating_point` is `at` of `linearize`, and `values` the study
+    file that gives the values of a named model."""
     whole, is_file = is_study_file(name), name.lower().endswith(".toml")
     if whole and values is not None:
         raise InputError(
@@ -119,57 +119,57 @@ def linear_point(
     if inverse and (whole or not is_file):
         raise InputError(f"inverse: is of linkage files; leave it out for {name}")
     if whole:
-        return _point_of_study(study_files.load(Path(name)), at, progress)
+        return _point_of_study(study_files.load(Path(name)), operating_point, progress)
     if is_file:
         machine = model_named(name)
-        if asks_for_equilibrium(at):
+        if asks_for_equilibrium(operating_point):
             assert isinstance(machine, InverseMachine)
-            point = _at_equilibrium(machine if inverse else machine.direct(), {}, at)
+            point = _at_equilibrium(machine if inverse else machine.direct(), {}, operating_point)
             return point._replace(title=machine.noun)
-        return _point_of_linkage(machine, at, inverse)
+        return _point_of_linkage(machine, operating_point, inverse)
     loaded = None if values is None else study_files.load(values)
     model, start = model_and_start(name, loaded, progress=progress)
-    if asks_for_equilibrium(at):
-        return _at_equilibrium(model, start, at)
-    return _at_values(model, start, at)
+    if asks_for_equilibrium(operating_point):
+        return _at_equilibrium(model, start, operating_point)
+    return _at_values(model, start, operating_point)
 
 
 # -- models and linkages
 
 
-def _at_values(model: Model, start: Mapping[str, float], at: At) -> LinearPoint:
-    """The point of a model with these start values, and with the values of `at`."""
-    given = _values(model, at)
+def _at_values(model: Model, start: Mapping[str, float], operating_point: At) -> LinearPoint:
+    """The point of a model with these start values, and with the values of the `operating_point`."""
+    point_values = _values(model, operating_point)
     names = set(model.parameter_layout.names)
     p = model.check(model.parameter_layout.from_names({k: x for k, x in start.items() if k in names}))
-    own = set(model.input_layout.names)
-    inputs = {k: float(x) for k, x in start.items() if k in own} | {
-        k: x for k, x in given.items() if k in own
+    input_names = set(model.input_layout.names)
+    inputs = {k: float(x) for k, x in start.items() if k in input_names} | {
+        k: x for k, x in point_values.items() if k in input_names
     }
     states: dict[str, float] = {}
     if model.state_layout:
         x = model.begin(p, model.input_layout.from_names(inputs))
         states = {k: float(v) for k, v in model.state_layout.by_name(x).items()}
-        states |= {k: v for k, v in given.items() if k in states}
-    if isinstance(model, DirectMachine) and "tau" not in given:
+        states |= {k: v for k, v in point_values.items() if k in states}
+    if isinstance(model, DirectMachine) and "tau" not in point_values:
         inputs["tau"] = holding_torque(model, p, inputs, states)
-    words = _in_words(model, given)
-    return LinearPoint(model, p, inputs, states, words or "start of the model")
+    text = _in_words(model, point_values)
+    return LinearPoint(model, p, inputs, states, text or "start of the model")
 
 
-def _at_equilibrium(model: Model, start: Mapping[str, float], at: str) -> LinearPoint:
+def _at_equilibrium(model: Model, start: Mapping[str, float], operating_point: str) -> LinearPoint:
     """The point of a machine at rest in an equilibrium, with these start values."""
     inverse = model.inverse if isinstance(model, DirectMachine) else model
     if not isinstance(inverse, InverseMachine) or inverse.States is not None:
         raise InputError(
-            f"at = {shown(at)}: {model.name} has no equilibria that are known; they are of linkages and machines "
-            "without states of their own; give states and inputs, NAME=VALUE, .."
+            f"at = {shown(operating_point)}: {model.name} has no equilibria that are known; they are of linkages "
+            "and machines without states of their own; give states and inputs, NAME=VALUE, .."
         )
-    number, own = equilibrium_point(inverse, start, at)
-    phi = own.place * float(start.get("ratio", inverse.Parameters().ratio))
+    number, equilibrium = equilibrium_point(inverse, start, operating_point)
+    phi = equilibrium.place * float(start.get("ratio", inverse.Parameters().ratio))
     rest = {"phi_start": phi, "w_start": 0.0} if model is not inverse else {"phi": phi, "w": 0.0}
     point = _at_values(model, {**start, **rest}, {"tau": 0.0} if model is not inverse else None)
-    return point._replace(words=f"equilibrium {number} ({place_words(inverse, own)})")
+    return point._replace(words=f"equilibrium {number} ({place_words(inverse, equilibrium)})")
 
 
 def holding_torque(
@@ -185,7 +185,7 @@ def holding_torque(
     return float(-outputs["a"] * (p.J_added + outputs["J"]))
 
 
-def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
+def _point_of_linkage(machine: Any, operating_point: At, inverse: bool) -> LinearPoint:
     """The point of a linkage at the angle (place) and speed of its driver."""
     low, high = machine.span
     ratio = float(machine.Parameters().ratio)
@@ -193,8 +193,8 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
     usual = middle, _USUAL_WAY_SPEED if machine.slides else _USUAL_SPEED
     phi, w = (x * ratio for x in usual)
     start = {"phi": phi, "w": w} if inverse else {"phi_start": phi, "w_start": w}
-    point = _at_values(machine if inverse else machine.direct(), start, at)
-    if at is None:
+    point = _at_values(machine if inverse else machine.direct(), start, operating_point)
+    if operating_point is None:
         unit = ("m", "m/s") if machine.slides else ("rad", "rad/s")
         point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
     driver_at = (point.inputs if inverse else point.states)["phi"] / ratio
@@ -204,39 +204,39 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
     return point._replace(title=machine.noun)
 
 
-def _in_words(model: Model, given: Mapping[str, float]) -> str:
+def _in_words(model: Model, point_values: Mapping[str, float]) -> str:
     """The values that a point gives to states and inputs, with their units."""
     units = {v.name: v.unit for v in _states_and_inputs(model)}
-    return ", ".join(f"{name} = {x:g} {units[name]}".removesuffix(" 1") for name, x in given.items())
+    return ", ".join(f"{name} = {x:g} {units[name]}".removesuffix(" 1") for name, x in point_values.items())
 
 
 def _states_and_inputs(model: Model) -> tuple[Variable, ...]:
     return *(model.state_layout.variables if model.state_layout else ()), *model.input_layout.variables
 
 
-def _values(model: Model, at: At) -> dict[str, float]:
+def _values(model: Model, operating_point: At) -> dict[str, float]:
     """The values that a point gives to states and inputs."""
-    if at is None:
+    if operating_point is None:
         return {}
     variables = _states_and_inputs(model)
-    if isinstance(at, str):
+    if isinstance(operating_point, str):
         pairs = {}
-        for each in at.split(","):
-            name, sign, text = (part.strip() for part in each.partition("="))
+        for assignment in operating_point.split(","):
+            name, sign, text = (part.strip() for part in assignment.partition("="))
             if not sign:
                 raise InputError(
-                    f"at = {shown(at)}: must be NAME=VALUE, .. of states and inputs of {model.name}, such as "
-                    f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study, '
-                    '"equilibrium" of a machine'
+                    f"at = {shown(operating_point)}: must be NAME=VALUE, .. of states and inputs of {model.name}, "
+                    f'such as "{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a '
+                    'study, "equilibrium" of a machine'
                 )
             pairs[name] = text
-        at = pairs
-    check_kind("at", at, Mapping, "a text, or a mapping of names to values")
+        operating_point = pairs
+    check_kind("at", operating_point, Mapping, "a text, or a mapping of names to values")
     values = {}
-    for name, given in at.items():
+    for name, value in operating_point.items():
         k = place("state or input", name, variables)
         try:
-            values[name] = to_number(variables[k], given)
+            values[name] = to_number(variables[k], value)
         except ValueError as error:
             raise InputError(f"at: {error}") from None
     return values
@@ -249,16 +249,16 @@ _EXAMPLES = {"rad": "30 deg", "rad/s": "60 rpm", "m": "20 mm", "m/s": "0.1 m/s"}
 
 
 def _point_of_study(
-    config: Config, at: At, progress: Callable[[str], None] = lambda what: None
+    config: Config, operating_point: At, progress: Callable[[str], None] = lambda what: None
 ) -> LinearPoint:
     """The point of the whole drive of a study."""
-    if asks_for_equilibrium(at):
+    if asks_for_equilibrium(operating_point):
         raise InputError(
-            f"at = {shown(at)}: is of a linkage file, or of a machine by its name; a study has runs: {START}, "
-            f"{', '.join([STEADY, *config.events])}"
+            f"at = {shown(operating_point)}: is of a linkage file, or of a machine by its name; a study has "
+            f"runs: {', '.join([START, STEADY, *config.events])}"
         )
     drive = drive_to_export(config, progress=progress)
-    point = drive_point(drive, config.operation, config.events, at, progress)
+    point = drive_point(drive, config.operation, config.events, operating_point, progress)
     return point._replace(title=config.title)
 
 
@@ -266,7 +266,7 @@ def drive_point(
     drive: Drive,
     operation: OperatingConditions,
     events: Mapping[str, Event],
-    at: At = None,
+    operating_point: At = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> LinearPoint:
     """The point of a drive in its operation, compiled to one system. The compiled system makes the runs, which
@@ -275,7 +275,7 @@ def drive_point(
     Parameters
     ----------
     drive, operation, events : of a study
-    at : see `linearize`
+    operating_point : `at` of `linearize`
 
     Raises
     ------
@@ -287,11 +287,11 @@ def drive_point(
     rig = Rig(operation, drive, None)
     with refusal_prefix("linear model: "):
         system = CompiledSystem(rig.graph)
-    run, time, given = STEADY, None, {}
-    if isinstance(at, str) and "=" not in at:
-        run, time = _run_and_time(at, [START, STEADY, *events])
+    run, time, point_values = STEADY, None, {}
+    if isinstance(operating_point, str) and "=" not in operating_point:
+        run, time = _run_and_time(operating_point, [START, STEADY, *events])
     else:
-        given = _values(system.model, at)
+        point_values = _values(system.model, operating_point)
     progress(f"run to {run.replace('_', ' ')}")
     simulation: Any  # of the compiled system, which has no FMUs to close
     with rig.from_rest() as simulation:
@@ -308,29 +308,31 @@ def drive_point(
     now = float(simulation.time)
     inputs = system.inputs | {full: float(at_time(x, now)) for full, x in simulation.signals.items()}
     states = dict(zip(system.model.state_layout.names, map(float, simulation.states), strict=True))
-    for own in (inputs, states):
-        own |= {name: x for name, x in given.items() if name in own}
-    words = f"{'steady running' if run == STEADY else run}, t = {now:.6g} s"
+    for group in (inputs, states):
+        group |= {name: x for name, x in point_values.items() if name in group}
+    text = f"{'steady running' if run == STEADY else run}, t = {now:.6g} s"
     return LinearPoint(
         system.model,
         system.p,
         inputs,
         states,
-        ", ".join(filter(None, (words, _in_words(system.model, given)))),
+        ", ".join(filter(None, (text, _in_words(system.model, point_values)))),
     )
 
 
-def _run_and_time(at: str, runs: list[str]) -> tuple[str, float | None]:
-    name, sign, text = (part.strip() for part in at.partition(":"))
+def _run_and_time(operating_point: str, runs: list[str]) -> tuple[str, float | None]:
+    name, sign, text = (part.strip() for part in operating_point.partition(":"))
     if name not in runs:
         raise InputError(
-            f"at = {shown(at)}: there is no run {shown(name)}{near_name(name, runs) or ';'} there are "
+            f"at = {shown(operating_point)}: there is no run {shown(name)}{near_name(name, runs) or ';'} there are "
             f'{", ".join(runs)}; must be RUN:TIME, such as "{START}:0.4 s", or NAME=VALUE, .. of states and inputs'
         )
     if not sign and name == STEADY:
         return name, None
     if not text:
-        raise InputError(f'at = {shown(at)}: must be RUN:TIME, such as "{name}:0.4 s"; the time is missing')
+        raise InputError(
+            f'at = {shown(operating_point)}: must be RUN:TIME, such as "{name}:0.4 s"; the time is missing'
+        )
     try:
         return name, to_number(Variable("at", "time of the run", Quantity("s", "", low=0.0, high=1e6)), text)
     except ValueError as error:

@@ -152,21 +152,21 @@ class _Way:
         machine = self.machine
         u = machine.inputs({"phi": q * machine.ratio, "w": self.speed * machine.ratio, **self.feed})
         state, part = machine.state(u), machine.model.parts[0]
-        given = part.layout.by_name(part.equations(numpy_(), machine.p, u, None, state))
-        return state, {name: np.broadcast_to(x, q.shape) for name, x in given.items()}
+        outputs = part.layout.by_name(part.equations(numpy_(), machine.p, u, None, state))
+        return state, {name: np.broadcast_to(x, q.shape) for name, x in outputs.items()}
 
     def outputs(self, names: Iterable[str]) -> Callable[[Any], Any]:
         """The function that gives outputs at places, shape (names, n)."""
         kept = tuple(names)
 
         def values(q: Any) -> Any:
-            given = self.state(q)[1]
-            return np.array([given[name] for name in kept]).reshape(-1, len(q))
+            outputs = self.state(q)[1]
+            return np.array([outputs[name] for name in kept]).reshape(-1, len(q))
 
         return values
 
 
-def speed_of_driver(machine: Machine, given: str | None, name: str = "--speed") -> float:
+def speed_of_driver(machine: Machine, text: str | None, name: str = "--speed") -> float:
     """The speed of the driver of a linkage [rad/s, m/s] from an option or argument of that name, or the usual one.
 
     Raises
@@ -176,7 +176,7 @@ def speed_of_driver(machine: Machine, given: str | None, name: str = "--speed") 
     """
     unit = "m/s" if machine.model.slides else "rad/s"
     most = FASTEST[unit]
-    return option_value(name, given or USUAL_SPEEDS[unit], unit, "speed of the driver", most)
+    return option_value(name, text or USUAL_SPEEDS[unit], unit, "speed of the driver", most)
 
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
@@ -189,8 +189,8 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
         for a load that has no finite value.
     """
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
-    for each in {speed} if machine.model.turns else {abs(speed), -abs(speed)}:
-        description.check_loads(machine.p, each)
+    for driver_speed in {speed} if machine.model.turns else {abs(speed), -abs(speed)}:
+        description.check_loads(machine.p, driver_speed)
     rest = machine.equilibria()
     if machine.model.turns:
         return _findings(machine, speed, rest)
@@ -210,14 +210,16 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
 
     def sizes(q: Any) -> Any:
         """All quantities of which the largest value counts, in the order of `names`."""
-        state, at = way.state(q)
+        state, part_outputs = way.state(q)
         bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
         margins = [np.broadcast_to(np.abs(margin), q.shape) for margin in state.m.margins()]
-        forces = [np.hypot(at[f"{joint}.fx"], at[f"{joint}.fy"]) for joint in joints.values()]
+        forces = [
+            np.hypot(part_outputs[f"{joint}.fx"], part_outputs[f"{joint}.fy"]) for joint in joints.values()
+        ]
         return np.array(
             [np.abs(bias), inertia, -inertia, *(-margin for margin in margins), *forces,
-             *(np.abs(at[name]) for name in moments), *(at[name] for name in moving),
-             *(-at[name] for name in moving)]
+             *(np.abs(part_outputs[name]) for name in moments), *(part_outputs[name] for name in moving),
+             *(-part_outputs[name] for name in moving)]
         )  # fmt: skip
 
     names = [
@@ -226,7 +228,7 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
     ]  # fmt: skip
     turns = machine.model.turns
     places, values = largest(sizes, q, around=turns)
-    at = {name: _folded(float(place), turns) for name, place in zip(names, places, strict=True)}
+    peak_places = {name: _folded(float(place), turns) for name, place in zip(names, places, strict=True)}
     top = dict(zip(names, map(float, values), strict=True))
 
     (mean, torque_rms), forces_rms = _means(way, joints.values(), description.span)
@@ -250,11 +252,14 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         q,
         outputs,
         turn,
-        {name: GroupTurn(margin=-top[f"-margin {name}"], margin_at=at[f"-margin {name}"]) for name in groups},
+        {
+            name: GroupTurn(margin=-top[f"-margin {name}"], margin_at=peak_places[f"-margin {name}"])
+            for name in groups
+        },
         {
             name: JointTurn(
                 peak=top[f"force {name}"],
-                peak_at=at[f"force {name}"],
+                peak_at=peak_places[f"force {name}"],
                 rms=force_rms,
                 moment=top.get(f"{variable}.moment"),
             )
@@ -278,10 +283,14 @@ def _means(
     variables, over the way of the driver from the begin to the end of its `span`."""
 
     def squares(q: Any) -> Any:
-        state, at = way.state(q)
+        state, part_outputs = way.state(q)
         bias = np.broadcast_to(state.bias, q.shape)
         return np.array(
-            [bias, bias**2, *(at[f"{joint}.fx"] ** 2 + at[f"{joint}.fy"] ** 2 for joint in joints)]
+            [
+                bias,
+                bias**2,
+                *(part_outputs[f"{joint}.fx"] ** 2 + part_outputs[f"{joint}.fy"] ** 2 for joint in joints),
+            ]
         )
 
     (mean, *mean_squares), (size, *_) = means(squares, *span)
@@ -311,16 +320,16 @@ def _motions(
         if description.link_turns[name][0] == 0.0 or not turns
     ]
     _, outputs = way.state(q)
-    parts = [each for each in parts if np.ptp(outputs[each[2]]) > STANDS]
+    parts = [part for part in parts if np.ptp(outputs[part[2]]) > STANDS]
     dead_centres = roots(way.outputs(rate for *_, rate in parts), q, around=turns) if parts else []
-    for (name, of, output, _), back in zip(parts, dead_centres, strict=True):
+    for (name, motion_type, output, _), back in zip(parts, dead_centres, strict=True):
         # a driver with a range has ends of its own
         places = back if turns and len(back) else np.array([q[0], *back, q[-1]])
         course = way.outputs([output])(places)[0]
         low, high = int(np.argmin(course)), int(np.argmax(course))
         whole = 2.0 * math.pi
         forth = float(places[high] - places[low]) % whole if turns else None
-        motion = of(
+        motion = motion_type(
             least=_plain(course[low]),
             least_at=_folded(float(places[low]), turns),
             largest=_plain(course[high]),

@@ -56,7 +56,7 @@ def turns_by_load(machine: Machine, crank_speed: float, feed: Any) -> dict[str, 
     the one-sided cases, or that without feed."""
     sided = bool(machine.model.sides)
     feeds = one_sided_feeds(feed) if sided else {"normal running": feed, "without feed": no_feed(feed)}
-    return {name: cycle(machine, crank_speed, each) for name, each in feeds.items()}
+    return {name: cycle(machine, crank_speed, load) for name, load in feeds.items()}
 
 
 def cycle_alone(

@@ -179,7 +179,7 @@ class Measure:
 
 def measure(
     unit: str,
-    words: str,
+    phrase: str,
     reader: Reader,
     *,
     of: str = "",
@@ -189,10 +189,10 @@ def measure(
     minor: bool = False,
 ) -> Any:
     """A field that declares a `Measure`, as `quantity` does; its description is the subject `of` and the
-    `words`."""
-    own_field = quantity(unit, f"{of}, {words}" if of else words, kind=kind)
-    own = Measure(reader, during, words, of or words, card, minor)
-    return dataclasses.field(metadata={**own_field.metadata, "measure": own})
+    `phrase`."""
+    own_field = quantity(unit, f"{of}, {phrase}" if of else phrase, kind=kind)
+    declared = Measure(reader, during, phrase, of or phrase, card, minor)
+    return dataclasses.field(metadata={**own_field.metadata, "measure": declared})
 
 
 @declaration
@@ -377,14 +377,14 @@ class Answers:
 
 
 MEASURES: Mapping[str, Measure] = {
-    each.name: each.metadata["measure"] for each in dataclasses.fields(Answers)
+    entry.name: entry.metadata["measure"] for entry in dataclasses.fields(Answers)
 }
 """The measures by the names of their fields."""
 
 
 def same_measure(name: str) -> Any:
     """A field that declares the measure of that name in another declaration."""
-    (own_field,) = (each for each in dataclasses.fields(Answers) if each.name == name)
+    (own_field,) = (entry for entry in dataclasses.fields(Answers) if entry.name == name)
     return dataclasses.field(metadata=own_field.metadata)
 
 
@@ -392,8 +392,8 @@ def read_answers(window: Window) -> Answers:
     """All measures of a window; a measure is None where it has no meaning in this run or no value."""
     return Answers(
         **{
-            name: read_measure(name, window) if window.phase in each.during else None
-            for name, each in MEASURES.items()
+            name: read_measure(name, window) if window.phase in entry.during else None
+            for name, entry in MEASURES.items()
         }
     )
 
@@ -402,10 +402,10 @@ def not_known(window: Window) -> dict[str, str]:
     """The measures of a window that cannot be read, by name, each with the part (motor or machine) that lacks
     a variable."""
     parts = {}
-    for name, each in MEASURES.items():
-        if window.phase in each.during:
+    for name, entry in MEASURES.items():
+        if window.phase in entry.during:
             try:
-                each.reader(window)
+                entry.reader(window)
             except AbsentError as absent:
                 parts[name] = absent.part
     return parts

@@ -117,8 +117,8 @@ class ForeignMotor(MotorSource):
         inputs = self.component.connectors
         with refusal_prefix("system.motor: ", "system.motor"):
             for part in registered():
-                if words := part.not_with_foreign_motor(plans[part.name]):
-                    raise InputError(f"{self.file}: {words}")
+                if refusal := part.not_with_foreign_motor(plans[part.name]):
+                    raise InputError(f"{self.file}: {refusal}")
             if tables.feed_forward and "tau_ff" not in inputs:
                 raise InputError(f"{self.file}: has no input tau_ff in N.m; leave feed_forward out")
 

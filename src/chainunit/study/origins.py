@@ -59,7 +59,10 @@ def _linkage_line(file: FileContents, name: str) -> int:
     # a link whose name has another meaning, too, has its kind in the name of its quantities
     links = (f"links.{key}", f"links.{key.replace('_link.', '.', 1)}")
     keys = {"feed": (f"inputs.{key}",), "machine": (_GRAVITY.get(key, key), f"parameters.{key}", *links)}
-    return next((file.linkage_lines[each] for each in keys.get(table, ()) if each in file.linkage_lines), 0)
+    return next(
+        (file.linkage_lines[line_key] for line_key in keys.get(table, ()) if line_key in file.linkage_lines),
+        0,
+    )
 
 
 _GRAVITY = {"g": "gravity"}

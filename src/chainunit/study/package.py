@@ -65,8 +65,8 @@ def start_of(drive: Drive, operation: OperatingConditions, model: Model) -> dict
     if not isinstance(model, Motor):
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
-        own = drive.simulated_machine if isinstance(model, ChainedModel) else drive.driven_machine
-        return _machine(operation, model, own)
+        machine = drive.simulated_machine if isinstance(model, ChainedModel) else drive.driven_machine
+        return _machine(operation, model, machine)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -158,10 +158,10 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
 
 def remarks_on_export(config: Config) -> list[str]:
     """Sentences on the parts of a study that its FMU or package does not have, and on the limits of its model."""
-    words = [left_out(config.operation, config.given_events)]
+    sentences = [left_out(config.operation, config.given_events)]
     if config.file.tables.get("organ") != "chain":
-        words += beyond_two_bars(config.machine, config.feed, config.run.crank_speed)
-    return list(filter(None, words))
+        sentences += beyond_two_bars(config.machine, config.feed, config.run.crank_speed)
+    return list(filter(None, sentences))
 
 
 def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
@@ -177,9 +177,9 @@ def _is_of(model: Model, drive: Drive) -> bool:
     """Whether the model is the machine of the drive, its direct model, or its model with chains."""
     if drive.foreign_machine:
         return False
-    own = drive.driven_machine.model
-    chains = bool(own.sides) and isinstance(model, ChainedModel)
-    return model is own or chains or model is own.direct()
+    machine_model = drive.driven_machine.model
+    chains = bool(machine_model.sides) and isinstance(model, ChainedModel)
+    return model is machine_model or chains or model is machine_model.direct()
 
 
 def _machine(operation: OperatingConditions, model: Model, machine: Machine) -> dict[str, float]:

@@ -46,17 +46,17 @@ class PermittedStarts(StartingData):
     permitted: float = quantity("1", "permitted starts an hour")
 
 
-def permitted_starts(of: StartingData, most: float = math.inf) -> PermittedStarts:
+def permitted_starts(data: StartingData, most: float = math.inf) -> PermittedStarts:
     """The permitted starts of a motor, at most so many an hour as another rule permits."""
-    inertia = of.inertia / of.rotor_inertia
-    torque = max(0.0, 1.0 - of.counter_torque / of.motor_torque)
-    running = max(0.0, 1.0 - (of.current / of.rated_current) ** 2)
+    inertia = data.inertia / data.rotor_inertia
+    torque = max(0.0, 1.0 - data.counter_torque / data.motor_torque)
+    running = max(0.0, 1.0 - (data.current / data.rated_current) ** 2)
     return PermittedStarts(
-        **vars(of),
+        **vars(data),
         inertia_factor=inertia,
         torque_factor=torque,
         running_factor=running,
-        permitted=min(most, of.bare * torque * running / inertia),
+        permitted=min(most, data.bare * torque * running / inertia),
     )
 
 

@@ -65,8 +65,8 @@ def _digests(file: FileContents) -> Iterator[tuple[str, str]]:
     for table, key in (("system", "motor"), ("system", "machine"), ("machine", "linkage")):
         name = str(file.tables.get(table, {}).get(key, ""))
         names += [name] if name.lower().endswith((".toml", ".fmu")) else []
-    of_parts = (each for part in registered() for each in part.files(file.tables))
-    names += [str(each.table.get(each.name, "")) for each in of_parts]
+    of_parts = (part_file for part in registered() for part_file in part.files(file.tables))
+    names += [str(part_file.table.get(part_file.name, "")) for part_file in of_parts]
     for name in dict.fromkeys(name for name in names if name):
         with contextlib.suppress(InputError, OSError):
             yield name, digest(beside(name, file.source))

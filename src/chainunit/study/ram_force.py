@@ -79,7 +79,9 @@ def rams(study: StudyRecord) -> Iterator[RamForce]:
         pin = next((k for k, j in joints.items() if j.kind == REVOLUTE and ram in (j.on[0], j.by[0])), None)
         if pin is None or name == description.structure.driver.joint:
             continue
-        guide, force = (attrgetter(description.variable("joint", each))(turn.outputs) for each in (name, pin))
+        guide, force = (
+            attrgetter(description.variable("joint", joint_name))(turn.outputs) for joint_name in (name, pin)
+        )
         shape = turn.angle.shape
         rate = np.broadcast_to(guide.v, shape) / study.config.run.crank_speed
         size = np.broadcast_to(_along(guide, force), shape)
@@ -106,8 +108,8 @@ def _dead_centres(angle: Any, rate: Any) -> list[float]:
     def rate_at(q: Any) -> Any:
         return np.interp(q, angle, rate, period=2.0 * math.pi)[None]
 
-    (found,) = roots(rate_at, np.append(angle, angle[0] + 2.0 * math.pi), around=True)
-    return [round(float(q), 9) % (2.0 * math.pi) for q in found]
+    (angles,) = roots(rate_at, np.append(angle, angle[0] + 2.0 * math.pi), around=True)
+    return [round(float(q), 9) % (2.0 * math.pi) for q in angles]
 
 
 def _before(angle: Any, size: Any, place: float) -> float:

@@ -125,9 +125,9 @@ def has_turn(drive: Drive, run: xr.Dataset) -> bool:
 
 def less_than_a_turn(drive: Drive, run: xr.Dataset) -> str:
     """The words on a run without a whole turn of the crank."""
-    made, time = number(turns_made(drive, run), "1"), run["time"].values
+    turns, time = number(turns_made(drive, run), "1"), run["time"].values
     span = number(float(time[-1] - time[0]), "s")
-    return f"the {drive.driver_noun} makes {made} of a turn in the {span} that are evaluated"
+    return f"the {drive.driver_noun} makes {turns} of a turn in the {span} that are evaluated"
 
 
 def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
@@ -143,7 +143,9 @@ def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
         unit = resolution * max(peak(x), 1e-9)
         columns.append(np.round(x / unit) * unit)
     instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
-    limits = [drive.motor.largest_torque(drive.fmu_parameters, T, *map(float, at)) for at in instants.T]
+    limits = [
+        drive.motor.largest_torque(drive.fmu_parameters, T, *map(float, instant)) for instant in instants.T
+    ]
     return np.array(limits)[np.reshape(which, -1)]
 
 

@@ -94,7 +94,9 @@ class StudyRecord:
     @property
     def warnings(self) -> list[Remark]:
         """Remarks on faults and on limits that are passed, the gravest first."""
-        return sorted((each for each in self.remarks if each.severity != "note"), key=lambda each: each.rank)
+        return sorted(
+            (remark for remark in self.remarks if remark.severity != "note"), key=lambda remark: remark.rank
+        )
 
     @property
     def notes(self) -> list[Remark]:
@@ -230,7 +232,7 @@ class Findings(ABC):
     @classmethod
     def found_in(cls, study: StudyRecord) -> Self | None:
         """The findings of this kind of a study; None where it has none."""
-        return next((each for each in study.findings.values() if isinstance(each, cls)), None)
+        return next((findings for findings in study.findings.values() if isinstance(findings, cls)), None)
 
     @classmethod
     def of_study(cls, study: StudyRecord) -> Self:

@@ -51,8 +51,8 @@ MORE_CURRENT = 1.2
 def class_holding(seconds: float, least: int = LIGHT) -> int:
     """The least trip class, from the class `least` on, whose cold relay surely holds in a start of so many `seconds`,
     see `start_seconds`."""
-    usual = [each for each in CLASSES if each.name.isdigit() and int(each.name) >= least]
-    return next((int(each.name) for each in usual if seconds <= each.shortest), HEAVIER)
+    usual = [candidate for candidate in CLASSES if candidate.name.isdigit() and int(candidate.name) >= least]
+    return next((int(candidate.name) for candidate in usual if seconds <= candidate.shortest), HEAVIER)
 
 
 def start_seconds(time: Any, current: Any, setting: float) -> float:
@@ -72,25 +72,25 @@ def protecting_class(
     may be locked for the `stall_time` [s]."""
 
     def protects(number: int) -> bool:
-        trip_class = next(each for each in CLASSES if each.name == str(number))
+        trip_class = next(candidate for candidate in CLASSES if candidate.name == str(number))
         trip = stall_trip(trip_class, setting, before, stall_current)
         return trip is not None and trip <= stall_time
 
     tolerant = class_holding(MORE_CURRENT**2 * seconds, least)
     if tolerant <= HEAVIEST and protects(tolerant):
         return tolerant
-    quick = next(each for each in CLASSES if each.name == str(QUICK))
+    quick = next(candidate for candidate in CLASSES if candidate.name == str(QUICK))
     saves = least == LIGHT and seconds <= quick.shortest and not protects(LIGHT) and protects(QUICK)
     return QUICK if saves else least
 
 
-def stall_trip(of: TripClass, setting: float, before: float, current: float) -> float | None:
+def stall_trip(trip_class: TripClass, setting: float, before: float, current: float) -> float | None:
     """Time [s] after which the slowest relay of a class trips at a steady `current` [A], warm from the RMS current
     `before` [A]; None where it never does, and where it does not let the motor run, either."""
     if before >= TRIPS_AT * setting:
         return None
     # a record without a row of the stall: all of it is the current that flows on
-    return relay_trip([0.0], [current], setting, before, current, of.longest, TRIPS_AT)
+    return relay_trip([0.0], [current], setting, before, current, trip_class.longest, TRIPS_AT)
 
 
 def lasting_current(current: Any, after: float | None = None) -> float:

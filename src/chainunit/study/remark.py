@@ -119,7 +119,7 @@ def _declare(
         for size, names in sizes.items()
         for name in names.split()
     }
-    sentences = tuple(each for text in texts for each in _SENTENCE_END.split(text))
+    sentences = tuple(sentence for text in texts for sentence in _SENTENCE_END.split(text))
     declared = RemarkCode(code, severity, sentences, remedy, by_name)
     assert DECLARED.setdefault(code, declared) == declared, code
     return declared

@@ -430,7 +430,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         yield "slowed", f"by {number(dip, '1', 'percent')}", {"speed_dip": dip}
     if answers.coupling_trip_time is not None:
         names = ("coupling_trip_time", "energy_after_trip", "energy_behind")
-        sizes = {each: getattr(answers, each) for each in names}
+        sizes = {key: getattr(answers, key) for key in names}
         time, energy, behind = (number(x, unit) for x, unit in zip(sizes.values(), "sJJ", strict=True))
         stays = "the machine behind it is an FMU and is not followed"
         if answers.energy_behind is not None:
@@ -516,14 +516,14 @@ def _on_inverter(study: StudyRecord) -> None:
 def _limited(study: StudyRecord) -> tuple[float | None, str]:
     """The current limit of an inverter with the rated current of the motor [A], and words on the starts with it; None
     where there are none."""
-    found = StartFindings.found_in(study)
-    if found is None or found.current_limit is None:
+    findings = StartFindings.found_in(study)
+    if findings is None or findings.current_limit is None:
         return None, ""
-    if stuck := [start for start in found.limited if start.start_time is None]:
+    if stuck := [start for start in findings.limited if start.start_time is None]:
         where = " and ".join(number(start.angle, "rad") for start in stuck)
-        return found.current_limit, f"does not bring the {study.driver_noun} to its speed from {where}"
-    time = number(max(start.start_time or 0.0 for start in found.limited), "s")
-    return found.current_limit, f"starts in up to {time}"
+        return findings.current_limit, f"does not bring the {study.driver_noun} to its speed from {where}"
+    time = number(max(start.start_time or 0.0 for start in findings.limited), "s")
+    return findings.current_limit, f"starts in up to {time}"
 
 
 _ASSUMPTION = note(
@@ -559,4 +559,4 @@ def declared_remarks() -> list[RemarkCode]:
         for module in iter_modules(folder.__path__):
             import_module(f"{folder.__name__}.{module.name}")
     order = list(SEVERITIES)
-    return sorted(DECLARED.values(), key=lambda each: (order.index(each.severity), each.code))
+    return sorted(DECLARED.values(), key=lambda declared: (order.index(declared.severity), declared.code))

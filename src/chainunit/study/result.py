@@ -120,9 +120,9 @@ def as_dict(study: StudyRecord) -> ResultEntries:
     """All results except the time series, ready for JSON, each number with its unit; given values, runs and findings
     are three parts."""
     with shown_in(study.config.units):
-        base, given = as_data(_data(study)), _given_values(study)
+        base, given_part = as_data(_data(study)), _given_values(study)
         runs, findings = base.pop("runs"), base.pop("findings") | _parts(study)
-        return ResultEntries(base | {"given": given, "runs": runs, "findings": findings})
+        return ResultEntries(base | {"given": given_part, "runs": runs, "findings": findings})
 
 
 def _data(study: StudyRecord) -> StudyData:
@@ -205,18 +205,18 @@ def _spread(study: StudyRecord, name: str) -> dict[str, InUnit]:
     """The range of the assumed quantities of an event, and the peaks over it."""
     spread = study.spreads[name]
     units = {v.name: v.unit for v in variables(study.config.events[name].Parameters)}
-    ranges = [(each, ends, units[each], "assumed") for each, ends in spread.ranges.items()]
-    ranges += [(each, ends, "N.m", "") for each, ends in spread.peaks.items()]
+    ranges = [(key, ends, units[key], "assumed") for key, ends in spread.ranges.items()]
+    ranges += [(key, ends, "N.m", "") for key, ends in spread.peaks.items()]
     return {
-        f"{each}_{end}": InUnit(x, unit, kind)
-        for each, ends, unit, kind in ranges
+        f"{key}_{end}": InUnit(x, unit, kind)
+        for key, ends, unit, kind in ranges
         for end, x in zip(("low", "high"), ends, strict=True)
     }
 
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
-    parts = {name: found.data(study) for name, found in study.findings.items()}
+    parts = {name: findings.data(study) for name, findings in study.findings.items()}
     if study.statics.modes is not None:
         parts |= _driveline(study)
     return parts

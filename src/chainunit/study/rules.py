@@ -82,8 +82,8 @@ def _default(machine: str = "") -> Parts:
 
 def _any(conditions: list[Condition]) -> Condition:
     joined, *rest = conditions or [NEVER]
-    for each in rest:
-        joined = joined | each
+    for condition in rest:
+        joined = joined | condition
     return joined
 
 
@@ -160,8 +160,8 @@ def _of_parts() -> Iterator[Rule]:
         is_empty_table("system"),
     )
     for part, foreign in (("motor", MOTOR_FMU), ("machine", MACHINE_FMU)):
-        words = f'are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
-        yield Rule(f"system.{part}_names", ~foreign, words)
+        refusal = f'are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
+        yield Rule(f"system.{part}_names", ~foreign, refusal)
     yield Rule("system.motor_parameters", ~MOTOR_FMU, "are of a motor that is an FMU; write them in [motor]")
     yield Rule("feed_forward", MACHINE_FMU, NEEDS_MODEL, is_one_of("feed_forward", True))
 
@@ -170,20 +170,20 @@ def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
     yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
     for name in lengths(**filled(Ratios, {})):
-        words = "given beside [ratios], which sets it; leave out one of the two"
-        yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), words)
+        refusal = "given beside [ratios], which sets it; leave out one of the two"
+        yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), refusal)
 
 
 def _of_motors() -> Iterator[Rule]:
     """Rules of the motor and of the tables that choose one."""
     yield Rule("motor", names_designation() | MOTOR_FMU, BESIDE_MOTOR)
     deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
-    words = "a motor of the type {type} has no input for the torque; leave it out"
+    refusal = "a motor of the type {type} has no input for the torque; leave it out"
     chosen, switched_on = motor_is_chosen(), is_one_of("feed_forward", True)
-    yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), words, switched_on)
+    yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), refusal, switched_on)
     keys = " or ".join([*(f"[{table}]" for table in _choosing_tables()), "system.motor"])
     for name in ("gear", "start", "starter", "catalogue"):
-        words = f"is of a motor of the catalogue; add {keys}, or leave it out"
-        yield Rule(name, ~(chosen | motor_of_catalogue()), words)
-    words = "follows from the motor's rated speed; to have another, give gear.ratio"
-    yield Rule("machine.ratio", ~chosen & motor_of_catalogue(), words)
+        refusal = f"is of a motor of the catalogue; add {keys}, or leave it out"
+        yield Rule(name, ~(chosen | motor_of_catalogue()), refusal)
+    refusal = "follows from the motor's rated speed; to have another, give gear.ratio"
+    yield Rule("machine.ratio", ~chosen & motor_of_catalogue(), refusal)

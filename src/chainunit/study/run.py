@@ -139,12 +139,17 @@ def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool =
 def _with_class_of_all_starts(study: StudyRecord) -> None:
     """Where the starts from all crank angles, or a stall, take a relay of another class, read its trips in the events
     once more."""
-    found, plate = StartFindings.found_in(study), study.plate
-    if found is None or plate is None or study.drive.follows:
+    findings, plate = StartFindings.found_in(study), study.plate
+    if findings is None or plate is None or study.drive.follows:
         return
-    least, of = max(found.start_class, study.relay_class), plate.nameplate
-    before, stall = study.answers[verdict.STEADY].current_rms, of.rated_current * of.locked_current_ratio
-    trip_class = protecting_class(least, found.relay_seconds, of.rated_current, before, stall, of.locked_time)
+    least, nameplate = max(findings.start_class, study.relay_class), plate.nameplate
+    before, stall = (
+        study.answers[verdict.STEADY].current_rms,
+        nameplate.rated_current * nameplate.locked_current_ratio,
+    )
+    trip_class = protecting_class(
+        least, findings.relay_seconds, nameplate.rated_current, before, stall, nameplate.locked_time
+    )
     if trip_class == study.relay_class:
         return
     study.relay_class = trip_class

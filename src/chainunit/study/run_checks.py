@@ -44,9 +44,12 @@ def loads_beyond(
     normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).by_name(feed)
     hardest = [(f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(events.items(), 1)]
     randoms = [(part, part.random_events(plans[part.name])) for part in registered()]
-    beside = {key: part for part, own in randoms for key in own}
+    beside = {key: part for part, random_events in randoms for key in random_events}
     hardest += [
-        (key, key, event) for _, own in randoms for key, random in own.items() for event in random.hardest()
+        (key, key, event)
+        for _, random_events in randoms
+        for key, random in random_events.items()
+        for event in random.hardest()
     ]
     of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
     for where, key, event in hardest:
@@ -63,8 +66,8 @@ def loads_beyond(
                 )
             # an input of the motor: the study checks whether the motor has it
             continue
-        if words := event.fault(normal):
-            yield InputError(f"{where}: {words}", key=key)
+        if fault := event.fault(normal):
+            yield InputError(f"{where}: {fault}", key=key)
         for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
             most = (
                 max([signal.start, *(x for *_, x in signal.changes)])

@@ -83,11 +83,11 @@ class _Schema:
             for key in table.keys:
                 self._add(place, key, table)
             if table.name in OF_PARTS:
-                own: dict[str, Any] = {}
-                inside = _object(own, table.name)["properties"]
+                part_tables: dict[str, Any] = {}
+                inside = _object(part_tables, table.name)["properties"]
                 for key in table.keys:
                     self._add(inside, key, table)
-                self.definitions[f"{table.name}.{table.of}"] = own[table.name]
+                self.definitions[f"{table.name}.{table.of}"] = part_tables[table.name]
         for name in OF_PARTS:
             # the keys depend on the machine and the motor: the `rules` give them
             del properties[name]["additionalProperties"]
@@ -108,7 +108,9 @@ class _Schema:
         for name, section in all_sections().items():
             for event in section.random_events:
                 properties[name]["properties"][event] = random
-        properties["system"]["properties"]["motor"]["examples"] += [each.designation for each in catalogue()]
+        properties["system"]["properties"]["motor"]["examples"] += [
+            motor.designation for motor in catalogue()
+        ]
         return {
             "$schema": "http://json-schema.org/draft-07/schema#",
             "title": "Study file of chainunit",
@@ -122,16 +124,16 @@ class _Schema:
     def _add(self, place: dict[str, Any], key: Key, table: KeyTable) -> None:
         """Add a key to the properties of a table; a key that is there already takes the values of both."""
         *tables, name = key.name.split(".")
-        for each in tables:
-            place = _object(place, each)["properties"]
+        for part in tables:
+            place = _object(place, part)["properties"]
         form = self._form(key, table)
         if table.of:
             form["description"] = f"{table.of}: {form['description']}"
         if name in place:
             others = place[name].get("anyOf", [place[name]]) if "anyOf" in place[name] else [place[name]]
             if form not in others:
-                words = "; ".join(dict.fromkeys((place[name]["description"], form["description"])))
-                place[name] = {"anyOf": [*others, form], "description": words}
+                description = "; ".join(dict.fromkeys((place[name]["description"], form["description"])))
+                place[name] = {"anyOf": [*others, form], "description": description}
         else:
             place[name] = form
 
@@ -230,8 +232,8 @@ class _Schema:
 
 def _object(place: dict[str, Any], name: str, description: str = "") -> dict[str, Any]:
     """The table `name` in a table, made where it is missing."""
-    made: dict[str, Any] = {"type": "object", "additionalProperties": False, "properties": {}}
-    inner: dict[str, Any] = place.setdefault(name, made)
+    new_table: dict[str, Any] = {"type": "object", "additionalProperties": False, "properties": {}}
+    inner: dict[str, Any] = place.setdefault(name, new_table)
     if description:
         inner.setdefault("description", description)
     return inner

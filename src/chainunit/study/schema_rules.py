@@ -30,8 +30,8 @@ def rules() -> Iterator[Schema]:
     motors = motor_is(*MOTORS, *packaged) | ends_with("system.motor", FMU)
     yield from _needs(given("system.motor") & ~given("catalogue"), motors)
     for name in MOTORS:
-        own = motor_is(name) | ~given("system.motor") if name == "DcMotor" else motor_is(name)
-        yield _where(own, {"properties": {"motor": {"$ref": f"#/definitions/motor.{name}"}}})
+        condition = motor_is(name) | ~given("system.motor") if name == "DcMotor" else motor_is(name)
+        yield _where(condition, {"properties": {"motor": {"$ref": f"#/definitions/motor.{name}"}}})
     for table, section in all_sections().items():
         for key in section.required:
             yield from _needs(given(table), given(f"{table}.{key}"))
@@ -52,7 +52,11 @@ def _of_machine(name: str) -> Schema:
     model = MACHINES[name]
     inputs = {v.name for v in model.input_layout.variables}
     inputs |= {v.name for motor in MOTORS.values() for v in motor.input_layout.variables}
-    events = [kind for kind, of in TYPES.items() if {*of.inputs("left" if of.has_side else "")} <= inputs]
+    events = [
+        kind
+        for kind, event_type in TYPES.items()
+        if {*event_type.inputs("left" if event_type.has_side else "")} <= inputs
+    ]
     tables: Schema = {table: {"$ref": f"#/definitions/{table}.{name}"} for table in ("machine", "feed")}
     tables["event"] = {"items": {"properties": {"type": {"enum": events}}}}
     return {"properties": tables}

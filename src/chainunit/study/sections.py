@@ -148,7 +148,7 @@ CHOICES: Mapping[str, Any] = {
 @cache
 def all_choices() -> dict[str, Any]:
     """The keys before all tables, with the keys of the capabilities."""
-    return dict(CHOICES) | {name: each for part in registered() for name, each in part.choices.items()}
+    return dict(CHOICES) | {name: choice for part in registered() for name, choice in part.choices.items()}
 
 
 def _names_form(title: str, names: Sequence[str]) -> type[BaseModel]:
@@ -218,11 +218,13 @@ the capabilities."""
 def all_sections() -> dict[str, FileSection]:
     """The tables of a study file, those of parts of the line and of capabilities included, by name; without those of
     machine and motor."""
-    own = {name: each for part in registered() for name, each in part.tables.items()}
+    part_tables = {name: part_section for part in registered() for name, part_section in part.tables.items()}
     tables: dict[str, FileSection] = {}
     for table, section in SECTIONS.items():
-        tables |= {name: each for name, each in own.items() if each.before == table} | {table: section}
-    return tables | own
+        tables |= {
+            name: part_section for name, part_section in part_tables.items() if part_section.before == table
+        } | {table: section}
+    return tables | part_tables
 
 
 _KIND_OF_MOTOR = (
@@ -233,8 +235,14 @@ _KIND_OF_MOTOR = (
 
 def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
-    own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
+    declarations = {
+        "machine": machine.Parameters,
+        "ratios": Ratios,
+        "feed": machine.Feed,
+        "motor": motor.Parameters,
+    }
     places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}
     return {
-        name: FileSection(declaration, places=places.get(name, {})) for name, declaration in own.items()
+        name: FileSection(declaration, places=places.get(name, {}))
+        for name, declaration in declarations.items()
     } | all_sections()

@@ -77,15 +77,15 @@ def start_from(
     angle: float,
     longest: float,
     event: Event | None = None,
-    of: PeakOf = on_coupling,
+    peak_of: PeakOf = on_coupling,
     before: float = 0.0,
 ) -> StartNumbers:
     """A start from the crank angle [rad], with the `event` of a start, if one is given.
 
     It is followed until the crank has its speed and a little longer, at most to the time `longest` [s]; `start_time`
-    is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`. `of` gives the torque
-    on the coupling, which accelerates the inertia `before` the machine, too, see `quasi_static_torque`."""
-    return _starts_from([from_angle(rig, angle)], [angle], longest, event, of, before)[0]
+    is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`. `peak_of` gives the
+    torque on the coupling, which accelerates the inertia `before` the machine, too, see `quasi_static_torque`."""
+    return _starts_from([from_angle(rig, angle)], [angle], longest, event, peak_of, before)[0]
 
 
 def _starts_from(
@@ -93,7 +93,7 @@ def _starts_from(
     angles: Sequence[float],
     longest: float,
     event: Event | None,
-    of: PeakOf,
+    peak_of: PeakOf,
     before: float,
 ) -> list[StartNumbers]:
     """The starts of rigs that differ in the angle [rad] alone; see `start_from`."""
@@ -119,7 +119,9 @@ def _starts_from(
             time, speed = run["time"].values, run[name].values / ratio
             final = float(np.mean(speed[time >= time[-1] - operation.turn]))
             reached[k] = time_to_start(time, speed, final, operation.crank_speed)
-    return [_numbers(rigs[k].drive, angles[k], runs[k], reached[k], of, before) for k in range(len(rigs))]
+    return [
+        _numbers(rigs[k].drive, angles[k], runs[k], reached[k], peak_of, before) for k in range(len(rigs))
+    ]
 
 
 def _read(rig: Rig) -> list[str]:
@@ -131,7 +133,7 @@ def _read(rig: Rig) -> list[str]:
 
 
 def _numbers(
-    drive: Drive, angle: float, run: xr.Dataset, reached: float | None, of: PeakOf, before: float
+    drive: Drive, angle: float, run: xr.Dataset, reached: float | None, peak_of: PeakOf, before: float
 ) -> StartNumbers:
     """The numbers of a start that has `reached` its speed at that time [s]."""
     time, current = run["time"].values, np.abs(run[f"motor.{drive.motor.current}"].values)
@@ -144,8 +146,8 @@ def _numbers(
         angle=angle,
         quasi_static=quasi_static_peak(drive, run),
         gear_torque=at_gear(drive, run),
-        coupling_torque=quasi_static_peak(drive, run, of, before),
-        coupling_transient=of(drive, run),
+        coupling_torque=quasi_static_peak(drive, run, peak_of, before),
+        coupling_transient=peak_of(drive, run),
         start_time=reached,
         start_class=relay,
         relay_seconds=seconds,
@@ -186,14 +188,16 @@ def starts_from_all(
     rig: Rig,
     longest: float,
     events: Sequence[Event] = (),
-    of: PeakOf = on_coupling,
+    peak_of: PeakOf = on_coupling,
     before: float = 0.0,
 ) -> list[StartNumbers]:
     """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0. For
-    `of` and `before` see `start_from`."""
+    `peak_of` and `before` see `start_from`."""
     angles = [2.0 * math.pi * k / START_ANGLES for k in range(START_ANGLES)]
-    starts = _starts_from([from_angle(rig, angle) for angle in angles], angles, longest, None, of, before)
-    return starts + [start_from(rig, 0.0, longest, event, of, before) for event in events]
+    starts = _starts_from(
+        [from_angle(rig, angle) for angle in angles], angles, longest, None, peak_of, before
+    )
+    return starts + [start_from(rig, 0.0, longest, event, peak_of, before) for event in events]
 
 
 def longest_of(starts: Sequence[StartNumbers]) -> float | None:

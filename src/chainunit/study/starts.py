@@ -106,7 +106,7 @@ class StartFindings(Findings):
             study.say(
                 _NO_START,
                 START,
-                where=" and ".join(number(each.angle, "rad") for each in self.stuck),
+                where=" and ".join(number(stuck_start.angle, "rad") for stuck_start in self.stuck),
                 ramp=", or a higher voltage of the soft starter"
                 if study.config.drive.start == "soft"
                 else "",

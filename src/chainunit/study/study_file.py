@@ -29,8 +29,8 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
     lengths = [f"machine.{name}" for name in LENGTHS]
     if config.machine.model.sides and written.keys() & set(lengths):
         # a file that gives one length takes none from the ratios of the example
-        own = config.machine.by_name
-        written = {f"machine.{name}": own[name] for name in LENGTHS} | written
+        machine_values = config.machine.by_name
+        written = {f"machine.{name}": machine_values[name] for name in LENGTHS} | written
         tables.pop("ratios", None)
     for name, value in sorted(written.items(), key=lambda item: _place(config.machine.model, item[0])):
         *above, last = name.split(".")
@@ -54,8 +54,8 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
 def _place(model: MachineModel, name: str) -> int:
     """The place of a parameter of the machine in its declaration; others stay behind them."""
     names = model.parameter_layout.names
-    own = name.removeprefix("machine.")
-    return names.index(own) if own in names else len(names)
+    parameter = name.removeprefix("machine.")
+    return names.index(parameter) if parameter in names else len(names)
 
 
 def _from(folder: Path, file: Path) -> str:
@@ -79,21 +79,21 @@ def _lines(table: Mapping[str, Any], prefix: str, notes: Mapping[str, str]) -> I
         nested = isinstance(value, Mapping) and (
             not prefix or any(isinstance(inner, Mapping) for inner in value.values())
         )
-        many = isinstance(value, list) and bool(value) and all(isinstance(each, Mapping) for each in value)
+        many = isinstance(value, list) and bool(value) and all(isinstance(entry, Mapping) for entry in value)
         if nested or (many and not prefix):
             later.append((name, value))
         else:
-            own = f"{prefix}{_key(name)}"
+            full_name = f"{prefix}{_key(name)}"
             yield from (
-                f"# {full}: {note}" for full, note in notes.items() if f"{full}.".startswith(f"{own}.")
+                f"# {full}: {note}" for full, note in notes.items() if f"{full}.".startswith(f"{full_name}.")
             )
             yield f"{_key(name)} = {_value(value)}"
     for name, value in later:
         full = f"{prefix}{_key(name)}"
-        for each in value if isinstance(value, list) else [value]:
+        for entry in value if isinstance(value, list) else [value]:
             yield ""
             yield f"[[{full}]]" if isinstance(value, list) else f"[{full}]"
-            yield from _lines(each, f"{full}.", notes)
+            yield from _lines(entry, f"{full}.", notes)
 
 
 def _key(name: str) -> str:

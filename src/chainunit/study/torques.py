@@ -64,10 +64,10 @@ def quasi_static_torque(drive: Drive, run: xr.Dataset, before: float = 0.0) -> A
     return ratio * (load + (inertia + before) * (motor - load) / (p.rotor.J + inertia))
 
 
-def quasi_static_peak(drive: Drive, run: xr.Dataset, of: PeakOf = at_gear, before: float = 0.0) -> float:
-    """Peak torque `of` a part in a run by load and acceleration, at the crank [N m], see `quasi_static_torque`; at
-    most that of the run, whose motor may speed up faster than its field follows the curve."""
-    most = of(drive, run)
+def quasi_static_peak(drive: Drive, run: xr.Dataset, peak_of: PeakOf = at_gear, before: float = 0.0) -> float:
+    """Peak torque of a part in a run by load and acceleration, at the crank [N m], see `quasi_static_torque`; at
+    most what `peak_of` reads from the run, whose motor may speed up faster than its field follows the curve."""
+    most = peak_of(drive, run)
     if drive.follows or any(name not in run for name in CURVE):
         return most
     return min(peak(quasi_static_torque(drive, run, before)), most)
@@ -81,10 +81,10 @@ class DutyPeak:
     run: str
 
 
-def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], of: PeakOf) -> DutyPeak:
-    """The largest torque `of` the runs of normal duty, each with its name: steady running, events that may last, and
-    all feed on either side (`all_feed_on`)."""
-    return max((DutyPeak(of(drive, run), name) for name, run in runs), key=lambda peak: peak.torque)
+def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], peak_of: PeakOf) -> DutyPeak:
+    """The largest torque, read by `peak_of`, in the runs of normal duty, each with its name: steady running, events
+    that may last, and all feed on either side (`all_feed_on`)."""
+    return max((DutyPeak(peak_of(drive, run), name) for name, run in runs), key=lambda peak: peak.torque)
 
 
 def all_feed_on(side: str) -> str:

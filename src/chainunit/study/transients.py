@@ -147,7 +147,9 @@ def compare(
         rows = rows[time[rows] != transient.begin]
     reference = monolithic(rig.graph, signals, time[rows], start=start)
     differences = {}
-    for of in ("machine.tau", "motor.w"):
-        difference = np.abs(run[of].values[rows] - reference[of].values)
-        differences[of + DIFFERENCE] = float(np.max(difference) / np.max(np.abs(reference[of].values)))
+    for output in ("machine.tau", "motor.w"):
+        difference = np.abs(run[output].values[rows] - reference[output].values)
+        differences[output + DIFFERENCE] = float(
+            np.max(difference) / np.max(np.abs(reference[output].values))
+        )
     return differences, {full: float(reference[full][-1]) for full in map(str, reference.data_vars)}

@@ -90,7 +90,7 @@ class TurnAnalysis(Analysis):
         """The turn at the crank speed of the study, by inverse dynamics."""
         config, machine = study.config, study.drive.machine
         feed, w = config.feed, config.run.crank_speed
-        loaded, free = (cycle(machine, w, each, POINTS) for each in (feed, no_feed(feed)))
+        loaded, free = (cycle(machine, w, load, POINTS) for load in (feed, no_feed(feed)))
         inertia = np.broadcast_to(loaded.outputs.J * machine.ratio**2, loaded.angle.shape)
         return TurnFindings(
             loaded,
@@ -121,12 +121,12 @@ def _lost_energy(cycle: Cycle, turn: float) -> float:
 
 
 def _reaction(loaded: Cycle, free: Cycle, output: str) -> Reaction:
-    forces = (attrgetter(output)(each.outputs) for each in (loaded, free))
+    forces = (attrgetter(output)(turn.outputs) for turn in (loaded, free))
     sizes = [np.broadcast_to(np.hypot(force.fx, force.fy), loaded.angle.shape) for force in forces]
-    at = [int(np.argmax(size)) for size in sizes]
+    peak_rows = [int(np.argmax(size)) for size in sizes]
     return Reaction(
-        peak=float(sizes[0][at[0]]),
-        angle=float(loaded.angle[at[0]]),
-        peak_free=float(sizes[1][at[1]]),
-        angle_free=float(loaded.angle[at[1]]),
+        peak=float(sizes[0][peak_rows[0]]),
+        angle=float(loaded.angle[peak_rows[0]]),
+        peak_free=float(sizes[1][peak_rows[1]]),
+        angle_free=float(loaded.angle[peak_rows[1]]),
     )

@@ -341,9 +341,9 @@ def speed_limits(slack_speed: float, mode: float, empty: bool = False) -> tuple[
 def passed_limits(limits: Iterable[SpeedLimit], speed: float) -> list[SpeedLimit]:
     """The limits that a crank speed [rad/s] passes. Where the crank torque may be wrong, the rocker torque is not
     named beside it."""
-    passed = [each for each in limits if each.passed(speed)]
-    whole = any(each.topic == "crank torque" for each in passed)
-    return [each for each in passed if not (whole and each.topic == "rocker torque")]
+    passed = [limit for limit in limits if limit.passed(speed)]
+    whole = any(limit.topic == "crank torque" for limit in passed)
+    return [limit for limit in passed if not (whole and limit.topic == "rocker torque")]
 
 
 def two_bars(
@@ -385,11 +385,11 @@ def two_bars(
                     Reason("end pushed", f"{rod}_pull", pull.end, 0.0, "N", run, rod=rod, place=pull.pin)
                 )
     passed = passed_limits(speed_limits(slack_speed, mode), speed)
-    reasons += [at_speed(each.topic, speed, each.speed, grave=each.grave) for each in passed]
-    if all(each.topic == "slack speed" for each in passed):
+    reasons += [at_speed(limit.topic, speed, limit.speed, grave=limit.grave) for limit in passed]
+    if all(limit.topic == "slack speed" for limit in passed):
         runs = [""] if "" in empty else sorted(empty)
         of_empty = passed_limits(speed_limits(math.inf, mode, empty=True), speed)
-        reasons += [at_speed(each.topic, speed, each.speed, run) for each in of_empty for run in runs]
+        reasons += [at_speed(limit.topic, speed, limit.speed, run) for limit in of_empty for run in runs]
     return Verdict("organs", BARS, speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
 
 

@@ -146,9 +146,9 @@ class Window:
         """Temperature of the winding in steady running [K], at most `BURNT`."""
         return min(BURNT, (self.steady or self).settled_temperature)
 
-    def mean(self, of: str | Reading) -> float:
+    def mean(self, reading: str | Reading) -> float:
         """Mean over the time of the `turns`, of a variable or of a value read from them."""
-        return mean(self.turns, self._read(of))
+        return mean(self.turns, self._read(reading))
 
     @cached_property
     def lasts(self) -> bool:
@@ -171,12 +171,12 @@ class Window:
         machine, whole = (float(x[-1] - x[0]) / float(time[-1] - time[0]) for x in held)
         return machine, whole
 
-    def rms(self, of: str | Reading) -> float:
+    def rms(self, reading: str | Reading) -> float:
         """RMS over the time of the `turns`."""
-        return math.sqrt(mean(self.turns, self._read(of) ** 2))
+        return math.sqrt(mean(self.turns, self._read(reading) ** 2))
 
-    def _read(self, of: str | Reading) -> Any:
-        return of(self.drive, self.turns) if callable(of) else series(self.turns, of)
+    def _read(self, reading: str | Reading) -> Any:
+        return reading(self.drive, self.turns) if callable(reading) else series(self.turns, reading)
 
     def largest(self, name: str) -> float:
         """Largest size of a variable."""

@@ -16,11 +16,11 @@ from .turn import live_turn
 def of_linkage(machine: Machine, speed: float, file: str, units: Units = DEFAULT_UNITS) -> LiveMachine:
     """The live machine of a linkage at the `speed` of its driver [rad/s, m/s]; `file` is the name of its file."""
     model = machine.model
-    own = speed_of_crank(speed)
+    speed_quantity = speed_of_crank(speed)
     if model.slides:
         q = Quantity("m/s", "speed of the driver", low=0.0, high=1e3, open_low=True)
-        own = replace(own, variable=Variable("crank_speed", "speed of the driver", q))
-    chosen = [*of_machine("feed", model.Feed()), own, *of_machine("machine", machine.p)]
+        speed_quantity = replace(speed_quantity, variable=Variable("crank_speed", "speed of the driver", q))
+    chosen = [*of_machine("feed", model.Feed()), speed_quantity, *of_machine("machine", machine.p)]
     copied = None
     if model.turns and not model.slides:
         copied = {

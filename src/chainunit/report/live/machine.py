@@ -34,7 +34,7 @@ def assembled(
         "turn": turn.data,
         "runs": runs.data if runs else None,
         "without_runs": why,
-        "quantities": [each.data(units, turn.data["driver"]) for each in quantities],
+        "quantities": [quantity.data(units, turn.data["driver"]) for quantity in quantities],
         "file": copied,
     }
     return LiveMachine(data, program(equations))

@@ -51,13 +51,14 @@ class LiveQuantity:
         }
 
 
-def of_machine(table: str, declared: Any, known: Collection[str] = ()) -> Iterator[LiveQuantity]:
+def of_machine(table: str, declared: Any, model_names: Collection[str] = ()) -> Iterator[LiveQuantity]:
     """The real numbers that a `table` of a study file has of a machine: its parameters, or its loads in normal
-    running; `known` are the parameters and inputs of the model of runs. The ratio is a quantity of the drive."""
+    running; `model_names` are the parameters and inputs of the model of runs. The ratio is a quantity of the
+    drive."""
     for v, value in named_values(declared):
         if v.type == "Real" and v.name != "ratio":
             full = f"machine.{v.name}"
-            runs = (full,) if full in known else ()
+            runs = (full,) if full in model_names else ()
             yield LiveQuantity((table, *v.name.split(".")), v, value, table, (v.name,), runs)
 
 

@@ -184,7 +184,7 @@ def _results(drive: Drive, units: Units, rocker: bool) -> Iterator[dict[str, Any
 
 
 def _quantities(
-    drive: Drive, operation: OperatingConditions, events: Iterable[Event], known: Collection[str]
+    drive: Drive, operation: OperatingConditions, events: Iterable[Event], model_names: Collection[str]
 ) -> Iterator[LiveQuantity]:
     """The quantities that the runs alone have: of the motor, the flywheel, the coupling, the ramp, the events."""
     # the parameters of a motor of the catalogue follow from its plate
@@ -193,7 +193,7 @@ def _quantities(
             full = f"motor.{v.name}"
             if (
                 v.type == "Real"
-                and full in known
+                and full in model_names
                 and not v.name.startswith(("solver.", "phi_start", "w_start"))
             ):
                 role, runs = ("rotor", ()) if v.name == "rotor.J" else ("", (full,))
@@ -212,7 +212,7 @@ def _tables(drive: Drive, operation: OperatingConditions) -> Iterator[LiveQuanti
         yield LiveQuantity(("run", "ramp"), ramp, float(operation.run.ramp), "drive", role="ramp")
     if operation.coupling is not None:
         for name, role in (("trip_torque", "trip"), ("release_time", "release")):
-            own = variable_of(Coupling, name)
-            variable = replace(own, template=f"torque limiter: {own.template}")
+            declared = variable_of(Coupling, name)
+            variable = replace(declared, template=f"torque limiter: {declared.template}")
             value = float(getattr(operation.coupling, name))
             yield LiveQuantity(("coupling", name), variable, value, "drive", role=role)

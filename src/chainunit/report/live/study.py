@@ -56,11 +56,11 @@ def of_study(
     plate = proposal.motor if proposal is not None else config.plate
     if not why:
         runs = live_runs(drive, config.operation, config.events, units, plate, tables.gear)
-    known = runs.names if runs else set()
-    chosen = [*of_machine("feed", config.feed, known)]
+    model_names = runs.names if runs else set()
+    chosen = [*of_machine("feed", config.feed, model_names)]
     if drive.follows or drive.foreign is not None:
         chosen.append(speed_of_crank(float(speed)))
-    chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, known)]
+    chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, model_names)]
     if runs:
         chosen += runs.quantities
         for part in capabilities():
@@ -130,8 +130,8 @@ def _with_drive(
 
 def _lengths(machine: Machine) -> dict[str, float]:
     """All lengths of a chain unit: a file that gives one takes none from its ratios."""
-    own = machine.by_name
-    return {f"machine.{name}": own[name] for name in LENGTHS} if machine.model.sides else {}
+    values = machine.by_name
+    return {f"machine.{name}": values[name] for name in LENGTHS} if machine.model.sides else {}
 
 
 def _without_dates(copied: dict[str, Any]) -> dict[str, Any]:

@@ -49,17 +49,17 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     q = np.linspace(low, high, 121)
     whole = machine.state(machine.inputs({"phi": q * machine.ratio, "w": speed * machine.ratio})).m
     forces = list(_forces(machine))
-    known = trace(model).columns
-    results = list(_results(machine, forces, known, units))
-    shown = [pin for pin in places(whole) if f"x({pin})" in known]
-    lines = [name for name in known if name.startswith("line(")]
+    model_columns = trace(model).columns
+    results = list(_results(machine, forces, model_columns, units))
+    shown = [pin for pin in places(whole) if f"x({pin})" in model_columns]
+    lines = [name for name in model_columns if name.startswith("line(")]
     columns = dict.fromkeys(
         [
-            *(each["of"] for each in results),
+            *(result["of"] for result in results),
             *(f"{force.output}.{axis}" for force in forces for axis in ("fx", "fy")),
             *(f"{axis}({pin})" for pin in shown for axis in "xy"),
             *lines,
-            *(name for each in _pulls(known) for name in each["columns"]),
+            *(name for pull in _pulls(model_columns) for name in pull["columns"]),
         ]
     )
     driver = whole.linkage.driver
@@ -73,12 +73,12 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         "effort": _effort(machine),
         "place": shown_in_unit("m" if model.slides else "rad", "", units),
         "results": results,
-        "pulls": list(_pulls(known)),
+        "pulls": list(_pulls(model_columns)),
         "forces": [
             {"title": force.title, "of": force.output, "at": force.joint, "short": force.short}
             for force in forces
         ],
-        "curves": list(_curves(machine, known, units)),
+        "curves": list(_curves(machine, model_columns, units)),
         "picture": {
             "links": [asdict(link) for link in linkage.links(whole.linkage, {})],
             "grounds": [pin for pin in whole.linkage.ground if pin in shown],
@@ -110,7 +110,9 @@ def _forces(machine: Machine) -> Iterator[_Force]:
             yield _Force(title, output, model.joints[output][0], title if named else "")
 
 
-def _results(machine: Machine, forces: list[_Force], known: Any, units: Units) -> Iterator[dict[str, Any]]:
+def _results(
+    machine: Machine, forces: list[_Force], model_columns: Any, units: Units
+) -> Iterator[dict[str, Any]]:
     """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
     the factors ``by``: the speed of the driver, or the square of the ratio."""
     model = machine.model
@@ -124,14 +126,15 @@ def _results(machine: Machine, forces: list[_Force], known: Any, units: Units) -
         (f"inertia reflected to the {driver}, least", "min", "J", inertia, "ratio2"),
         (f"inertia reflected to the {driver}, largest", "max", "J", inertia, "ratio2"),
     ]
-    if "rocker.tau" in known:
+    if "rocker.tau" in model_columns:
         rows.insert(3, ("rocker torque, peak", "peak", "rocker.tau", "N.m", ""))
-    if "margin" in known:
+    if "margin" in model_columns:
         rows.append(("margin from a dead position, least", "min", "margin", "1", ""))
-    for title, reduction, column, of, by in rows:
+    for title, reduction, column, row_unit, by in rows:
         yield {
             "name": f"{reduction}({column})" + (f" {by}" if by else ""),
-            "title": title, "reduce": reduction, "of": column, "by": by, "group": "", **shown_in_unit(of, "", units),
+            "title": title, "reduce": reduction, "of": column, "by": by, "group": "",
+            **shown_in_unit(row_unit, "", units),
         }  # fmt: skip
     for force in forces:
         column = f"force({force.output})"
@@ -141,7 +144,7 @@ def _results(machine: Machine, forces: list[_Force], known: Any, units: Units) -
         }  # fmt: skip
 
 
-def _pulls(known: Any) -> Iterator[dict[str, Any]]:
+def _pulls(model_columns: Any) -> Iterator[dict[str, Any]]:
     """The pulls in the rods of organs, by kind of rod: the columns of both sides, and the words where the least of
     them is below zero."""
     for rod in ("web", "wall"):
@@ -150,17 +153,17 @@ def _pulls(known: Any) -> Iterator[dict[str, Any]]:
             ("end", "{}.{}_pull", "end pushed"),
         ):
             columns = [column.format(side, rod) for side in ("left", "right")]
-            if all(name in known for name in columns):
+            if all(name in model_columns for name in columns):
                 title = f"least {kind} pull in a {rod}"
                 yield {"title": title, "columns": columns, "words": TOPICS[topic].short}
 
 
-def _curves(machine: Machine, known: Any, units: Units) -> Iterator[dict[str, Any]]:
+def _curves(machine: Machine, model_columns: Any, units: Units) -> Iterator[dict[str, Any]]:
     """The plots over the turn: each has curves of one unit."""
     model = machine.model
     port, driver, effort = model.driver_port.unit, model.driver_noun, _effort(machine)
     curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
-    if "rocker.tau" in known:
+    if "rocker.tau" in model_columns:
         curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
     yield {
         "name": "torque",

@@ -63,11 +63,11 @@ def _shaft_keys() -> Iterator[Key]:
     from ..keys import Key, quantity_keys
 
     for shaft, stiffness in SHAFTS.items():
-        words = f"its profile, in place of {stiffness}"
-        yield Key(f"{shaft}.section", words, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
+        description = f"its profile, in place of {stiffness}"
+        yield Key(f"{shaft}.section", description, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
         yield from quantity_keys(Shaft, prefix=f"{shaft}.")
-        words = "corners of a profile of any form, as pairs [m]"
-        yield Key(f"{shaft}.outline", words, sort="list", items=CORNER)
+        description = "corners of a profile of any form, as pairs [m]"
+        yield Key(f"{shaft}.outline", description, sort="list", items=CORNER)
         yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list", items=CORNER)
 
 
@@ -83,8 +83,8 @@ def _of_shaft() -> Iterator[Schema]:
     """The dimensions that go with a profile."""
     for name, profile in PROFILES.items():
         needed = [*profile.takes, "length"]
-        known = [*needed, *profile.also, "section", "shear_modulus"]
-        then: dict[str, Any] = {"required": needed, "propertyNames": {"enum": known}}
+        allowed = [*needed, *profile.also, "section", "shear_modulus"]
+        then: dict[str, Any] = {"required": needed, "propertyNames": {"enum": allowed}}
         yield {"if": is_one_of("section", name).schema(), "then": then}
 
 
