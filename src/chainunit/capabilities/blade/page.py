@@ -30,11 +30,11 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield _figure(study, BladeFindings.of_study(study))
 
 
-def _polyline(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
+def _polyline(links: tuple[DrawnLink, ...], places: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
     """Places x, y of all links as one line with gaps, shape (points,) each [m]."""
     gap, points = (math.nan, math.nan), []
     for link in links:
-        points += [at[pin] for pin in (*link.joints, *link.joints[: int(link.closed)])] + [gap]
+        points += [places[pin] for pin in (*link.joints, *link.joints[: int(link.closed)])] + [gap]
     x, y = np.array(points, float).T
     return x, y
 
@@ -83,32 +83,32 @@ def _figure(study: StudyRecord, findings: BladeFindings) -> fig.Figure:
 
 def _positions(machine: Machine, findings: BladeFindings, fall: float) -> Iterator[fig.Item]:
     """The linkage with its blade at the top, half-way and at the bottom, and the stack."""
-    at: dict[str, tuple[Any, Any]] = {}
+    places: dict[str, tuple[Any, Any]] = {}
     for look, (name, q) in (
         (2, ("blade at its top", findings.top)),
         (1, ("half-way", findings.top + 0.5 * fall)),
         (0, ("at its bottom", findings.top + fall)),
     ):
         m = machine.drive(q * machine.ratio)
-        at = linkage.places(m) | edge(machine.p, m.links)
-        words = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
-        yield fig.Curve(words, *_polyline((*linkage.links(m.linkage, {}), _EDGE), at), look, "o")
-    ends = sorted(float(at[name][0]) for name in ENDS)
-    low, high = ([each, each] for each in (findings.stack.table, findings.stack.top))
+        places = linkage.places(m) | edge(machine.p, m.links)
+        title = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
+        yield fig.Curve(title, *_polyline((*linkage.links(m.linkage, {}), _EDGE), places), look, "o")
+    ends = sorted(float(places[name][0]) for name in ENDS)
+    low, high = ([height, height] for height in (findings.stack.table, findings.stack.top))
     yield fig.Between("stack", ends, low, high, "hatched")
     yield fig.Curve("path of the edge's middle", findings.blade.x, findings.blade.y, "path")
-    yield from (fig.Label(float(x), float(y), name) for name, (x, y) in at.items() if len(name) < 3)
+    yield from (fig.Label(float(x), float(y), name) for name, (x, y) in places.items() if len(name) < 3)
 
 
 def _path(findings: BladeFindings, fall: float) -> Iterator[fig.Item]:
     """The path of the edge's middle. Crank angles are marked only on the way down, as the way up may run along the
     same line."""
-    x, y = (np.append(each, each[0]) for each in (findings.blade.x, findings.blade.y))
+    x, y = (np.append(coordinate, coordinate[0]) for coordinate in (findings.blade.x, findings.blade.y))
     yield fig.Shade(findings.stack.table, findings.stack.top, "stack", "y", "hatched")
     yield fig.Curve("path of the edge's middle", x, y, in_legend=False)
     angle = findings.turn.angle
     for k in range(7):
         i = round((findings.top + fall * k / 6.0) / (2.0 * math.pi) * len(angle)) % len(angle)
-        at = float(findings.blade.x[i]), float(findings.blade.y[i])
-        yield fig.Curve("", [at[0]], [at[1]], marker="o", has_line=False, in_legend=False)
-        yield fig.Label(at[0], at[1], number(float(angle[i]), "rad"), "left" if k == 6 else "right")
+        place = float(findings.blade.x[i]), float(findings.blade.y[i])
+        yield fig.Curve("", [place[0]], [place[1]], marker="o", has_line=False, in_legend=False)
+        yield fig.Label(place[0], place[1], number(float(angle[i]), "rad"), "left" if k == 6 else "right")

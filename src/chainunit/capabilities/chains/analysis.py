@@ -171,11 +171,11 @@ def run_turns(
         rows = list(pool.map(one, range(starts), [stop] * starts))
     series = np.array(rows).reshape(starts, turns, points, len(names))
     first = len(outputs)
-    each = len(rods) // 2
+    count = len(rods) // 2
     return Turns(
         2.0 * math.pi * np.arange(1, points + 1) / points,
         {name: series[..., k] for k, name in enumerate(outputs)},
-        {side: series[..., first + each * k : first + each * (k + 1)] for k, side in enumerate(SIDES)},
+        {side: series[..., first + count * k : first + count * (k + 1)] for k, side in enumerate(SIDES)},
     )
 
 
@@ -294,11 +294,11 @@ def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> t
 
 
 def study_chain(
-    drive: Drive, chain: ChainOrgans, feed: Feed, own: float, file: Path, progress: TaskProgress
+    drive: Drive, chain: ChainOrgans, feed: Feed, own_speed: float, file: Path, progress: TaskProgress
 ) -> tuple[ChainResult, RunError | None]:
-    """The numbers of chains at the crank speed `own` of a study [rad/s] and over the range of speeds, by the FMU
-    `file` of the machine; and the error that ended the runs early, or None. A speed whose run fails is left out and
-    stands in `failures`.
+    """The numbers of chains at the crank speed `own_speed` of a study [rad/s] and over the range of speeds, by the
+    FMU `file` of the machine; and the error that ended the runs early, or None. A speed whose run fails is left out
+    and stands in `failures`.
 
     Raises
     ------
@@ -313,15 +313,15 @@ def study_chain(
     speeds, (low, high) = chain.speeds, chain.ends
     if speeds:
         # the resonance itself is added to the grid
-        lowest = [each.speed for each in critical[:1]]
+        lowest = [speed.speed for speed in critical[:1]]
         speeds += [w for w in lowest if low < w < high]
     spacing = (high - low) / max(1, len(speeds) - 2)
-    others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
+    others = sorted({w for w in speeds if abs(w - own_speed) > 1e-9 * own_speed})
     failures: dict[float, str] = {}
     interruption: RunError | None = None
     with stoppable() as is_stopped, closing(Fmu(file)) as fmu:
 
-        def at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
+        def run_at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
             def report_share(share: float) -> None:
                 progress(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
@@ -329,11 +329,11 @@ def study_chain(
             return numbers_at(fmu, drive, chain, feed, w, report_share, is_stopped)
 
         # the study's own speed comes first, so that an early end loses only the others
-        mine, by_rod = at(0, own)
+        mine, by_rod = run_at(0, own_speed)
         rows = [mine]
         for k, w in enumerate(others, 1):
             try:
-                rows.append(at(k, w)[0])
+                rows.append(run_at(k, w)[0])
             except InterruptedRunError as error:
                 interruption = error
                 break

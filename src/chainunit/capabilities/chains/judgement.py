@@ -84,11 +84,11 @@ def verdict_on(study: StudyRecord, speed: float, actual: float, residuals: Mappi
     folds = {name: a.fold_largest for name, a in runs.items() if a is not None}
     slack = {name: a.slack_time for name, a in runs.items() if a is not None}
     residuals, turns = dict(residuals), math.inf
-    found = ChainResult.found_in(study)
-    if found is not None:
-        own = found.own
-        folds[CONSTANT], slack[CONSTANT] = own.fold_largest, own.slack_time
-        residuals[CONSTANT], turns = own.energy_residual, own.independent_turns
+    findings = ChainResult.found_in(study)
+    if findings is not None:
+        numbers = findings.own
+        folds[CONSTANT], slack[CONSTANT] = numbers.fold_largest, numbers.slack_time
+        residuals[CONSTANT], turns = numbers.energy_residual, numbers.independent_turns
     limit, least_turns = study.config.table("chain").fold_limit, runs_needed(HIGH)
     return chains(speed, residuals, folds, limit, slack, turns, least_turns, actual=actual)
 

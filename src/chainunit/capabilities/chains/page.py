@@ -68,7 +68,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         for side, rods in chain["slack_by_rod"].items()
     }
     if any(slack.values()):
-        rows = tuple(b.TableRow((side, words or "none")) for side, words in slack.items())
+        rows = tuple(b.TableRow((side, slack_rods or "none")) for side, slack_rods in slack.items())
         yield b.Table(rows, title="Rods that go slack, share of the time", numeric=False)
     if len(chain["sweep"]) > 1:
         yield _sweep(s, x)
@@ -127,8 +127,8 @@ def _sweep(s: b.Source, x: ChainResult) -> b.Table:
         return s.estimate(f"chain.sweep.{i}.{name}", unknown="-", certain=CERTAIN)
 
     rows = (
-        b.TableRow((number(each.speed), *(cell(i, name) for name in columns)))
-        for i, each in enumerate(x.speeds)
+        b.TableRow((number(numbers.speed), *(cell(i, name) for name in columns)))
+        for i, numbers in enumerate(x.speeds)
     )
     title = (
         "Chains and two bars over the crank speed; in brackets, where the starts differ: the interval of "
@@ -143,8 +143,8 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
     """Critical crank speeds: all of them in a table, those within the sweep in a sentence."""
     path = "chain.critical_speeds"
     places: dict[float, dict[float, int]] = {}
-    for i, each in enumerate(chain["critical_speeds"]):
-        places.setdefault(each["mode"]["value"], {})[each["order"]["value"]] = i
+    for i, entry in enumerate(chain["critical_speeds"]):
+        places.setdefault(entry["mode"]["value"], {})[entry["order"]["value"]] = i
     rows = (
         b.TableRow(
             (
@@ -157,10 +157,10 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
     orders = (s.line(f"order {{={path}.{i}.order}}") for i in next(iter(places.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
-    found = ChainResult.of_study(study)
+    result = ChainResult.of_study(study)
     inside = [
-        s.line(f"{{{path}.{places[each.mode][each.order]}.speed}} (mode {each.mode}, order {each.order})")
-        for each in sorted(found.within_speeds(), key=lambda each: each.speed)
+        s.line(f"{{{path}.{places[speed.mode][speed.order]}.speed}} (mode {speed.mode}, order {speed.order})")
+        for speed in sorted(result.within_speeds(), key=lambda speed: speed.speed)
     ]
     if inside:
         yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
@@ -174,18 +174,18 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     speed = np.array([n.speed for n in rows])
     x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
     # the least distance of 5 % keeps labels apart on a narrow screen, too
-    words: list[fig.Item] = [
+    labels: list[fig.Item] = [
         fig.Mark(
-            each.speed,
-            words=f"mode {each.mode}" + (f", order {each.order}" if each.order > 1 else ""),
+            critical.speed,
+            words=f"mode {critical.mode}" + (f", order {critical.order}" if critical.order > 1 else ""),
             look="thin",
             upright=True,
         )
-        for each in result.within_speeds(0.05)
+        for critical in result.within_speeds(0.05)
     ]
     marks: list[fig.Item] = [
         *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
-        *(fig.Mark(each.speed, look="thin") for each in result.within_speeds()),
+        *(fig.Mark(critical.speed, look="thin") for critical in result.within_speeds()),
         fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 
@@ -197,14 +197,14 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         ]
 
     panels: list[tuple[fig.Axis, list[fig.Item]]] = []
-    for of in ("rocker", "crank"):
-        names = (f"{of}_torque_median", f"{of}_torque_high", f"two_bar_{of}_torque")
+    for part in ("rocker", "crank"):
+        names = (f"{part}_torque_median", f"{part}_torque_high", f"two_bar_{part}_torque")
         median, high, two = (np.array([getattr(n, name) for n in rows]) for name in names)
         sizes = np.concatenate([median, high, two])
         wide = float(np.nanmax(sizes)) > WIDE * max(float(np.nanmin(sizes)), 1e-9)
         quantile = fig.Between(f"chains, up to the {100 * HIGH:g} % quantile", speed, median, high)
-        y = fig.Axis(f"{of} torque, peak", "N.m", low=None if wide else 0.0, log=wide)
-        panels.append((y, [quantile, *pair(median, two), *([] if panels else words)]))
+        y = fig.Axis(f"{part} torque, peak", "N.m", low=None if wide else 0.0, log=wide)
+        panels.append((y, [quantile, *pair(median, two), *([] if panels else labels)]))
     slack = pair([n.slack_time for n in rows], [n.two_bar_slack_time for n in rows])
     panels.append((fig.Axis("time slack", "1", "percent", low=-0.04, high=1.04), slack))
     return fig.Figure(

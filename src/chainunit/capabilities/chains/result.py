@@ -122,7 +122,7 @@ class ChainResult(Findings):
     @derived("rad/s", "speed")
     def resonance(self) -> float | None:
         """Crank speed that equals the lowest natural frequency of an organ; None without weight."""
-        return next((each.speed for each in self.critical if each.mode == each.order == 1), None)
+        return next((speed.speed for speed in self.critical if speed.mode == speed.order == 1), None)
 
     @derived("1", "percent", name="distance_to_resonance")
     def distance(self) -> float | None:
@@ -134,10 +134,10 @@ class ChainResult(Findings):
         to an earlier one is less than the share `apart` of the width of the range."""
         low, high = self.speeds[0].speed, self.speeds[-1].speed
         speeds: list[CriticalSpeed] = []
-        for each in sorted(self.critical, key=lambda speed: (speed.order, speed.mode)):
-            clear = all(abs(each.speed - other.speed) >= apart * (high - low) for other in speeds)
-            if low <= each.speed <= high and clear:
-                speeds.append(each)
+        for speed in sorted(self.critical, key=lambda speed: (speed.order, speed.mode)):
+            clear = all(abs(speed.speed - other.speed) >= apart * (high - low) for other in speeds)
+            if low <= speed.speed <= high and clear:
+                speeds.append(speed)
         return speeds
 
     def remark(self, study: StudyRecord) -> None:

@@ -76,10 +76,10 @@ def _completed(chain: ChainOrgans, reading: FileReading) -> ChainOrgans | None:
     bars."""
     if reading.form.organ != "chain" or not isinstance(reading.machine, ChainUnitMachine):
         return None
-    given = reading.given["chain"]
+    keys = reading.given["chain"]
     usual = damping_of_organ(reading.machine)
-    chain = replace(chain, **{name: x for name, x in usual.items() if name not in given})
-    if "sweep_highest" in given:
+    chain = replace(chain, **{name: x for name, x in usual.items() if name not in keys})
+    if "sweep_highest" in keys:
         return chain
     _, mode = slack_and_mode(reading.machine, reading.values["feed"])
     beyond = _BEYOND * mode if math.isfinite(mode) else 0.0

@@ -126,18 +126,18 @@ class CheckCapability(Capability):
         """What was not checked, and why."""
         from .analysis import CheckFindings
 
-        found = CheckFindings.found_in(study)
-        if found is None:
+        findings = CheckFindings.found_in(study)
+        if findings is None:
             yield "bearings, shaft sections, gear and couplings: the study ended before"
             return
-        absent = [each for each in found.not_checked if each.table]
+        absent = [omission for omission in findings.not_checked if omission.table]
         if absent:
-            parts = (f"{each.what} ([{each.table}])" for each in absent)
+            parts = (f"{omission.what} ([{omission.table}])" for omission in absent)
             yield f"parts without data in the file: {'; '.join(parts)}"
         reasons: dict[str, list[str]] = {}
-        for each in found.not_checked:
-            if not each.table:
-                reasons.setdefault(each.why, []).append(each.what)
+        for omission in findings.not_checked:
+            if not omission.table:
+                reasons.setdefault(omission.why, []).append(omission.what)
         yield from (f"{'; '.join(parts)}: {why}" for why, parts in reasons.items())
 
 

@@ -86,22 +86,26 @@ class CheckAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> CheckFindings:
         """The checks over steady running, and of the largest loads of all runs."""
         plan: CheckPlan = study.config.plans[CheckAnalysis.name]
-        found = _Found()
+        collection = _Found()
         turns = has_turn(study.drive, study.steady)
         if turns:
-            _bearings(study, plan, found)
-        found.add(rigid.checks(study))
+            _bearings(study, plan, collection)
+        collection.add(rigid.checks(study))
         parts: dict[str, Any] = {
-            "relay": found.of(*relay.find(study, plan.relay)),
-            "starting": found.of(*starting.find(study, plan.starting, plan.starts_per_hour)),
+            "relay": collection.of(*relay.find(study, plan.relay)),
+            "starting": collection.of(*starting.find(study, plan.starting, plan.starts_per_hour)),
         }
         if turns:
-            parts |= _of_cycle(study, plan, found)
+            parts |= _of_cycle(study, plan, collection)
         else:
             what = "bearings, gear, shaft of the motor, coupling, shaft sections"
-            found.add([NotChecked(what, less_than_a_turn(study.drive, study.steady))])
+            collection.add([NotChecked(what, less_than_a_turn(study.drive, study.steady))])
         return CheckFindings(
-            found.rolling, found.plain, rows=tuple(found.rows), not_checked=tuple(found.missing), **parts
+            collection.rolling,
+            collection.plain,
+            rows=tuple(collection.rows),
+            not_checked=tuple(collection.missing),
+            **parts,
         )
 
 
@@ -116,11 +120,11 @@ class _Found:
 
     def add(self, checks: Iterable[CheckRow | NotChecked]) -> None:
         """Add checks, and things that were not checked."""
-        for each in checks:
-            if isinstance(each, CheckRow):
-                self.rows.append(each)
+        for check in checks:
+            if isinstance(check, CheckRow):
+                self.rows.append(check)
             else:
-                self.missing.append(each)
+                self.missing.append(check)
 
     def of(self, findings: T, checks: Iterable[CheckRow | NotChecked]) -> T:
         """The findings of a part, whose checks are added."""
@@ -128,47 +132,53 @@ class _Found:
         return findings
 
 
-def _of_cycle(study: StudyRecord, plan: CheckPlan, found: _Found) -> dict[str, Any]:
+def _of_cycle(study: StudyRecord, plan: CheckPlan, collection: _Found) -> dict[str, Any]:
     """The findings on parts that carry the cycle, by name; their checks are added."""
-    starts, at = plan.starts_per_hour, (plan.coupling_place, plan.coupling_name)
+    starts, place_and_name = plan.starts_per_hour, (plan.coupling_place, plan.coupling_name)
     return {
-        "gear": found.of(*gear.find(study, plan.gear, plan.separate_bearing)),
-        "motor_shaft": found.of(*gear.motor_shaft(study, plan.motor_shaft)),
-        "flexible_coupling": found.of(*coupling.find(study, plan.coupling, *at, starts, plan.couplings)),
-        "section": found.of(*section.find(study, plan.sections)),
+        "gear": collection.of(*gear.find(study, plan.gear, plan.separate_bearing)),
+        "motor_shaft": collection.of(*gear.motor_shaft(study, plan.motor_shaft)),
+        "flexible_coupling": collection.of(
+            *coupling.find(study, plan.coupling, *place_and_name, starts, plan.couplings)
+        ),
+        "section": collection.of(*section.find(study, plan.sections)),
     }
 
 
-def _bearings(study: StudyRecord, plan: CheckPlan, found: _Found) -> None:
+def _bearings(study: StudyRecord, plan: CheckPlan, collection: _Found) -> None:
     """The checks of all bearings."""
     drive, asked = study.drive, plan.bearings
     if drive.foreign_machine:
-        found.add([NotChecked("bearings", "the machine is an FMU, whose pins are not known")])
+        collection.add([NotChecked("bearings", "the machine is an FMU, whose pins are not known")])
         return
     if asked:
         turns = study.steady
         machine = drive.simulated_machine
         angles = machine.pin_turns(machine_series(turns))
-        time, made = turns["time"].values, turns_made(drive, turns)
+        time, turn_count = turns["time"].values, turns_made(drive, turns)
     for pin, bearing in asked.items():
         name = machine.model.pins.get(pin)
         if name is None or name not in angles:
-            found.add([NotChecked(f"{pin}, bearing", "its angle is not known with organs that are chains")])
+            collection.add(
+                [NotChecked(f"{pin}, bearing", "its angle is not known with organs that are chains")]
+            )
             continue
         force = pin_force(drive, turns, pin)
         largest, run = largest_load(study.pins, pin)
         if bearing.kind == PLAIN:
             of_plain = plain.plain_bearing(bearing.table, time, force, angles[name], largest, run)
-            found.plain[pin] = of_plain
-            found.add(plain.checks(pin, of_plain, bearing.table, f"checks.plain.{pin}", study.title_of(run)))
+            collection.plain[pin] = of_plain
+            collection.add(
+                plain.checks(pin, of_plain, bearing.table, f"checks.plain.{pin}", study.title_of(run))
+            )
         else:
-            args = (bearing.kind, bearing.table, time, made, force, angles[name], largest, run)
+            args = (bearing.kind, bearing.table, time, turn_count, force, angles[name], largest, run)
             of_rolling = rolling.rolling_bearing(*args)
-            found.rolling[pin] = of_rolling
-            found.add(
+            collection.rolling[pin] = of_rolling
+            collection.add(
                 rolling.checks(pin, of_rolling, bearing.table, f"checks.rolling.{pin}", study.title_of(run))
             )
-    found.add(_without(turning_pins(drive.machine.model), asked))
+    collection.add(_without(turning_pins(drive.machine.model), asked))
 
 
 def _without(pins: Iterable[str], asked: Mapping[str, Any]) -> Iterator[NotChecked]:

@@ -127,8 +127,8 @@ def swinging(time: Any, torque: Any, natural: float, damping: float) -> Swinging
     return Swinging(
         natural_frequency=natural,
         **{
-            name: 0.5 * float(np.ptp(np.fft.irfft(of, count)))
-            for name, of in (("rigid", parts), ("elastic", elastic), ("weighted", elastic * heating))
+            name: 0.5 * float(np.ptp(np.fft.irfft(spectrum, count)))
+            for name, spectrum in (("rigid", parts), ("elastic", elastic), ("weighted", elastic * heating))
         },
         passed=2.0 / count * float(np.max(above)) if len(above) else 0.0,
     )
@@ -178,17 +178,17 @@ _PASSAGE = CheckRule(
 
 
 def coupling_rows(
-    of: CouplingCheck, table: FlexibleCouplingTable, titles: Mapping[str, str]
+    check: CouplingCheck, table: FlexibleCouplingTable, titles: Mapping[str, str]
 ) -> Iterator[CheckRow | NotChecked]:
     """The rows of a coupling; `titles` are those of runs."""
-    run = titles.get(of.run, of.run)
+    run = titles.get(check.run, check.run)
     for key, rule in (*_RULES.items(), ("peak_torque", _PASSAGE)):
         lacking = key if not (limit := getattr(table, key)) else "stiffness and damping"
-        if not limit or getattr(of, rule.value) is None:
+        if not limit or getattr(check, rule.value) is None:
             why = f"add [flexible_coupling] with {lacking}, by its maker"
             yield NotChecked(f"coupling, {rule.title.format(run=run)}", why)
         else:
-            yield rule.row("coupling", "checks.flexible_coupling", of, limit, run)
+            yield rule.row("coupling", "checks.flexible_coupling", check, limit, run)
 
 
 @dataclass(frozen=True)
@@ -240,12 +240,12 @@ def _cycle(study: StudyRecord, place: str, start: float) -> _Cycle:
     return _Cycle(turns["time"].values, torque, duty, place, run, start)
 
 
-def remark_on_coupling(study: StudyRecord, of: CouplingCheck) -> None:
+def remark_on_coupling(study: StudyRecord, check: CouplingCheck) -> None:
     """Warn where no coupling of the catalogues keeps each limit, or the named one does not; note how it was
     checked."""
-    if not of.candidates:
+    if not check.candidates:
         return
-    best = of.candidates[0]
+    best = check.candidates[0]
     if best.verdict != CHOSEN:
         study.say(_TOO_WEAK, name=best.designation, reason=best.reason)
     study.say(_CHECKED)
@@ -262,13 +262,13 @@ _CHECKED = note(
 )
 
 
-def speed_row(of: CouplingCheck, table: FlexibleCouplingTable) -> CheckRow | NotChecked:
+def speed_row(check: CouplingCheck, table: FlexibleCouplingTable) -> CheckRow | NotChecked:
     """The check of the speed of a coupling."""
     if not table.largest_speed:
         return NotChecked("coupling, speed", "add [flexible_coupling] with largest_speed, by its maker")
     formula = "largest |w| of all runs <= permitted"
     rule = CheckRule("speed", "speed", "Limit of the maker of the coupling", formula)
-    return rule.row("coupling", "checks.flexible_coupling", of.duty, table.largest_speed)
+    return rule.row("coupling", "checks.flexible_coupling", check.duty, table.largest_speed)
 
 
 def find(
@@ -297,17 +297,17 @@ def find(
         return None, [NotChecked("flexible coupling", why)]
     cycle = _cycle(study, place, factor)
 
-    def all_rows(own: FlexibleCouplingTable) -> list[CheckRow | NotChecked]:
-        of = cycle.check(own)
-        return [*coupling_rows(of, own, study.titles), speed_row(of, own)]
+    def all_rows(trial: FlexibleCouplingTable) -> list[CheckRow | NotChecked]:
+        check = cycle.check(trial)
+        return [*coupling_rows(check, trial, study.titles), speed_row(check, trial)]
 
     candidates: list[CouplingCandidate] = []
     if couplings:
 
-        def rows_of(own: FlexibleCouplingTable) -> Iterator[CheckRow]:
-            return (row for row in all_rows(own) if isinstance(row, CheckRow))
+        def rows_of(trial: FlexibleCouplingTable) -> Iterator[CheckRow]:
+            return (row for row in all_rows(trial) if isinstance(row, CheckRow))
 
         candidates = tried(couplings, table, rows_of, name)
-        (sold,) = (each for each in couplings if each.designation == candidates[0].designation)
+        (sold,) = (coupling for coupling in couplings if coupling.designation == candidates[0].designation)
         table = with_row(table, sold)
     return replace(cycle.check(table), candidates=tuple(candidates)), all_rows(table)

@@ -64,7 +64,7 @@ class CouplingCandidate:
     @property
     def hardest(self) -> CandidateCheck:
         """The check of whose limit it uses the largest share."""
-        return max(self.checks, key=lambda each: each.utilisation)
+        return max(self.checks, key=lambda check: check.utilisation)
 
     @property
     def fits(self) -> bool:
@@ -91,22 +91,22 @@ def tried(
     rows_of : the checks of a coupling with that table
     name : designation of the coupling that the file names; empty where it leaves the choice
     """
-    found = [_candidate(each, rows_of(with_row(table, each))) for each in couplings]
-    found.sort(key=lambda each: (each.designation != name, *_order(each)))
-    return [_judged(each, found[0], name) for each in found]
+    candidates = [_candidate(coupling, rows_of(with_row(table, coupling))) for coupling in couplings]
+    candidates.sort(key=lambda candidate: (candidate.designation != name, *_order(candidate)))
+    return [_judged(candidate, candidates[0], name) for candidate in candidates]
 
 
 def _candidate(sold: CatalogueFlexible, rows: Iterable[CheckRow]) -> CouplingCandidate:
-    of: FlexibleCouplingData = sold.data
+    data: FlexibleCouplingData = sold.data
     return CouplingCandidate(
         sold.designation,
         sold.order_number,
         sold.price,
         sold.source,
-        rated_torque=float(of.rated_torque),
-        stiffness=float(of.stiffness),
-        damping=float(of.damping),
-        J=float(of.J),
+        rated_torque=float(data.rated_torque),
+        stiffness=float(data.stiffness),
+        damping=float(data.damping),
+        J=float(data.J),
         checks=tuple(
             CandidateCheck(row.title, row.value, row.limit, row.unit, row.kind)
             for row in rows
@@ -115,47 +115,55 @@ def _candidate(sold: CatalogueFlexible, rows: Iterable[CheckRow]) -> CouplingCan
     )
 
 
-def _order(each: CouplingCandidate) -> tuple[bool, float, float, str]:
+def _order(candidate: CouplingCandidate) -> tuple[bool, float, float, str]:
     """The cheapest that fits comes first, one without a price behind those with one; where none fits, the one that
     uses the smallest share of its limits."""
-    if not each.fits:
-        return True, each.hardest.utilisation, each.rated_torque, each.designation
-    return False, each.price or math.inf, each.rated_torque, each.designation
+    if not candidate.fits:
+        return True, candidate.hardest.utilisation, candidate.rated_torque, candidate.designation
+    return False, candidate.price or math.inf, candidate.rated_torque, candidate.designation
 
 
-def _judged(each: CouplingCandidate, best: CouplingCandidate, name: str) -> CouplingCandidate:
-    if each is best:
+def _judged(candidate: CouplingCandidate, best: CouplingCandidate, name: str) -> CouplingCandidate:
+    if candidate is best:
         if name:
-            reason = f"named by the study file; {each.hardest.words}"
-            return replace(each, verdict=CHOSEN if each.fits else REJECTED, reason=reason)
-        if not each.fits:
-            return replace(each, verdict=NEAREST, reason=f"no coupling fits; {each.hardest.words}")
+            reason = f"named by the study file; {candidate.hardest.words}"
+            return replace(candidate, verdict=CHOSEN if candidate.fits else REJECTED, reason=reason)
+        if not candidate.fits:
+            return replace(candidate, verdict=NEAREST, reason=f"no coupling fits; {candidate.hardest.words}")
         first = (
-            "the cheapest that fits" if each.price is not None else "the smallest that fits, without a price"
+            "the cheapest that fits"
+            if candidate.price is not None
+            else "the smallest that fits, without a price"
         )
-        return replace(each, verdict=CHOSEN, reason=f"{first}; {each.hardest.words}")
-    if not each.fits:
-        return replace(each, verdict=REJECTED, reason=each.hardest.words)
+        return replace(candidate, verdict=CHOSEN, reason=f"{first}; {candidate.hardest.words}")
+    if not candidate.fits:
+        return replace(candidate, verdict=REJECTED, reason=candidate.hardest.words)
     if name:
-        return replace(each, verdict=FITS, reason="the study file names another one")
-    if each.price is None:
-        return replace(each, verdict=FITS, reason="has no price")
-    dearer = f"dearer: {each.price:.10g}" if each.price != best.price else "larger, at the same price"
-    return replace(each, verdict=FITS, reason=dearer)
+        return replace(candidate, verdict=FITS, reason="the study file names another one")
+    if candidate.price is None:
+        return replace(candidate, verdict=FITS, reason="has no price")
+    dearer = (
+        f"dearer: {candidate.price:.10g}" if candidate.price != best.price else "larger, at the same price"
+    )
+    return replace(candidate, verdict=FITS, reason=dearer)
 
 
 def coupling_faults(
-    couplings: Sequence[CatalogueFlexible], name: str, given: Collection[str]
+    couplings: Sequence[CatalogueFlexible], name: str, keys: Collection[str]
 ) -> Iterator[InputError]:
     """Refusals of a designation that none of the `couplings` of the catalogues has, and beside them of those values
-    of a row that are `given`."""
-    known = [each.designation for each in couplings]
+    of a row whose `keys` the file gives."""
+    designations = [coupling.designation for coupling in couplings]
     key = f"{_TABLE}.designation"
-    if name and name not in known:
-        words = f"must be one of {', '.join(known[:5])}" if known else "no catalogue has flexible couplings"
-        near = near_name(name, known)
-        yield InputError(f"{key} = {shown(name)}: not in the catalogue; {words}{near}", key)
-    for each in OF_ROW if known else ():
-        if (own := f"{_TABLE}.{each}") in given:
-            words = "each flexible coupling of the catalogue has its own; leave it out"
-            yield InputError(f"{own}: {words}", own)
+    if name and name not in designations:
+        reason = (
+            f"must be one of {', '.join(designations[:5])}"
+            if designations
+            else "no catalogue has flexible couplings"
+        )
+        near = near_name(name, designations)
+        yield InputError(f"{key} = {shown(name)}: not in the catalogue; {reason}{near}", key)
+    for column in OF_ROW if designations else ():
+        if (full_key := f"{_TABLE}.{column}") in keys:
+            reason = "each flexible coupling of the catalogue has its own; leave it out"
+            yield InputError(f"{full_key}: {reason}", full_key)

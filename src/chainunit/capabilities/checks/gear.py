@@ -130,7 +130,7 @@ def gear_check(
 
 
 def gear_rows(
-    of: GearCheck,
+    check: GearCheck,
     rating: GearRating,
     permitted_peak: float,
     titles: Mapping[str, str],
@@ -138,10 +138,10 @@ def gear_rows(
 ) -> Iterator[CheckRow | NotChecked]:
     """The rows of a gear; `permitted_peak` is the permitted radial force in events [N], 0 where it is unknown, and
     `titles` are those of runs. `unloaded` says why the output shaft carries no reaction, where it carries none."""
-    load, at = of.load, "checks.gear"
-    if of.running_limit is not None and of.torque_limit is not None:
-        yield _RUNNING[bool(load.exponent)].row("gear", at, load, of.running_limit)
-        yield _LARGEST.row("gear", at, load, of.torque_limit, titles.get(of.run, of.run))
+    load, path = check.load, "checks.gear"
+    if check.running_limit is not None and check.torque_limit is not None:
+        yield _RUNNING[bool(load.exponent)].row("gear", path, load, check.running_limit)
+        yield _LARGEST.row("gear", path, load, check.torque_limit, titles.get(check.run, check.run))
     else:
         yield _lacks("torque of running and largest torque", "rated_torque")
     for key, rule in _RATINGS.items():
@@ -150,10 +150,10 @@ def gear_rows(
         elif not (limit := getattr(rating, key)):
             yield _lacks(rule.title, key)
         else:
-            yield rule.row("gear", at, load, limit)
+            yield rule.row("gear", path, load, limit)
     if load.largest_radial is not None and rating.overhung_load:
         if permitted_peak:
-            yield _EVENTS.row("gear", at, load, permitted_peak)
+            yield _EVENTS.row("gear", path, load, permitted_peak)
         else:
             yield _lacks(_EVENTS.title, "peak_overhung_load")
 
@@ -179,8 +179,8 @@ def find(
     drive, tables = study.drive, study.config.drive
     if drive.ratio == 1.0:
         return None, []
-    given = tables.gear if "gear.torque_limit" in tables.given else None
-    rating = rating_of(table, drive.gear_rating, given.torque_limit if given else 0.0)
+    transmission = tables.gear if "gear.torque_limit" in tables.given else None
+    rating = rating_of(table, drive.gear_rating, transmission.torque_limit if transmission else 0.0)
     if not any((rating.rated_torque, rating.thermal_power, rating.overhung_load, rating.largest_speed)):
         why = "the file gives no rating of the gear; add [gear_rating]"
         return None, [NotChecked("gear", why, "gear_rating")]
@@ -206,9 +206,9 @@ def find(
         largest_radial=largest_radial,
         speed=largest(study, lambda run: run[drive.motor_speed].values)[0],
     )
-    found = gear_check(load, rating, peak_factor_of(table, drive.gear_rating, tables.gear), run, title)
+    check = gear_check(load, rating, peak_factor_of(table, drive.gear_rating, tables.gear), run, title)
     why = _SEPARATE if separate else _UNTURNED
-    return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles, why))
+    return check, list(gear_rows(check, rating, table.peak_overhung_load, study.titles, why))
 
 
 def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: float) -> GearRating:
@@ -263,8 +263,8 @@ def motor_shaft(
         return None, [
             NotChecked(what, "a belt or wheel on it is not known; add pulley_diameter and tension_factor")
         ]
-    found = ShaftLoad(torque, radial)
-    return found, [shaft_row(found, table.overhung_load, formula, numbers)]
+    load = ShaftLoad(torque, radial)
+    return load, [shaft_row(load, table.overhung_load, formula, numbers)]
 
 
 def pulley_force(torque: float, diameter: float, factor: float) -> float:
@@ -273,9 +273,9 @@ def pulley_force(torque: float, diameter: float, factor: float) -> float:
     return 2.0 * torque * factor / diameter
 
 
-def shaft_row(of: ShaftLoad, limit: float, formula: str, numbers: Mapping[str, str]) -> CheckRow:
+def shaft_row(load: ShaftLoad, limit: float, formula: str, numbers: Mapping[str, str]) -> CheckRow:
     """The row of the motor's shaft."""
     source, place = "Permitted radial force of the maker of the motor", "checks.motor_shaft.radial"
     return CheckRow(
-        "motor", "overhung load of the shaft", source, formula, of.radial, limit, place, numbers, "N"
+        "motor", "overhung load of the shaft", source, formula, load.radial, limit, place, numbers, "N"
     )

@@ -20,9 +20,9 @@ _COUPLINGS = "checks.flexible_coupling.candidates"
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table of the checks."""
-    found = CheckFindings.of_study(study)
-    if found.rows:
-        couplings = () if found.flexible_coupling is None else found.flexible_coupling.candidates
+    findings = CheckFindings.of_study(study)
+    if findings.rows:
+        couplings = () if findings.flexible_coupling is None else findings.flexible_coupling.candidates
         if couplings:
             yield _coupling_to_order(s, couplings)
         lead = (
@@ -38,30 +38,30 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Text(lead.format(place="under it"), "lead", "long")
         yield b.Text(lead.format(place="whose number stands behind it"), "lead", "sheet")
         yield b.Table(
-            tuple(_row(s, found, k) for k in range(len(found.rows))),
+            tuple(_row(s, findings, k) for k in range(len(findings.rows))),
             b.heads("check", "value", "limit", "used"),
             title="Checks by clause",
             note_title="clause, formula, numbers",
             form="long",
         )
-        yield from _on_sheet(s, found)
+        yield from _on_sheet(s, findings)
         if couplings:
             yield _tried_couplings(s, couplings)
         yield b.Table(
-            tuple(_row(s, found, k, short=True) for k in range(len(found.rows))),
+            tuple(_row(s, findings, k, short=True) for k in range(len(findings.rows))),
             b.heads("check", "value", "limit", "used"),
             title="Checks by clause",
             form="short",
         )
 
 
-def _on_sheet(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
+def _on_sheet(s: b.Source, findings: CheckFindings) -> Iterator[b.Block]:
     """The checks with a line each, and behind them each clause and formula once, by its number in the table."""
-    laws = dict.fromkeys((row.clause, row.formula) for row in found.rows)
+    laws = dict.fromkeys((row.clause, row.formula) for row in findings.rows)
     places = {law: place for place, law in enumerate(laws, 1)}
     rows = []
-    for k, row in enumerate(found.rows):
-        short = _row(s, found, k, short=True)
+    for k, row in enumerate(findings.rows):
+        short = _row(s, findings, k, short=True)
         rows.append(replace(short, cells=(*short.cells, f"[{places[row.clause, row.formula]}]")))
     heads = (*b.heads("check", "value", "limit"), b.Column("used", of_text=True), *b.heads("by"))
     yield b.Table(tuple(rows), heads, title="Checks by clause", form="sheet")
@@ -71,32 +71,38 @@ def _on_sheet(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
 
 def _coupling_to_order(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Text:
     """The flexible coupling of the catalogues that is checked."""
-    at, best = _COUPLINGS, candidates[0]
-    words: list[Line] = [s.words(f"{at}.0.designation")]
+    path, best = _COUPLINGS, candidates[0]
+    phrases: list[Line] = [s.words(f"{path}.0.designation")]
     if best.order_number:
-        words.append(s.line(f"order number {{{at}.0.order_number}}"))
+        phrases.append(s.line(f"order number {{{path}.0.order_number}}"))
     if best.price is not None:
-        words.append(s.line(f"price {{={at}.0.price:10}}"))
-    values = (s.number(f"{at}.0.{name}", as_given=True) for name in ("rated_torque", "stiffness", "damping"))
-    words += [line(name, value) for name, value in zip(("TKN ", "CTdyn ", "psi "), values, strict=True)]
-    count = f"{sum(each.fits for each in candidates)} of the {len(candidates)} of the catalogues fit"
-    reason = s.words(f"{at}.0.reason")
+        phrases.append(s.line(f"price {{={path}.0.price:10}}"))
+    values = (
+        s.number(f"{path}.0.{name}", as_given=True) for name in ("rated_torque", "stiffness", "damping")
+    )
+    phrases += [line(name, value) for name, value in zip(("TKN ", "CTdyn ", "psi "), values, strict=True)]
+    count = (
+        f"{sum(candidate.fits for candidate in candidates)} of the {len(candidates)} of the catalogues fit"
+    )
+    reason = s.words(f"{path}.0.reason")
     begin = (
         "Flexible coupling to order: " if best.verdict == CHOSEN else "Flexible coupling that does not fit: "
     )
-    return b.Text(line(begin, *join(words), ": ", reason, f" ({count})."))
+    return b.Text(line(begin, *join(phrases), ": ", reason, f" ({count})."))
 
 
 def _tried_couplings(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Table:
     """The flexible couplings of the catalogues."""
     rows = []
-    for k, each in enumerate(candidates):
-        at = f"{_COUPLINGS}.{k}"
+    for k, candidate in enumerate(candidates):
+        path = f"{_COUPLINGS}.{k}"
         name, verdict, order, why = (
-            s.words(f"{at}.{x}") for x in ("designation", "verdict", "order_number", "reason")
+            s.words(f"{path}.{x}") for x in ("designation", "verdict", "order_number", "reason")
         )
-        price = s.number(f"{at}.price", as_given=True, none="-")
-        share = s.number(f"{at}.checks.{each.checks.index(each.hardest)}.utilisation", over=not each.fits)
+        price = s.number(f"{path}.price", as_given=True, none="-")
+        share = s.number(
+            f"{path}.checks.{candidate.checks.index(candidate.hardest)}.utilisation", over=not candidate.fits
+        )
         rows.append(b.TableRow((name, verdict, share, price, order, why)))
     heads = b.heads("flexible coupling", "verdict", "largest share", "price", "order number", "reason")
     title = "Flexible couplings of the catalogues"
@@ -105,11 +111,11 @@ def _tried_couplings(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.
 
 def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """What was not checked, and why."""
-    found = CheckFindings.of_study(study)
-    if found.not_checked:
+    findings = CheckFindings.of_study(study)
+    if findings.not_checked:
         cells = (
             (s.words(f"checks.not_checked.{k}.what"), s.words(f"checks.not_checked.{k}.why"))
-            for k in range(len(found.not_checked))
+            for k in range(len(findings.not_checked))
         )
         yield b.Table(
             tuple(map(b.TableRow, cells)), b.heads("not checked", "why"), numeric=False, form="long"
@@ -118,12 +124,12 @@ def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The classes of the relay, beside the start and the stall of the motor; nothing where no relay is checked."""
-    found = CheckFindings.of_study(study).relay
-    if found is None:
+    findings = CheckFindings.of_study(study).relay
+    if findings is None:
         return
     rows = []
-    never = "trips in running" if found.numbers.before >= TRIPS_AT * found.numbers.setting else "never"
-    for name in found.classes:
+    never = "trips in running" if findings.numbers.before >= TRIPS_AT * findings.numbers.setting else "never"
+    for name in findings.classes:
         path = f"checks.relay.classes.{name}"
         rows.append(
             b.TableRow(
@@ -131,7 +137,7 @@ def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
                     name,
                     s.number(f"{path}.shortest"),
                     s.number(f"{path}.stall_trip", none=never),
-                    "yes" if name in found.suitable else "no",
+                    "yes" if name in findings.suitable else "no",
                 )
             )
         )
@@ -148,8 +154,8 @@ def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield b.Table(tuple(rows), heads, form="long")
 
 
-def _row(s: b.Source, found: CheckFindings, k: int, *, short: bool = False) -> b.TableRow:
-    row, path = found.rows[k], f"checks.rows.{k}"
+def _row(s: b.Source, findings: CheckFindings, k: int, *, short: bool = False) -> b.TableRow:
+    row, path = findings.rows[k], f"checks.rows.{k}"
     title = line(s.words(f"{path}.of"), ": ", s.words(f"{path}.title"))
     limit = line("at least " if row.at_least else "at most ", s.number(f"{path}.limit"))
     # of a check that fails, a number that the result does not have is not finite
@@ -166,4 +172,4 @@ def _numbers(s: b.Source, row: CheckRow) -> tuple[Line, ...]:
     """The numbers of the formula, behind it."""
     if not row.numbers:
         return ()
-    return (" (", *join([line(f"{symbol} = ", s.number(at)) for symbol, at in row.numbers.items()]), ")")
+    return (" (", *join([line(f"{symbol} = ", s.number(path)) for symbol, path in row.numbers.items()]), ")")

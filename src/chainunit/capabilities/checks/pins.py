@@ -25,5 +25,5 @@ def pins_named(name: str, titles: list[str]) -> list[str]:
 
 def no_pin(name: str, titles: list[str]) -> str:
     """The words on a name that no pin has."""
-    names = [*dict.fromkeys(each for title in titles for each in (first_word(title), title))]
+    names = [*dict.fromkeys(spelling for title in titles for spelling in (first_word(title), title))]
     return f"is no turning pin{meant(name, names)} there are {', '.join(titles) or 'none'}"

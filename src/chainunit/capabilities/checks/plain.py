@@ -73,7 +73,9 @@ def plain_bearing(table: Any, time: Any, force: Any, angle: Any, largest: float,
     return PlainBearing(run, numbers)
 
 
-def checks(pin: str, of: PlainBearing, table: Any, path: str, run: str) -> Iterator[CheckRow | NotChecked]:
+def checks(
+    pin: str, bearing: PlainBearing, table: Any, path: str, run: str
+) -> Iterator[CheckRow | NotChecked]:
     """The checks of a bearing whose numbers stand at `path` of the result; `run` is the title of the run with the
     largest force."""
     for rule in _RULES:
@@ -82,4 +84,4 @@ def checks(pin: str, of: PlainBearing, table: Any, path: str, run: str) -> Itera
                 f"{pin}, {rule.title.format(run=run)}", f"the file gives no permitted {rule.value}"
             )
         else:
-            yield rule.row(pin, path, of.numbers, limit, run)
+            yield rule.row(pin, path, bearing.numbers, limit, run)

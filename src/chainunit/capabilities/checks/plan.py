@@ -155,6 +155,6 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
             table = replace(table, static_safety=STATIC_SAFETY[kind])
         return pins, BearingPlan(kind, table)
 
-    found = BEARINGS.read_named(tables, faults, read)
-    plans = {pin: plan for pins, plan in found.values() for pin in pins}
+    entries = BEARINGS.read_named(tables, faults, read)
+    plans = {pin: plan for pins, plan in entries.values() for pin in pins}
     return {title: plans[title] for title in titles if title in plans}

@@ -92,7 +92,7 @@ class RelayFindings:
 
 
 def stall_heat(
-    of: TripClass,
+    relay_class: TripClass,
     time: Any,
     current: Any,
     setting: float,
@@ -106,7 +106,7 @@ def stall_heat(
     if before >= TRIPS_AT * setting:
         return None
     lasts = lasting_current(current, after)
-    trip = relay_trip(time, current, setting, before, lasts, of.longest, TRIPS_AT)
+    trip = relay_trip(time, current, setting, before, lasts, relay_class.longest, TRIPS_AT)
     if trip is None:
         return None
     until = time <= trip
@@ -129,23 +129,25 @@ def relay_findings(
     """
     classes: dict[str, RelayOfClass] = {}
     starting = []
-    for each in CLASSES:
-        trip = stall_trip(each, numbers.setting, numbers.before, numbers.stall_current)
-        classes[each.name] = RelayOfClass(shortest=each.shortest, longest=each.longest, stall_trip=trip)
-        enough = least <= LIGHT or each.longest >= least
-        if numbers.start_seconds <= each.shortest and enough:
-            starting.append(each)
-    named = {each.name: each for each in CLASSES}
-    own = named[trip_class] if trip_class else named.get(str(least), CLASSES[-1])
-    trips = {name: classes[name].stall_trip for name in (each.name for each in starting)}
+    for relay_class in CLASSES:
+        trip = stall_trip(relay_class, numbers.setting, numbers.before, numbers.stall_current)
+        classes[relay_class.name] = RelayOfClass(
+            shortest=relay_class.shortest, longest=relay_class.longest, stall_trip=trip
+        )
+        enough = least <= LIGHT or relay_class.longest >= least
+        if numbers.start_seconds <= relay_class.shortest and enough:
+            starting.append(relay_class)
+    named = {relay_class.name: relay_class for relay_class in CLASSES}
+    chosen_class = named[trip_class] if trip_class else named.get(str(least), CLASSES[-1])
+    trips = {name: classes[name].stall_trip for name in (relay_class.name for relay_class in starting)}
     suitable = [name for name, trip in trips.items() if trip is not None and trip <= numbers.stall_time]
     heats = {
-        name: stall_heat(own, time, current, numbers.setting, before, numbers.stall_current, *after)
+        name: stall_heat(chosen_class, time, current, numbers.setting, before, numbers.stall_current, *after)
         for name, (time, current, before, *after) in runs.items()
     }
     events = {name: heat for name, heat in heats.items() if heat is not None}
     holds = HOLDS_AT * numbers.setting
-    return RelayFindings(own.name, numbers, holds, classes, tuple(suitable), events)
+    return RelayFindings(chosen_class.name, numbers, holds, classes, tuple(suitable), events)
 
 
 def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, list[CheckRow | NotChecked]]:
@@ -159,13 +161,13 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
     # a relay in the phases of a delta carries the current of a winding
     in_phases = drive.star_delta is not None and plan.is_in_phases
     share = 1.0 / math.sqrt(3.0) if in_phases else 1.0
-    given = {
+    settings = {
         "setting": plan.table.setting or share * (drive.rated_current or 0.0),
         "stall_time": plan.table.stall_time or (plate.locked_time if plate else 0.0),
         "stall_current": plan.table.stall_current
         or (share * plate.rated_current * plate.locked_current_ratio if plate else 0.0),
     }
-    if missing := [name for name, value in given.items() if not value]:
+    if missing := [name for name, value in settings.items() if not value]:
         return None, [NotChecked(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")]
     assert study.start is not None
     before = share * study.answers[STEADY].current_rms
@@ -175,7 +177,7 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
         return share * (drive.relay_current(run["time"].values, current) if in_phases else current)
 
     rise = study.runs["start_up"].sel(time=slice(None, study.start_end))
-    seconds = start_seconds(rise["time"].values, current_of(rise), given["setting"])
+    seconds = start_seconds(rise["time"].values, current_of(rise), settings["setting"])
     starts = StartFindings.found_in(study)
     if (
         starts is not None
@@ -184,7 +186,9 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
         and in_phases == (drive.star_delta is not None)
     ):
         # the hardest of the starts from all crank angles, which are for a relay at the rated current
-        seconds = max(seconds, starts.relay_seconds * (share * drive.rated_current / given["setting"]) ** 2)
+        seconds = max(
+            seconds, starts.relay_seconds * (share * drive.rated_current / settings["setting"]) ** 2
+        )
     runs: dict[str, tuple[Any, Any, float, float | None]] = {}
     for event in study.overloads:
         # behind a coupling that opens no load is left that could trip the relay
@@ -194,9 +198,9 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
             time = run["time"].values - study.event[event]
             passes = study.config.events[event].passes and study.answers[event].stall_time is None
             runs[event] = time, current_of(run), 0.0 if from_rest else before, before if passes else None
-    numbers = RelaySetting(before=before, start_seconds=seconds, **given)
-    found = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
-    return found, list(relay_rows(found, {event: study.title_of(event) for event in found.events}))
+    numbers = RelaySetting(before=before, start_seconds=seconds, **settings)
+    findings = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
+    return findings, list(relay_rows(findings, {event: study.title_of(event) for event in findings.events}))
 
 
 def _why_none(study: StudyRecord) -> str:
@@ -208,33 +212,34 @@ def _why_none(study: StudyRecord) -> str:
     return ""
 
 
-def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow | NotChecked]:
+def relay_rows(findings: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow | NotChecked]:
     """The rows of a relay; `titles` are those of its events."""
-    numbers, own, at = of.numbers, of.classes[of.trip_class], "checks.relay"
-    here, name = f"{at}.classes.{of.trip_class}", f"thermal relay of class {of.trip_class}"
+    numbers, chosen_class, root = findings.numbers, findings.classes[findings.trip_class], "checks.relay"
+    here, name = f"{root}.classes.{findings.trip_class}", f"thermal relay of class {findings.trip_class}"
     places = {
-        "Ir": f"{at}.setting",
-        "IA": f"{at}.stall_current",
-        "I0": f"{at}.before",
+        "Ir": f"{root}.setting",
+        "IA": f"{root}.stall_current",
+        "I0": f"{root}.before",
         "largest": f"{here}.longest",
     }
     yield CheckRow(
         name, "start", _CLAUSE,
         f"t = sum (I/({MULTIPLE:g} Ir))^2 dt <= least trip time of the class at {MULTIPLE:g} Ir, cold",
-        numbers.start_seconds, own.shortest, f"{at}.start_seconds",
+        numbers.start_seconds, chosen_class.shortest, f"{root}.start_seconds",
         {"Ir": places["Ir"], "limit": f"{here}.shortest"}, "s",
     )  # fmt: skip
-    yield _RUNNING.row(name, at, numbers, of.holds_up_to)
+    yield _RUNNING.row(name, root, numbers, findings.holds_up_to)
     if numbers.before >= TRIPS_AT * numbers.setting:
         yield NotChecked(f"{name}, stall and events", "running alone trips it")
         return
     yield CheckRow(
         name, "trip with the rotor locked", _STALL,
         f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the class",
-        math.inf if own.stall_trip is None else own.stall_trip, numbers.stall_time, f"{here}.stall_trip", places, "s",
+        math.inf if chosen_class.stall_trip is None else chosen_class.stall_trip, numbers.stall_time,
+        f"{here}.stall_trip", places, "s",
     )  # fmt: skip
-    for event, heat in of.events.items():
-        path = f"{at}.events.{event}"
+    for event, heat in findings.events.items():
+        path = f"{root}.events.{event}"
         yield CheckRow(
             name, f"heat of the motor until the trip ({titles[event]})", _STALL,
             "t = sum (I/IA)^2 dt until the slowest relay trips", heat.seconds, numbers.stall_time, f"{path}.seconds",

@@ -114,7 +114,7 @@ def rolling_bearing(
     p, span = EXPONENT[kind], float(time[-1] - time[0])
     load, way = mean_load(force, angle, p), float(np.sum(np.abs(np.diff(angle))))
     speed, is_moved = way / span, load * way > 0.0
-    given = (table.C, load, p, speed, table.life_factor)
+    terms = (table.C, load, p, speed, table.life_factor)
     swings = is_moved and not turns_round(angle)
     numbers = RollingNumbers(
         C=table.C,
@@ -125,8 +125,8 @@ def rolling_bearing(
         swing=float(np.ptp(angle)) if swings else None,
         amplitude_factor=2.0 * math.pi * turns / way if is_moved else None,
         life_factor=table.life_factor,
-        life=rating_life(*given) if is_moved else None,
-        needed=needed_rating(table.life, *given[1:]) if is_moved else None,
+        life=rating_life(*terms) if is_moved else None,
+        needed=needed_rating(table.life, *terms[1:]) if is_moved else None,
         critical_swing=critical_swing(table.elements, table.diameter_ratio) if table.elements else None,
         largest_force=largest,
         static_safety=table.C0 / largest if table.C0 and largest > 0.0 else None,
@@ -134,29 +134,31 @@ def rolling_bearing(
     return RollingBearing(kind, run, numbers)
 
 
-def checks(pin: str, of: RollingBearing, table: Any, path: str, run: str) -> Iterator[CheckRow | NotChecked]:
+def checks(
+    pin: str, bearing: RollingBearing, table: Any, path: str, run: str
+) -> Iterator[CheckRow | NotChecked]:
     """The checks of a bearing whose numbers stand at `path` of the result; `run` is the title of the run with the
     largest force."""
-    own = of.numbers
-    least = own.critical_swing
-    if own.swing is not None and least is not None and own.swing < least:
+    numbers = bearing.numbers
+    least = numbers.critical_swing
+    if numbers.swing is not None and least is not None and numbers.swing < least:
         why = (
-            f"its swing of {number(own.swing, 'rad')} stays below {number(least, 'rad')}, from where on the formula "
-            "holds; take a plain bearing, or ask the maker"
+            f"its swing of {number(numbers.swing, 'rad')} stays below {number(least, 'rad')}, from where on the "
+            "formula holds; take a plain bearing, or ask the maker"
         )
         yield NotChecked(f"{pin}, rating life", why)
     else:
-        yield _LIFE[of.kind].row(pin, path, own, table.life)
+        yield _LIFE[bearing.kind].row(pin, path, numbers, table.life)
     most = MOST_LOAD * table.C
-    yield _LOAD[of.kind].row(pin, path, own, min(most, table.C0) if table.C0 else most)
+    yield _LOAD[bearing.kind].row(pin, path, numbers, min(most, table.C0) if table.C0 else most)
     if table.C0:
-        yield _STATIC.row(pin, path, own, table.static_safety or 0.0, run)
+        yield _STATIC.row(pin, path, numbers, table.static_safety or 0.0, run)
     else:
         yield NotChecked(f"{pin}, static safety", "the file gives no static load rating C0")
-    if own.swing is None:
+    if numbers.swing is None:
         return
     if least is None:
         why = "the file does not give the number of rolling elements (elements)"
         yield NotChecked(f"{pin}, swing against false brinelling", why)
         return
-    yield _SWING.row(pin, path, own, least)
+    yield _SWING.row(pin, path, numbers, least)

@@ -21,6 +21,6 @@ def _runs_from_events(study: StudyRecord) -> Iterator[tuple[str, xr.Dataset]]:
             yield name, from_event_on(study, name)
 
 
-def largest(study: StudyRecord, of: Callable[[xr.Dataset], Any]) -> tuple[float, str]:
-    """The largest size of a quantity `of` all runs, and the run in which it is."""
-    return max((peak(of(run)), name) for name, run in _runs_from_events(study))
+def largest(study: StudyRecord, quantity: Callable[[xr.Dataset], Any]) -> tuple[float, str]:
+    """The largest size of a `quantity` in all runs, and the run in which it is."""
+    return max((peak(quantity(run)), name) for name, run in _runs_from_events(study))

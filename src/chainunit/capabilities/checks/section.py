@@ -91,10 +91,10 @@ def fibres(fx: Any, fy: Any, turned: Any) -> tuple[Any, Any]:
     turned : counter-clockwise angle of the section [rad], shape (n,), or 0 for one that stands
     """
     c, s = np.cos(turned), np.sin(turned)
-    own = np.stack([c * fx + s * fy, c * fy - s * fx])
+    forces = np.stack([c * fx + s * fy, c * fy - s * fx])
     # half of the circle: the fibre opposite has the same amplitude, and the mean with its other sign
     angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    force = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ own
+    force = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ forces
     largest, least = np.max(force, axis=1), np.min(force, axis=1)
     return 0.5 * (largest - least), 0.5 * np.abs(largest + least)
 
@@ -157,10 +157,10 @@ def shaft_section(
     return ShaftSection(pin, run, numbers, strength)
 
 
-def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterator[CheckRow]:
+def section_rows(name: str, section: ShaftSection, safety: float, run: str) -> Iterator[CheckRow]:
     """The rows of a section; `run` is the title of the run with the largest force."""
     for rule in (_FATIGUE, _YIELD):
-        row = rule.row(f"section {name}", f"checks.section.{name}", of.stress, safety, run)
+        row = rule.row(f"section {name}", f"checks.section.{name}", section.stress, safety, run)
         # a section without a swinging stress lasts
         yield row if row.value is not None and math.isfinite(row.value) else replace(row, value=None)
 
@@ -178,7 +178,7 @@ def find(
     bearing = driver_bearing(drive)
     torque = crank_torque(drive, turns)
     largest_torque, _ = largest(study, lambda run: crank_torque(drive, run))
-    found: dict[str, ShaftSection] = {}
+    sections: dict[str, ShaftSection] = {}
     checks: list[CheckRow | NotChecked] = []
     for name, plan in plans.items():
         pin = plan.pin or bearing
@@ -196,6 +196,6 @@ def find(
             amplitude, mean = fibres(fx, fy, angle)
         most, run = largest_load(study.pins, pin)
         args = (amplitude, mean, force, most, torque, largest_torque, pin, run)
-        found[name] = shaft_section(plan, *args)
-        checks += section_rows(name, found[name], plan.table.safety, study.title_of(run))
-    return found, checks
+        sections[name] = shaft_section(plan, *args)
+        checks += section_rows(name, sections[name], plan.table.safety, study.title_of(run))
+    return sections, checks

@@ -46,8 +46,8 @@ def read_sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) 
 
     def read(entry: Entry, name: str) -> SectionPlan:
         missing = [key for key in SECTION_NEEDS if key not in entry.raw]
-        words = {key: entry.raw.pop(key) for key in _TEXTS if key in entry.raw}
-        pin = words.get("pin", "")
+        texts = {key: entry.raw.pop(key) for key in _TEXTS if key in entry.raw}
+        pin = texts.get("pin", "")
         if pin:
             pins = pins_named(pin, titles)
             if len(pins) == 1:
@@ -59,13 +59,13 @@ def read_sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) 
         for key in missing:
             choice = f", one of {', '.join(NOTCHES)}" if key == "notch" else ""
             entry.fault(key, f"must be given{choice}")
-        notch = words.get("notch", "none")
-        for of, keys in NOTCH_KEYS.items():
+        notch = texts.get("notch", "none")
+        for kind, keys in NOTCH_KEYS.items():
             for key in keys:
-                if key in entry.raw and of != notch:
-                    entry.fault(key, f"is of the notch {of}, and the notch is {notch}; leave it out")
-                elif key not in entry.raw and of == notch and of != GIVEN_NOTCH:
-                    entry.fault(key, f"must be given for the notch {of}")
+                if key in entry.raw and kind != notch:
+                    entry.fault(key, f"is of the notch {kind}, and the notch is {notch}; leave it out")
+                elif key not in entry.raw and kind == notch and kind != GIVEN_NOTCH:
+                    entry.fault(key, f"must be given for the notch {kind}")
         entry.refuse()
         table = instance(SectionTable, entry.raw)
         if table.bore >= table.diameter:
@@ -79,11 +79,11 @@ def read_sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) 
         return SectionPlan(
             table,
             pin,
-            words.get("on", PARTS[0]),
+            texts.get("on", PARTS[0]),
             notch,
-            words.get("steel", ""),
-            bool(words.get("hard_surface", False)),
-            words.get("mean_stress", RATIO),
+            texts.get("steel", ""),
+            bool(texts.get("hard_surface", False)),
+            texts.get("mean_stress", RATIO),
         )
 
     return SECTIONS.read_named(tables, faults, read)

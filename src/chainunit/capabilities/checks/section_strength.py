@@ -236,7 +236,7 @@ class FibreFatigue:
         return 1.0 / used if used > 0.0 else math.inf
 
 
-def fibre_fatigue(of: SectionStrength, stress: Stresses, case: str = RATIO) -> FibreFatigue:
+def fibre_fatigue(section: SectionStrength, stress: Stresses, case: str = RATIO) -> FibreFatigue:
     """The fatigue of the fibres under their stresses; for the `case` see `permitted_amplitude`."""
     mean = np.sqrt(np.square(stress.bending_mean) + 3.0 * stress.torsion_mean**2)
     limits: dict[str, Any] = {}
@@ -246,16 +246,16 @@ def fibre_fatigue(of: SectionStrength, stress: Stresses, case: str = RATIO) -> F
         ("tension", stress.tension, mean),
         ("torsion", stress.torsion, mean / math.sqrt(3.0)),
     ):
-        strength, yields = getattr(of, load), getattr(of, f"yield_{load}")
-        limits[load] = permitted_amplitude(strength, yields, of.tensile, amplitude, middle, case)
+        strength, yields = getattr(section, load), getattr(section, f"yield_{load}")
+        limits[load] = permitted_amplitude(strength, yields, section.tensile, amplitude, middle, case)
         with np.errstate(divide="ignore", invalid="ignore"):
             shares.append(np.where(np.asarray(amplitude) > 0.0, amplitude / limits[load], 0.0))
     bending, tension, torsion = shares
     return FibreFatigue(limits, np.hypot(bending + tension, torsion))
 
 
-def yield_safety(of: SectionStrength, bending: float, tension: float, torsion: float) -> float:
+def yield_safety(section: SectionStrength, bending: float, tension: float, torsion: float) -> float:
     """Safety against yield under the largest stresses [N/m2]; infinite without stress."""
-    direct = bending / of.yield_bending + tension / of.yield_tension
-    used = math.hypot(direct, torsion / of.yield_torsion)
+    direct = bending / section.yield_bending + tension / section.yield_tension
+    used = math.hypot(direct, torsion / section.yield_torsion)
     return 1.0 / used if used > 0.0 else math.inf

@@ -34,14 +34,14 @@ def find(
     plate = study.plate.nameplate
     rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
     current, bare = study.answers[STEADY].current_rms, table.permitted or plate.starts
-    found = permitted_starts(
+    starts = permitted_starts(
         starting_data(study.drive, plate, rise, study.steady, per_hour=asked, bare=bare, current=current),
         math.inf if study.proposal is None else study.proposal.permitted_starts,
     )
-    return found, list(starting_rows(found, is_chosen=study.proposal is not None))
+    return starts, list(starting_rows(starts, is_chosen=study.proposal is not None))
 
 
-def starting_rows(of: PermittedStarts, is_chosen: bool = False) -> Iterator[CheckRow]:
+def starting_rows(starts: PermittedStarts, is_chosen: bool = False) -> Iterator[CheckRow]:
     """The row of the starts; those of a motor that `is_chosen` are limited by the criteria of the choice, too."""
     choice = "; at most as many as the choice of the motor permits, by the heat of its winding"
     rule = CheckRule(
@@ -50,7 +50,7 @@ def starting_rows(of: PermittedStarts, is_chosen: bool = False) -> Iterator[Chec
         f"Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM{choice if is_chosen else ''}",
         "Z0 = bare; ML = counter_torque; MH = motor_torque; I = current; IN = rated_current; FI = inertia_factor",
     )  # fmt: skip
-    yield rule.row("motor", "checks.starting", of, of.permitted)
+    yield rule.row("motor", "checks.starting", starts, starts.permitted)
 
 
 def _why_none(study: StudyRecord, table: StartingTable, asked: float) -> str:

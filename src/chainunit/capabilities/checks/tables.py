@@ -72,13 +72,13 @@ BEARINGS = TableList(
         "required": ["kind"],
         "allOf": [
             {
-                "if": {"properties": {"kind": {"enum": list(of)}}, "required": ["kind"]},
+                "if": {"properties": {"kind": {"enum": list(kinds)}}, "required": ["kind"]},
                 "then": {
-                    "required": list(NEEDED[of[0]]),
+                    "required": list(NEEDED[kinds[0]]),
                     "not": {"anyOf": [{"required": [key]} for key in others]},
                 },
             }
-            for of, others in ((ROLLING, OF_PLAIN), ((PLAIN,), OF_ROLLING))
+            for kinds, others in ((ROLLING, OF_PLAIN), ((PLAIN,), OF_ROLLING))
         ],
     },
     follows={"static_safety": "1.5 for balls, 3 for rollers"},
@@ -113,7 +113,7 @@ RELAY_PLACES = (IN_PHASES, "line")
 
 RELAY_KEYS = {
     "trip_class": (
-        Literal[tuple(each.name for each in CLASSES)],
+        Literal[tuple(relay_class.name for relay_class in CLASSES)],
         Field(None, description="trip class of IEC 60947-4-1"),
     ),
     "place": (

@@ -41,12 +41,12 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
     - ``only``: the runs, events and measures that one of them has alone
     """
     results, pairs = {"a": a, "b": b}, (SIDES, SIDES[::-1])
-    given = {side: dict(_given_values(result.data)) for side, result in results.items()}
+    values = {side: dict(_given_values(result.data)) for side, result in results.items()}
     runs = {side: _runs(result.data) for side, result in results.items()}
     drivers = {result.words("driver") or USUAL_DRIVER for result in results.values()}
-    words = _words(drivers.pop() if len(drivers) == 1 else "driver")
-    names = dict.fromkeys([*given["a"], *given["b"]])
-    different = [name for name in names if not _same(*(given[side].get(name) for side in SIDES))]
+    descriptions = _words(drivers.pop() if len(drivers) == 1 else "driver")
+    names = dict.fromkeys([*values["a"], *values["b"]])
+    different = [name for name in names if not _same(*(values[side].get(name) for side in SIDES))]
     origins = {side: as_mapping(result.data.get("origins")) for side, result in results.items()}
     return {
         "chainunit": __version__,
@@ -54,18 +54,18 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
         "verdict": {side: _verdicts(result) for side, result in results.items()},
         "warnings": {side: _warnings_alone(results[side], results[other]) for side, other in pairs},
         "given": {
-            name: {side: given[side].get(name) for side in SIDES}
+            name: {side: values[side].get(name) for side in SIDES}
             | {f"origin_{side}": origins[side].get(name, "") for side in SIDES}
             for name in different
         },
         "given_equal": entry(len(names) - len(different), "1"),
         "runs": {
-            run: {"title": _title(b, run), "measures": _measures(numbers, runs["b"][run], words)}
+            run: {"title": _title(b, run), "measures": _measures(numbers, runs["b"][run], descriptions)}
             for run, numbers in runs["a"].items()
             if run in runs["b"]
         },
         "only": {
-            side: _alone(results[side], runs[side], results[other], runs[other], words)
+            side: _alone(results[side], runs[side], results[other], runs[other], descriptions)
             for side, other in pairs
         },
     }
@@ -80,9 +80,9 @@ def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
     """The verdicts of a result by their subject: whether it holds, and the text."""
     verdicts = {}
     for name, verdict in as_mapping(result.data.get("verdict")).items():
-        words = {key: as_mapping(verdict).get(key) for key in ("holds", "text")}
-        if all(isinstance(text, str) for text in words.values()):
-            verdicts[printable(name)] = {key: printable(str(text), 2000) for key, text in words.items()}
+        texts = {key: as_mapping(verdict).get(key) for key in ("holds", "text")}
+        if all(isinstance(text, str) for text in texts.values()):
+            verdicts[printable(name)] = {key: printable(str(text), 2000) for key, text in texts.items()}
     return verdicts
 
 
@@ -122,10 +122,10 @@ def _is_entry(node: Any) -> bool:
     """Whether a node is a number or a list of numbers with its unit, as this program writes it."""
     if not isinstance(node, Mapping) or "value" not in node:
         return False
-    value, words = node["value"], (node.get("unit"), node.get("kind", ""))
+    value, texts = node["value"], (node.get("unit"), node.get("kind", ""))
     numbers = value if isinstance(value, list) else [] if value is None else [value]
     return all(map(_is_finite, numbers)) and all(
-        isinstance(text, str) and text.isprintable() for text in words
+        isinstance(text, str) and text.isprintable() for text in texts
     )
 
 
@@ -171,15 +171,17 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
 
 def _words(driver: str) -> dict[str, str]:
     """By name, the words on the numbers of a result."""
-    words = {name: text for part in registered() for name, text in part.words(driver).items()}
-    return words | {v.name: v.described(driver) for of in (ShaftAnswers, Answers) for v in variables(of)}
+    descriptions = {name: text for part in registered() for name, text in part.words(driver).items()}
+    return descriptions | {
+        v.name: v.described(driver) for kind in (ShaftAnswers, Answers) for v in variables(kind)
+    }
 
 
-def _spoken(name: str, words: Mapping[str, str]) -> str:
+def _spoken(name: str, descriptions: Mapping[str, str]) -> str:
     """The name of a number in words: ``crank_torque_peak.q95`` -> crank torque, peak, 95 %."""
     first, _, rest = name.partition(".")
     rest = f"{rest[1:]} % of runs below" if rest[1:].isdigit() and rest[0] == "q" else rest.replace(".", ", ")
-    return ", ".join(filter(None, (words.get(first, first.replace("_", " ")), rest)))
+    return ", ".join(filter(None, (descriptions.get(first, first.replace("_", " ")), rest)))
 
 
 def _title(result: StoredResult, run: str) -> str:
@@ -190,10 +192,10 @@ def _title(result: StoredResult, run: str) -> str:
 # -- both
 
 
-def _measures(a: Numbers, b: Numbers, words: Mapping[str, str]) -> dict[str, Any]:
+def _measures(a: Numbers, b: Numbers, descriptions: Mapping[str, str]) -> dict[str, Any]:
     """The measures that both have and that have a value in one of them."""
     return {
-        name: {"title": _spoken(name, words)} | _pair(a[name], b[name])
+        name: {"title": _spoken(name, descriptions)} | _pair(a[name], b[name])
         for name in a
         if name in b and not a[name]["value"] is b[name]["value"] is None
     }
@@ -223,7 +225,7 @@ def _alone(
     runs: Mapping[str, Numbers],
     theirs: StoredResult,
     others: Mapping[str, Numbers],
-    words: Mapping[str, str],
+    descriptions: Mapping[str, str],
 ) -> dict[str, list[str]]:
     """The runs, events and measures that one result has and the other has not."""
     missing = [run for run in runs if run not in others]
@@ -238,7 +240,7 @@ def _alone(
         ],
         "events": [name for name in as_mapping(mine.data.get("event")) if name not in events],
         "measures": [
-            f"{_title(mine, run)}: {_spoken(name, words)}"
+            f"{_title(mine, run)}: {_spoken(name, descriptions)}"
             for run, numbers in runs.items()
             if run in others
             for name in numbers

@@ -49,8 +49,8 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             severity = _SEVERITY.get(verdict["holds"], "warning")
             yield b.Judgement(severity, line(f"{side.upper()}: ", s.words(f"verdict.{side}.{subject}.text")))
     for side in SIDES:
-        for words in s.lines(f"warnings.{side}"):
-            yield b.Judgement("warning", line(f"only {side.upper()}: ", words))
+        for warning in s.lines(f"warnings.{side}"):
+            yield b.Judgement("warning", line(f"only {side.upper()}: ", warning))
 
 
 def _given(s: b.Source) -> Iterator[b.Block]:
@@ -118,7 +118,8 @@ def _runs(s: b.Source) -> Iterator[b.Block]:
         rows = []
         for name, pair in measures.items():
             columns = (
-                s.number(f"runs.{run}.measures.{name}.{of}") for of in (*SIDES, "difference", "relative")
+                s.number(f"runs.{run}.measures.{name}.{column}")
+                for column in (*SIDES, "difference", "relative")
             )
             rows.append(b.TableRow((pair["title"], *columns), form="both" if name in short else "long"))
         if rows:

@@ -54,8 +54,8 @@ class EnergyCapability(Capability):
         from .running import scale_faults
 
         for name, load in plan.loads.items():
-            for words in scale_faults(config.feed, float(load.factor)):
-                yield InputError(f"usage.load.factor = {load.factor:g} ({name}): {words}", "usage.load")
+            for reason in scale_faults(config.feed, float(load.factor)):
+                yield InputError(f"usage.load.factor = {load.factor:g} ({name}): {reason}", "usage.load")
         if not plan.other:
             return
         from ...drives.catalogue import motor_of_catalogue

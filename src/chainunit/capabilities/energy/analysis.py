@@ -198,31 +198,31 @@ class _Task:
             self.study.say(_NOT_KNOWN, loads=", ".join(duty.unsteady))
             return None
         price = _price(self.plan.table.motor_price, motor)
-        own = self._energy(duty, motor.designation if motor else "the motor of the study", price)
+        energy = self._energy(duty, motor.designation if motor else "the motor of the study", price)
         other, no_other = self._other(drive, motor, duty)
         return EnergyFindings(
-            own=own,
+            own=energy,
             loads={
                 name: LoadEnergy(run.losses, duty.shares[name], float(self.plan.loads[name].factor))
                 for name, run in duty.runs.items()
             },
             running=self.plan.running,
             other=other,
-            comparison=None if other is None else compared(own, other),
+            comparison=None if other is None else compared(energy, other),
             inverter=self._inverter_words() if inverter else "",
             no_other=no_other,
             given_back=duty.given_back,
         )
 
-    def _duty(self, drive: Drive, inverter: InverterRating | None, words: str) -> LoadDuty:
+    def _duty(self, drive: Drive, inverter: InverterRating | None, suffix: str) -> LoadDuty:
         steady = self.study.answers[STEADY].winding_temperature
         usual = drive.parameters.ambient.T if steady is None else steady
         # a duty with the feed of the study is its steady running
-        full = all(each.factor == 1.0 for each in self.plan.loads.values())
+        full = all(load.factor == 1.0 for load in self.plan.loads.values())
         is_steady = full and steady is not None and drive is self.study.drive
 
         def progress(name: str) -> None:
-            self.work.progress(f"energy: {name}{words}", 0.0, 1.0)
+            self.work.progress(f"energy: {name}{suffix}", 0.0, 1.0)
 
         hottest = self.study.config.permitted_temperature[1]
         return duty_of(self.work.rig, drive, self.plan.loads, inverter, usual, hottest, progress, is_steady)
@@ -231,8 +231,8 @@ class _Task:
         if not drive.follows or motor is None:
             return None
         power = motor.nameplate.power
-        given = self.plan.inverter_losses
-        losses = tuple(apparent_power(power) * x for x in given) if given else typical_losses(power)
+        shares = self.plan.inverter_losses
+        losses = tuple(apparent_power(power) * x for x in shares) if shares else typical_losses(power)
         return InverterRating(losses, motor.nameplate)
 
     def _inverter_words(self) -> str:
@@ -245,9 +245,9 @@ class _Task:
         )
 
     def _other(
-        self, drive: Drive, motor: CatalogueMotor | None, own: LoadDuty
+        self, drive: Drive, motor: CatalogueMotor | None, study_duty: LoadDuty
     ) -> tuple[MotorEnergy | None, str]:
-        """The energy with the other motor beside the `own` duty, or the reason why there is none."""
+        """The energy with the other motor beside the `study_duty`, or the reason why there is none."""
         if motor is None:
             return None, "the motor has no nameplate"
         try:
@@ -263,7 +263,7 @@ class _Task:
             return None, f"the other motor could not be run: {error}"
         if duty.unsteady:
             return None, f"{other.designation} does not run steadily with {', '.join(duty.unsteady)}"
-        speeds = duty.mean(drive.motor_speed) / own.mean(drive.motor_speed)
+        speeds = duty.mean(drive.motor_speed) / study_duty.mean(drive.motor_speed)
         if abs(speeds - 1.0) > _SPEEDS:
             return None, (
                 f"with {other.designation} behind the same gear the crank turns at {speeds:.3g} times the speed, "
@@ -278,9 +278,9 @@ class _Task:
         return MotorEnergy(name, year, losses, duty.temperature, duty.is_too_hot, speed, price)
 
 
-def _price(given: float, motor: CatalogueMotor | None) -> float | None:
+def _price(price: float, motor: CatalogueMotor | None) -> float | None:
     """The price that the file gives, or else the catalogue; None where neither does."""
-    return float(given) or (motor.nameplate.price if motor else 0.0) or None
+    return float(price) or (motor.nameplate.price if motor else 0.0) or None
 
 
 def year_of(plan: UsagePlan, power: float, price: float | None) -> Year:
@@ -300,9 +300,9 @@ def year_of(plan: UsagePlan, power: float, price: float | None) -> Year:
     )
 
 
-def compared(own: MotorEnergy, other: MotorEnergy) -> MotorComparison:
+def compared(energy: MotorEnergy, other: MotorEnergy) -> MotorComparison:
     """The comparison of two motors with the same duty."""
-    better, worse = sorted((own, other), key=lambda each: float(each.year.energy))
+    better, worse = sorted((energy, other), key=lambda motor: float(motor.year.energy))
     saving = worse.year.energy - better.year.energy
     cost = _difference(worse.year.cost, better.year.cost)
     extra = _difference(better.price, worse.price)

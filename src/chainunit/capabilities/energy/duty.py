@@ -74,19 +74,19 @@ def duty_of(
     RunError
         where a run fails.
     """
-    whole = sum(each.share for each in loads.values())
-    shares = {name: float(each.share) / whole for name, each in loads.items()}
+    whole = sum(load.share for load in loads.values())
+    shares = {name: float(load.share) / whole for name, load in loads.items()}
     feed = rig.operation.feed
 
-    def at(temperature: float) -> LoadDuty:
+    def duty_at(temperature: float) -> LoadDuty:
         runs = {}
-        for name, each in loads.items():
+        for name, load in loads.items():
             progress(name)
-            own = scaled(feed, float(each.factor))
-            runs[name] = run_steadily(rig, warm(drive, temperature), own, inverter)
+            scaled_feed = scaled(feed, float(load.factor))
+            runs[name] = run_steadily(rig, warm(drive, temperature), scaled_feed, inverter)
         return LoadDuty(shares, runs, temperature)
 
-    duty = at(min(temperature, hottest))
+    duty = duty_at(min(temperature, hottest))
     for k in range(_PASSES):
         if duty.unsteady:
             return duty
@@ -100,5 +100,5 @@ def duty_of(
         settled = min(settled, hottest)
         if abs(settled - duty.temperature) <= _CLOSE or k == _PASSES - 1:
             break
-        duty = at(settled)
+        duty = duty_at(settled)
     return duty

@@ -64,10 +64,10 @@ EXEMPTIONS = (
 """The exemptions that a drive of this kind meets, in words."""
 
 
-def limit(of: str, power: float, poles: float) -> float | None:
-    """Least rated efficiency of the class `of` for a motor of that power [W]; None for a size or a number of poles
-    that the table has not. Between two sizes it is linear in the logarithm of the power."""
-    values, kW = _LIMITS.get((of, round(poles))), 1e-3 * power
+def limit(class_name: str, power: float, poles: float) -> float | None:
+    """Least rated efficiency of the class `class_name` for a motor of that power [W]; None for a size or a number of
+    poles that the table has not. Between two sizes it is linear in the logarithm of the power."""
+    values, kW = _LIMITS.get((class_name, round(poles))), 1e-3 * power
     if values is None or not _SIZES[0] <= kW * (1.0 + 1e-9) <= 1000.0 * (1.0 + 2e-9):
         return None
     return 0.01 * float(np.interp(math.log(kW), np.log(_SIZES), values))
@@ -88,10 +88,10 @@ def class_of(plate: Nameplate) -> str:
     if no_class(plate):
         return ""
     reached = "IE1 or less"
-    for each in CLASSES:
-        least = limit(each, plate.power, plate.poles)
+    for class_name in CLASSES:
+        least = limit(class_name, plate.power, plate.poles)
         if least is not None and plate.efficiency >= least - _ROUNDING:
-            reached = each
+            reached = class_name
     return reached
 
 
@@ -115,16 +115,16 @@ def required(plate: Nameplate) -> str:
 def falls_short(plate: Nameplate) -> bool:
     """Whether the class of a motor is known and below the one that EU 2019/1781 asks of it."""
     order = ("IE1 or less", *CLASSES)
-    own, asked = class_of(plate), required(plate)
-    return bool(own and asked) and order.index(own) < order.index(asked)
+    reached, asked = class_of(plate), required(plate)
+    return bool(reached and asked) and order.index(reached) < order.index(asked)
 
 
 def next_class(plate: Nameplate) -> tuple[str, float] | None:
     """The class above that of a motor, and its least efficiency; None for a motor of the highest class here, or
     without a class."""
-    own = class_of(plate)
-    if not own or own == CLASSES[-1]:
+    reached = class_of(plate)
+    if not reached or reached == CLASSES[-1]:
         return None
-    above = CLASSES[CLASSES.index(own) + 1] if own in CLASSES else CLASSES[0]
+    above = CLASSES[CLASSES.index(reached) + 1] if reached in CLASSES else CLASSES[0]
     least = limit(above, plate.power, plate.poles)
     return None if least is None else (above, least)

@@ -57,8 +57,8 @@ def _by_size(motor_power: float, column: int) -> float:
     sizes, values = (np.array([row[k] for row in _REFERENCE]) for k in (0, column))
     kW = 1e-3 * motor_power
     inside = min(max(kW, float(sizes[0])), float(sizes[-1]))
-    at = math.exp(float(np.interp(math.log(inside), np.log(sizes), np.log(values))))
-    return 1e3 * at * (kW / inside)
+    power = math.exp(float(np.interp(math.log(inside), np.log(sizes), np.log(values))))
+    return 1e3 * power * (kW / inside)
 
 
 def loss(losses: tuple[float, ...], frequency: Any, current: Any) -> Any:
@@ -87,8 +87,8 @@ def loss(losses: tuple[float, ...], frequency: Any, current: Any) -> Any:
     return (1.0 - x) * low + x * high
 
 
-def _cell(places: Any, at: Any) -> tuple[Any, Any]:
+def _cell(places: Any, place: Any) -> tuple[Any, Any]:
     """Index of the place below, and the share of the way to the next."""
-    at = np.clip(np.asarray(at, dtype=float), places[0], places[-1])
-    k = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
-    return k, (at - places[k]) / (places[k + 1] - places[k])
+    place = np.clip(np.asarray(place, dtype=float), places[0], places[-1])
+    k = np.clip(np.searchsorted(places, place, side="right") - 1, 0, len(places) - 2)
+    return k, (place - places[k]) / (places[k + 1] - places[k])

@@ -65,7 +65,7 @@ class MotorClassAnalysis(Analysis):
         if motor is None or study.drive.foreign is not None:
             return None
         plate = motor.nameplate
-        found = MotorClass(
+        motor_class = MotorClass(
             motor.designation,
             class_of(plate),
             required(plate),
@@ -73,16 +73,20 @@ class MotorClassAnalysis(Analysis):
             float(plate.efficiency),
             no_class(plate),
         )
-        is_asked = found.falls_short or (found.no_class and found.required)
-        return found if is_asked or study.config.plans["energy"] is not None else None
+        is_asked = motor_class.falls_short or (motor_class.no_class and motor_class.required)
+        return motor_class if is_asked or study.config.plans["energy"] is not None else None
 
 
-def words_of(found: MotorClass) -> str:
+def words_of(motor_class: MotorClass) -> str:
     """Class and demand, in a sentence."""
-    if found.no_class:
-        asked = f" EU 2019/1781 asks {found.required}: compare its nameplate." if found.required else ""
-        return f"The class of the motor by IEC 60034-30-1 is not checked: {found.no_class}.{asked}"
-    if not found.required:
-        return f"The motor is {found.efficiency_class}; EU 2019/1781 does not cover it."
-    verb = "asks" if not found.falls_short else "asks more,"
-    return f"The motor is {found.efficiency_class}; EU 2019/1781 {verb} {found.required}."
+    if motor_class.no_class:
+        asked = (
+            f" EU 2019/1781 asks {motor_class.required}: compare its nameplate."
+            if motor_class.required
+            else ""
+        )
+        return f"The class of the motor by IEC 60034-30-1 is not checked: {motor_class.no_class}.{asked}"
+    if not motor_class.required:
+        return f"The motor is {motor_class.efficiency_class}; EU 2019/1781 does not cover it."
+    verb = "asks" if not motor_class.falls_short else "asks more,"
+    return f"The motor is {motor_class.efficiency_class}; EU 2019/1781 {verb} {motor_class.required}."

@@ -29,25 +29,25 @@ def other_motor(motor: CatalogueMotor, designation: str, own_motors: Sequence[Pa
     """
     if designation:
         other = motor_of_catalogue(designation, own_motors)
-        frequency, own = other.nameplate.frequency, motor.nameplate.frequency
-        if frequency != own:
-            words = f"has {frequency:g} Hz, and the motor of the study {own:g} Hz; name a motor of {own:g} Hz"
-            raise InputError(f"usage.other = {shown(designation)}: {words}", "usage.other")
+        frequency, wanted = other.nameplate.frequency, motor.nameplate.frequency
+        if frequency != wanted:
+            reason = f"has {frequency:g} Hz, and the motor of the study {wanted:g} Hz; name a motor of {wanted:g} Hz"
+            raise InputError(f"usage.other = {shown(designation)}: {reason}", "usage.other")
         return other
     plate, above = motor.nameplate, next_class(motor.nameplate)
     if above is None:
         return None
     name, efficiency = above
     better = [
-        each
-        for each in catalogue(*own_motors)
-        if abs(each.nameplate.power / plate.power - 1.0) <= _SAME
-        and each.nameplate.poles == plate.poles
-        and each.nameplate.frequency == plate.frequency
-        and each.nameplate.efficiency >= efficiency
+        candidate
+        for candidate in catalogue(*own_motors)
+        if abs(candidate.nameplate.power / plate.power - 1.0) <= _SAME
+        and candidate.nameplate.poles == plate.poles
+        and candidate.nameplate.frequency == plate.frequency
+        and candidate.nameplate.efficiency >= efficiency
     ]
     if better:
-        return min(better, key=lambda each: float(each.nameplate.efficiency))
+        return min(better, key=lambda candidate: float(candidate.nameplate.efficiency))
     # all losses fall alike, the loss of the slip with them
     share = (1.0 / efficiency - 1.0) / (1.0 / plate.efficiency - 1.0)
     speed = plate.synchronous * (1.0 - share * plate.slip)

@@ -26,9 +26,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the energy."""
     findings = EnergyFindings.of_study(study)
     yield b.Text(_lead(s, findings))
-    found = MotorClass.found_in(study)
-    if found is not None:
-        yield b.Text(words_of(found))
+    motor_class = MotorClass.found_in(study)
+    if motor_class is not None:
+        yield b.Text(words_of(motor_class))
     titles = _titles(study)
     yield _places(s, findings, titles)
     yield _figure(findings, titles)
@@ -78,17 +78,17 @@ def _year(s: b.Source, findings: EnergyFindings) -> b.Table:
     motors = list(filter(None, (findings.own, findings.other)))
     shown = list(filter(None, (x.own, x.other)))
     rows = [
-        b.TableRow((v.template, *(number(getattr(each.year, v.name)) for each in shown)))
+        b.TableRow((v.template, *(number(getattr(motor.year, v.name)) for motor in shown)))
         for v in Layout(Year).variables
         if any(getattr(motor.year, v.name) is not None for motor in motors)
     ]
-    for words, sizes in (
-        ("speed of the motor, mean", [number(each.speed) for each in shown]),
-        ("price of the motor", [number(each.price) for each in shown]),
+    for heading, sizes in (
+        ("speed of the motor, mean", [number(motor.speed) for motor in shown]),
+        ("price of the motor", [number(motor.price) for motor in shown]),
     ):
-        rows += [b.TableRow((words, *sizes))] if any(size.value is not None for size in sizes) else []
+        rows += [b.TableRow((heading, *sizes))] if any(size.value is not None for size in sizes) else []
     title = s.line("A year, and a life of {=usage.years} years")
-    return b.Table(tuple(rows), b.heads("", *(each.motor for each in shown)), title=title)
+    return b.Table(tuple(rows), b.heads("", *(motor.motor for motor in shown)), title=title)
 
 
 def verdict_words(comparison: MotorComparison) -> str:

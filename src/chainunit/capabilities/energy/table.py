@@ -132,7 +132,7 @@ def read_usage(table: Usage, form: Any) -> UsagePlan:
         usual="load ",
     )
     faults.refuse()
-    whole = sum(each.share for each in loads.values())
+    whole = sum(load.share for load in loads.values())
     if loads and not math.isclose(whole, 1.0, abs_tol=_WHOLE):
         raise InputError(
             f"usage.load: the shares are {100 * whole:.4g} % together; must be 100 % (an entry with factor = 0 is "

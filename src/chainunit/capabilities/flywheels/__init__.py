@@ -49,8 +49,8 @@ class FlywheelCapability(Capability):
 
     def rules(self) -> Iterable[Rule]:
         """Sizing has flywheels of its own."""
-        words = "sizing finds its own; leave out one of the two"
-        yield Rule("flywheel", motor_is_chosen(), words, has_entries("flywheel"))
+        reason = "sizing finds its own; leave out one of the two"
+        yield Rule("flywheel", motor_is_chosen(), reason, has_entries("flywheel"))
 
     def plan(self, reading: FileReading) -> FlywheelPlan | None:
         """The plan of the table."""

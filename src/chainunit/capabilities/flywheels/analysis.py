@@ -190,7 +190,7 @@ def _wheel(
     drive, motor_ripple = study.drive, None
     if drive.line and turning:
         motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
-    own = {
+    numbers = {
         "flywheel": flywheel,
         "inertia": findings.bare + flywheel,
         "start_time": start.start_time,
@@ -200,7 +200,7 @@ def _wheel(
         "residual": residual,
     }
     names = Layout(FlywheelAnswers).names
-    values = {name: own.get(name, getattr(steady, name, None) if turning else None) for name in names}
+    values = {name: numbers.get(name, getattr(steady, name, None) if turning else None) for name in names}
     answers = FlywheelAnswers(**values)
     checks = given_motor(
         drive,
@@ -421,17 +421,17 @@ def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
 def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
     """Warn where the flywheel of the study, or every flywheel, does not keep the permitted fluctuation."""
     limit = number(findings.permitted_fluctuation, "1", "percent")
-    own = next((wheel for wheel in findings.wheels if wheel.flywheel == findings.own), None)
+    study_wheel = next((wheel for wheel in findings.wheels if wheel.flywheel == findings.own), None)
     if (
-        own is not None
-        and own.answers.speed_ripple is not None
-        and own.answers.speed_ripple > findings.permitted_fluctuation
+        study_wheel is not None
+        and study_wheel.answers.speed_ripple is not None
+        and study_wheel.answers.speed_ripple > findings.permitted_fluctuation
     ):
         study.say(
             _FLUCTUATION,
             STEADY,
-            speed_ripple=own.answers.speed_ripple,
-            flywheel=own.flywheel,
+            speed_ripple=study_wheel.answers.speed_ripple,
+            flywheel=study_wheel.flywheel,
             permitted=findings.permitted_fluctuation,
         )
     # flywheels without a run are not judged

@@ -60,13 +60,13 @@ def _table(s: b.Source, findings: FlywheelFindings) -> b.Table:
     ]
     heads = (b.Column(v.described(s.driver), _HEADS[v.name]) for v in columns)
 
-    def head(words: str, path: str) -> Line:
-        return line(s.number(f"{path}.flywheel"), f" ({words})" if words else "")
+    def head(remark: str, path: str) -> Line:
+        return line(s.number(f"{path}.flywheel"), f" ({remark})" if remark else "")
 
     return b.Table(
         tuple(
-            b.TableRow((head(words, path), *(s.number(f"{path}.{v.name}", none="-") for v in columns)))
-            for words, _, path in rows
+            b.TableRow((head(remark, path), *(s.number(f"{path}.{v.name}", none="-") for v in columns)))
+            for remark, _, path in rows
         ),
         (b.Column("flywheel"), *heads),
         title=s.line("Flywheels on the motor's shaft; permitted ripple of the speed {=flywheels.permitted}"),

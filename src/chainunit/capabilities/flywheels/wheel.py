@@ -65,8 +65,8 @@ class Wheel:
     @property
     def is_settled(self) -> bool:
         """Whether the turns of its run close."""
-        own = self.answers
-        return closes(own.cycle_gap or 0.0, own.speed_drift or 0.0, own.energy_gap or 0.0)
+        answers = self.answers
+        return closes(answers.cycle_gap or 0.0, answers.speed_drift or 0.0, answers.energy_gap or 0.0)
 
     @property
     def excesses(self) -> list[str]:

@@ -15,7 +15,7 @@ _PARTS = ("value", "limit", "utilisation")
 def candidates_csv(candidates: Sequence[Mapping[str, Any]]) -> str:
     """The candidates in the order of their rank. Heads name the unit in brackets; ``peak_torque.utilisation`` is the
     share of its limit that a candidate takes by the check ``peak_torque``. A value that is not known is empty."""
-    rows = [_cells(rank, each) for rank, each in enumerate(candidates, 1)]
+    rows = [_cells(rank, candidate) for rank, candidate in enumerate(candidates, 1)]
     heads = dict.fromkeys(head for row in rows for head in row)
     return as_rows(heads, ([row.get(head, "") for head in heads] for row in rows))
 
@@ -26,12 +26,13 @@ def _cells(rank: int, candidate: Mapping[str, Any]) -> dict[str, str]:
         "ratio", candidate.get("ratio")
     )
     cells |= {name: text_of(candidate, name) for name in ("gear", "series", "verdict", "criterion", "reason")}
-    for each in candidate.get("parts") or ():
-        part = text_of(as_mapping(each), "part").replace(" ", "_")
+    for ordered_part in candidate.get("parts") or ():
+        part = text_of(as_mapping(ordered_part), "part").replace(" ", "_")
         cells |= {
-            f"{part}.{name}": text_of(as_mapping(each), name) for name in ("designation", "order_number")
+            f"{part}.{name}": text_of(as_mapping(ordered_part), name)
+            for name in ("designation", "order_number")
         }
-        cells |= _entry(f"{part}.price", as_mapping(each).get("price"))
+        cells |= _entry(f"{part}.price", as_mapping(ordered_part).get("price"))
     cells |= _entry("total_price", candidate.get("total_price")) if "total_price" in candidate else {}
     for name, check in as_mapping(candidate.get("checks")).items():
         for part in _PARTS:

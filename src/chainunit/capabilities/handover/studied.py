@@ -47,8 +47,8 @@ class StudiedDrive:
 
     def text(self, *path: str) -> str:
         """The text of the result at a path; empty where it has none."""
-        found = _at(self.result.data, *path)
-        return printable(found, 2000) if isinstance(found, str) else ""
+        node = _at(self.result.data, *path)
+        return printable(node, 2000) if isinstance(node, str) else ""
 
     @cached_property
     def written(self) -> datetime:
@@ -67,14 +67,14 @@ class StudiedDrive:
     @property
     def candidates(self) -> list[Mapping[str, Any]]:
         """The candidates of sizing by their rank; none without sizing."""
-        found = _at(self.result.data, "sizing", "candidates")
-        return [as_mapping(each) for each in found] if isinstance(found, list) else []
+        rows = _at(self.result.data, "sizing", "candidates")
+        return [as_mapping(row) for row in rows] if isinstance(rows, list) else []
 
     @property
     def checks(self) -> list[Mapping[str, Any]]:
         """The checks by clause; none without."""
-        found = _at(self.result.data, "checks", "rows")
-        return [as_mapping(each) for each in found] if isinstance(found, list) else []
+        rows = _at(self.result.data, "checks", "rows")
+        return [as_mapping(row) for row in rows] if isinstance(rows, list) else []
 
     @property
     def best(self) -> Mapping[str, Any]:
@@ -87,14 +87,14 @@ class StudiedDrive:
         """The row of a catalogue that is a part of the drive of sizing, by its kind: "motor", "gear", "torque
         limiter"; empty where the part is of no catalogue of the user."""
         parts = _at(self.result.data, "sizing", "parts", "parts")
-        found = map(as_mapping, parts if isinstance(parts, list) else ())
-        return next((each for each in found if each.get("part") == kind), {})
+        rows = map(as_mapping, parts if isinstance(parts, list) else ())
+        return next((row for row in rows if row.get("part") == kind), {})
 
     @property
     def flexible_coupling(self) -> Mapping[str, Any]:
         """The row of a catalogue that is the flexible coupling; empty where no row carries the torque."""
-        found = _at(self.result.data, "checks", "flexible_coupling", "candidates")
-        first = as_mapping(found[0]) if isinstance(found, list) and found else {}
+        rows = _at(self.result.data, "checks", "flexible_coupling", "candidates")
+        first = as_mapping(rows[0]) if isinstance(rows, list) and rows else {}
         return first if first.get("verdict") == "chosen" else {}
 
     def check(self, name: str, part: str) -> float | None:
@@ -161,13 +161,13 @@ def read_study(folder: Path) -> StudiedDrive:
             f"{folder / SERIES}: has no {', '.join(missing)}: its motor is an FMU that does not give the motion of "
             "its shaft by these names"
         )
-    at = float(start.attrs[STEADY_BEGIN]) + plain[0]
-    torque = _torque(start, at, plain[2], folder)
+    instants = float(start.attrs[STEADY_BEGIN]) + plain[0]
+    torque = _torque(start, instants, plain[2], folder)
     power = start.get("motor.supply_power")
     time = start["time"].values
     return StudiedDrive(
         result,
-        _steady(start, at, plain),
+        _steady(start, instants, plain),
         ShaftCycle(
             time - time[0],
             start["motor.phi"].values - float(start["motor.phi"][0]),
@@ -175,29 +175,29 @@ def read_study(folder: Path) -> StudiedDrive:
             start["motor.a"].values,
             torque,
         ),
-        None if power is None else np.interp(at, time, power.values),
+        None if power is None else np.interp(instants, time, power.values),
         files,
     )
 
 
-def _steady(start: xr.Dataset, at: np.ndarray, plain: np.ndarray) -> ShaftCycle:
+def _steady(start: xr.Dataset, instants: np.ndarray, plain: np.ndarray) -> ShaftCycle:
     """The steady turns: speed, torque and inertia as load_cycle.csv has them, angle and acceleration of the same
     rows."""
     time, speed, torque, inertia = plain
     angle, acceleration = (
-        np.interp(at, start["time"].values, start[f"motor.{x}"].values) for x in ("phi", "a")
+        np.interp(instants, start["time"].values, start[f"motor.{x}"].values) for x in ("phi", "a")
     )
     return ShaftCycle(time, angle - angle[0], speed, acceleration, torque, inertia)
 
 
-def _torque(start: xr.Dataset, at: np.ndarray, wanted: np.ndarray, folder: Path) -> np.ndarray:
+def _torque(start: xr.Dataset, instants: np.ndarray, wanted: np.ndarray, folder: Path) -> np.ndarray:
     """The torque of the motor's shaft in the whole run [N m], shape (time,): the variable that load_cycle.csv has in
     the steady turns. Of which part of the drive it is depends on the parts between motor and machine."""
     names = [
         str(name) for name in start.data_vars if str(name).count(".") == 1 and str(name).endswith(".tau")
     ]
     gaps = {
-        name: float(np.max(np.abs(np.interp(at, start["time"].values, start[name].values) - wanted)))
+        name: float(np.max(np.abs(np.interp(instants, start["time"].values, start[name].values) - wanted)))
         for name in names
     }
     best = min(gaps, key=lambda name: gaps[name], default="")

@@ -42,7 +42,9 @@ class IdentificationCapability(Capability):
                     "maxItems": MOST_SPEEDS,
                     "items": {"type": "array", "items": _VALUE, "minItems": 3, "maxItems": 3},
                 },
-                "sensor.column": {"enum": [name for name, each in MEASURANDS.items() if each.analog]},
+                "sensor.column": {
+                    "enum": [name for name, measurand in MEASURANDS.items() if measurand.analog]
+                },
             },
             single_keys=("parameter", "run", "sensor"),
         ),

@@ -152,7 +152,7 @@ class IdentifiedMachine:
         return run.off is None and not any(hasattr(x, "changes") for x in run.values.values())
 
     def _run(self, name: str) -> RecordedRun:
-        return next(each for each in self.problem.runs if each.name == name)
+        return next(run for run in self.problem.runs if run.name == name)
 
     def value_of_sum(self, combination: Combination) -> tuple[float, float]:
         """The value of a sum of sought numbers, and its standard deviation."""
@@ -218,7 +218,7 @@ def identify(
         seed=plan.seed,
     )
     progress("checks", 0.95, 1.0)
-    after = information(problem, best.z, workers, propose=False, at=best)
+    after = information(problem, best.z, workers, propose=False, equations=best)
     around = posterior(problem, best, workers, plan.seed)
     numbers, residuals = known_number_tests(problem, best, workers), tuple(residual_tests(best))
     machine = IdentifiedMachine(config, plan, problem, before, best, around, after, residuals, numbers)
@@ -291,7 +291,7 @@ def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
 
 def _same_rows(first: Recording, second: Recording) -> bool:
     """Whether two recordings have rows of one file in common, or the same values in all signals that both have."""
-    ends = [(float(each.time[0]), float(each.time[-1])) for each in (first, second)]
+    ends = [(float(recording.time[0]), float(recording.time[-1])) for recording in (first, second)]
     if first.source == second.source and max(begin for begin, _ in ends) < min(end for _, end in ends):
         return True
     common = [name for name in SIGNALS if name in first.columns and name in second.columns]
@@ -302,7 +302,9 @@ def _problem(
     loads: Any, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
 ) -> Problem:
     sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
-    measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
+    measured = dict.fromkeys(
+        name for recording in recordings.values() for name in recording.columns if name != "mark"
+    )
     plant = plant_for(drive, measured, [u.name for u in sought])
     of_shaft = is_of_shaft(measured)
     free = {u.name for u in sought}
@@ -341,10 +343,12 @@ def _sensors(
     for name in measured:
         if not MEASURANDS[name].analog:
             continue
-        own = plan.sensor(name)
-        size = max(rms(each.columns[name]) for each in recordings.values() if name in each.columns)
-        offset = usual_offset(name, size) if own.offset is None else own.offset
-        sensors[name] = Sensor(own.noise, own.resolution, own.gain, offset)
+        knowledge = plan.sensor(name)
+        size = max(
+            rms(recording.columns[name]) for recording in recordings.values() if name in recording.columns
+        )
+        offset = usual_offset(name, size) if knowledge.offset is None else knowledge.offset
+        sensors[name] = Sensor(knowledge.noise, knowledge.resolution, knowledge.gain, offset)
     return sensors
 
 
@@ -358,7 +362,9 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
-        of_current = next(each for each in machine.best.comparisons if each.column == "motor.i")
+        of_current = next(
+            comparison for comparison in machine.best.comparisons if comparison.column == "motor.i"
+        )
         column = machine.columns_over_time(of_current)
         speed = next(run.crank_speed for run in runs if run.name == of_current.run)
         turn = column.simulated[column.time > column.time[-1] - 2.0 * np.pi / speed]
@@ -370,7 +376,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     for run in runs:
         yield run.recording.sentence
         for name in sorted(
-            each for each in columns - run.recording.columns.keys() if MEASURANDS[each].analog
+            signal for signal in columns - run.recording.columns.keys() if MEASURANDS[signal].analog
         ):
             yield f"{run.recording.source} has no {name}, which another recording has: it tells less without it"
         if "mark" not in run.recording.columns:

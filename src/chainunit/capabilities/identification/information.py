@@ -74,10 +74,10 @@ class Combination:
 
     def __str__(self) -> str:
         first, *others = self.terms
-        words = "".join(
+        rest = "".join(
             f" {'+' if c > 0.0 else '-'} {_factor(abs(c))}{short_name(name)}" for name, c in others
         )
-        return short_name(first[0]) + words
+        return short_name(first[0]) + rest
 
 
 @result
@@ -110,16 +110,16 @@ def information(
     z: Any = None,
     workers: int = 2,
     propose: bool = True,
-    at: NormalEquations | None = None,
+    equations: NormalEquations | None = None,
 ) -> Information:
     """The information of the runs of a problem at the values `z` of the unknowns, by default the start values.
 
     Of the recordings the columns, the times of the rows and the sizes of the noise count. With `propose` further runs
-    are ranked, each of which is simulated. `at` are the normal equations there, where they are known, with the
+    are ranked, each of which is simulated. `equations` are the normal equations there, where they are known, with the
     measured sizes of the noise.
     """
     z = problem.initial_point(workers) if z is None else z
-    fisher = (at or normal_equations(problem, z, workers)).fisher
+    fisher = (equations or normal_equations(problem, z, workers)).fisher
     determinations, sums = _determinations(problem, fisher), _combinations(problem, fisher)
     proposals = _proposals(problem, z, fisher, determinations, workers) if propose else ()
     return Information(determinations, sums, _null_space(problem, fisher), tuple(proposals))
@@ -171,11 +171,11 @@ def _factors(alone: Any, both: Any, first: int, others: Sequence[int]) -> tuple[
     the runs `alone`, and its deviation by `both` runs and priors, each a covariance. They have so few digits that the
     sum as it is written is as good as that with all digits."""
     best = -np.linalg.solve(alone[np.ix_(others, others)], alone[others, first])
-    own = both[np.ix_([first, *others], [first, *others])]
+    covariance = both[np.ix_([first, *others], [first, *others])]
 
     def deviation(factors: Sequence[float]) -> float:
         weights = np.array([1.0, *factors])
-        return math.sqrt(float(weights @ own @ weights))
+        return math.sqrt(float(weights @ covariance @ weights))
 
     for digits in range(2, 8):
         factors = [float(f"{x:.{digits}g}") for x in best]
@@ -189,8 +189,10 @@ def _null_space(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
     count, spread = len(problem.sought), problem.prior_deviations
     matrix = fisher + np.diag(np.where(np.arange(len(spread)) < count, 0.0, 1.0 / spread**2))
     nuisances = matrix[count:, count:]
-    own = matrix[:count, :count] - matrix[:count, count:] @ np.linalg.solve(nuisances, matrix[count:, :count])
-    sizes, directions = np.linalg.eigh(own * np.outer(spread[:count], spread[:count]))
+    reduced = matrix[:count, :count] - matrix[:count, count:] @ np.linalg.solve(
+        nuisances, matrix[count:, :count]
+    )
+    sizes, directions = np.linalg.eigh(reduced * np.outer(spread[:count], spread[:count]))
     basis = directions[:, sizes < NO_INFORMATION].T
     rows = []
     for k in range(len(basis)):
@@ -224,26 +226,28 @@ def _proposals(
 ) -> Iterator[Proposal]:
     """Further runs, the best first."""
     ranked = []
-    for words, run in _candidates(problem):
+    for title, run in _candidates(problem):
         more = Problem(problem.plant, (*problem.runs, run), problem.sought, problem.sensors)
-        at = more.start_values
+        point = more.start_values
         for name, place in problem.place.items():
-            at[more.place[name]] = z[place]
+            point[more.place[name]] = z[place]
         sparse, scales = _sparse(problem, run)
         single = Problem(
-            problem.plant, (_simulated(more, sparse, at, workers),), problem.sought, problem.sensors
+            problem.plant, (_simulated(more, sparse, point, workers),), problem.sought, problem.sensors
         )
-        own = normal_equations(
-            single, np.array([at[more.place[name]] for name in single.place]), workers, scales
+        single_fisher = normal_equations(
+            single, np.array([point[more.place[name]] for name in single.place]), workers, scales
         ).fisher
-        total = np.zeros((len(at), len(at)))
-        for of_runs, matrix in ((problem, fisher), (single, own)):
+        total = np.zeros((len(point), len(point)))
+        for of_runs, matrix in ((problem, fisher), (single, single_fisher)):
             places = [more.place[name] for name in of_runs.place]
             total[np.ix_(places, places)] += matrix
         then = _determinations(more, total)
         factor = np.exp(np.mean([math.log(a.by_both / b.by_both) for a, b in zip(now, then, strict=True)]))
-        ranked.append(Proposal(words, float(factor), sum(each.is_determined for each in then)))
-    yield from sorted(ranked, key=lambda each: -each.factor)
+        ranked.append(
+            Proposal(title, float(factor), sum(determination.is_determined for determination in then))
+        )
+    yield from sorted(ranked, key=lambda proposal: -proposal.factor)
 
 
 def _sparse(problem: Problem, run: RecordedRun) -> tuple[RecordedRun, dict[tuple[str, str], float]]:
@@ -264,39 +268,42 @@ def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:
     feed = [u.name for u in problem.sought if u.name.endswith(("material_mass", "processing_force"))]
     first = next((run for run in problem.runs if not set(feed) & set(run.values)), problem.runs[0])
     steady = {name: getattr(x, "start", x) for name, x in first.values.items()}
-    own = replace(first, name=FURTHER, added={}, values=steady, off=None)
+    further = replace(first, name=FURTHER, added={}, values=steady, off=None)
     if feed and not any(set(feed) <= set(run.values) for run in problem.runs):
-        yield "empty", replace(own, values={**steady, **dict.fromkeys(feed, 0.0)})
+        yield "empty", replace(further, values={**steady, **dict.fromkeys(feed, 0.0)})
     if REFERENCE in steady:
-        yield from _other_speeds(problem, own)
+        yield from _other_speeds(problem, further)
     begin, end = float(first.recording.time[0]), float(first.recording.time[-1])
     if not any(run.off is not None for run in problem.runs):
-        yield "with the motor switched off after a quarter", replace(own, off=begin + 0.25 * (end - begin))
+        yield (
+            "with the motor switched off after a quarter",
+            replace(further, off=begin + 0.25 * (end - begin)),
+        )
     for u in problem.sought:
         if u.name.endswith(("web_mass", "wall_mass")) and not any(
             u.name in run.added for run in problem.runs
         ):
-            yield f"with {ADDED:g} kg added to {short_name(u.name)}", replace(own, added={u.name: ADDED})
+            yield f"with {ADDED:g} kg added to {short_name(u.name)}", replace(further, added={u.name: ADDED})
 
 
-def _other_speeds(problem: Problem, own: RecordedRun) -> Iterator[tuple[str, RecordedRun]]:
+def _other_speeds(problem: Problem, further: RecordedRun) -> Iterator[tuple[str, RecordedRun]]:
     """The run at other speeds, and at a speed that changes."""
-    w, references = float(own.values[REFERENCE]), [run.values.get(REFERENCE, 0.0) for run in problem.runs]
+    w, references = float(further.values[REFERENCE]), [run.values.get(REFERENCE, 0.0) for run in problem.runs]
     for share in OTHER_SPEEDS:
         if not any(abs(getattr(x, "start", x) - share * w) < 0.05 * w for x in references):
-            values = {**own.values, REFERENCE: share * w}
+            values = {**further.values, REFERENCE: share * w}
             yield (
                 f"at {share:g} times the speed",
-                replace(own, values=values, crank_speed=share * own.crank_speed),
+                replace(further, values=values, crank_speed=share * further.crank_speed),
             )
     if not any(hasattr(x, "changes") for x in references):
-        time = own.recording.time
+        time = further.recording.time
         begins = np.arange(float(time[0]), float(time[-1]), SHAKING)[:MOST_CHANGES]
         changes = tuple((float(t), 0.5 * SHAKING, w * SHAKEN[k % 2]) for k, t in enumerate(begins))
-        words = (
+        title = (
             f"at a speed that changes every {SHAKING:g} s between {SHAKEN[0]:g} and {SHAKEN[1]:g} times it"
         )
-        yield words, replace(own, values={**own.values, REFERENCE: Profile(w, changes)})
+        yield title, replace(further, values={**further.values, REFERENCE: Profile(w, changes)})
 
 
 def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> RecordedRun:

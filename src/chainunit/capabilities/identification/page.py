@@ -81,21 +81,25 @@ TASK: Task[Config, IdentifiedMachine] = Task(
 
 def _opening(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
     if machine.is_described:
-        words = s.line("These recordings determine {=told} of {=sought} numbers.")
+        determined = s.line("These recordings determine {=told} of {=sought} numbers.")
         yield b.Judgement(
-            "good", line("The model describes the recordings: their residuals are noise. ", words)
+            "good", line("The model describes the recordings: their residuals are noise. ", determined)
         )
     else:
         sentence = "The model does not describe the recordings. No number is determined, and"
         yield b.Judgement("bad", f"{sentence} {FILE} is not written.")
     for sentence in sentences(machine):
         yield b.Judgement("warning", f"{sentence}.")
-    for each in s.lines("remarks"):
-        yield b.Judgement("remark", line(each, "."))
+    for remark in s.lines("remarks"):
+        yield b.Judgement("remark", line(remark, "."))
 
 
 def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
-    rows = [(i, each.describes, suspect) for i, each in enumerate(x.suspects, 1) for suspect in each.suspects]
+    rows = [
+        (i, suspected.describes, suspect)
+        for i, suspected in enumerate(x.suspects, 1)
+        for suspect in suspected.suspects
+    ]
     yield from table(
         rows,
         ("set", lambda row: str(row[0])),
@@ -112,7 +116,7 @@ def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
     if rows:
         yield b.Text(
             "Measure these numbers, or seek them: a set with the values of the table explains the recordings."
-            if any(each.describes for each in x.suspects)
+            if any(suspected.describes for suspected in x.suspects)
             else "No set explains the recordings; the nearest one stands first.",
             "note",
         )
@@ -157,34 +161,34 @@ def _numbers(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
 
 
 def _limits(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
-    for each in s.lines("blind"):
-        yield b.Judgement("partly", line("No trace in any column: ", each, "."))
+    for direction in s.lines("blind"):
+        yield b.Judgement("partly", line("No trace in any column: ", direction, "."))
     yield from table(
         x.combinations,
-        ("sum", lambda each: each.text),
-        ("value", lambda each: number(each.value, 4)),
-        ("standard deviation", lambda each: number(each.deviation, 2)),
+        ("sum", lambda combination: combination.text),
+        ("value", lambda combination: number(combination.value, 4)),
+        ("standard deviation", lambda combination: number(combination.deviation, 2)),
         title="Sums that are determined, of numbers that are not",
     )
     before, is_whole = number(x.told_at_start), number(x.told).value == number(x.sought).value
-    words = "Further runs, the best first; without one {=told_at_start} numbers can be determined"
+    title = "Further runs, the best first; without one {=told_at_start} numbers can be determined"
     yield from table(
         x.proposals,
-        ("further run", lambda each: each.words),
-        ("deviations fall by the factor", lambda each: number(each.factor, 3)),
-        ("numbers determined", lambda each: number(each.determined, as_given=True)),
+        ("further run", lambda proposal: proposal.words),
+        ("deviations fall by the factor", lambda proposal: number(proposal.factor, 3)),
+        ("numbers determined", lambda proposal: number(proposal.determined, as_given=True)),
         title="Further runs that would make the numbers sharper, the best first"
         if is_whole
-        else s.line(words),
+        else s.line(title),
     )
-    more = (number(each.determined).value for each in x.proposals)
+    more = (number(proposal.determined).value for proposal in x.proposals)
     if x.proposals and not is_whole and all((size or 0) <= (before.value or 0) for size in more):
         yield b.Text("None of these runs determines one more number: weigh a part, or know a gain.", "note")
 
 
 def _residuals(s: b.Source) -> Iterator[b.Block]:
     rows = []
-    for k, each in enumerate(s.result["residuals"]):
+    for k, residual in enumerate(s.result["residuals"]):
         path = f"residuals.{k}"
         orders = line(
             s.number(f"{path}.orders.0.order", as_given=True),
@@ -195,9 +199,9 @@ def _residuals(s: b.Source) -> Iterator[b.Block]:
         rows.append(
             b.TableRow(
                 (
-                    line(Name(each["run"]), " ", Name(each["column"])),
+                    line(Name(residual["run"]), " ", Name(residual["column"])),
                     s.number(f"{path}.noise", digits=3),
-                    s.number(f"{path}.statistic", digits=3, over=not each["is_noise"]),
+                    s.number(f"{path}.statistic", digits=3, over=not residual["is_noise"]),
                     s.number(f"{path}.limit", digits=3),
                     orders,
                 )

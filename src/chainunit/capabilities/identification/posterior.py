@@ -96,8 +96,8 @@ def _active_bounds(problem: Problem, best: NormalEquations) -> dict[int, float]:
 
     count, (low, high), pull = len(problem.sought), problem.bounds, _score(problem, best)
     near = 1e-6 * problem.prior_deviations
-    at = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))
-    at_bounds = [int(k) for k in np.flatnonzero(at[:count])]
+    held = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))
+    at_bounds = [int(k) for k in np.flatnonzero(held[:count])]
     if not at_bounds:
         return {}
     # what the sum of squares would fall by without these bounds; one of them alone may press for another one's error
@@ -110,8 +110,8 @@ def _active_bounds(problem: Problem, best: NormalEquations) -> dict[int, float]:
             continue  # a number that is hardly determined comes to its bound by chance, and along a bend
         # the others stay at their bounds, as they did in the fit
         free = [j for j in range(len(best.z)) if j == k or j not in at_bounds]
-        own = inverse(best.matrix[np.ix_(free, free)])[free.index(k), free.index(k)]
-        if abs(pull[k]) * math.sqrt(own) > BOUND_DEVIATIONS:
+        variance = inverse(best.matrix[np.ix_(free, free)])[free.index(k), free.index(k)]
+        if abs(pull[k]) * math.sqrt(variance) > BOUND_DEVIATIONS:
             active[k] = float(pull[k])
     return active
 
@@ -143,8 +143,8 @@ class _CurvedDensity:
         stiff = np.zeros(size)
         stiff[self._fixed] = (_STIFF / spread[self._fixed]) ** 2
         covariance = inverse(best.matrix + np.diag(stiff))
-        own = covariance[:count, :count] / np.outer(spread[:count], spread[:count])
-        sizes, directions = np.linalg.eigh(own)
+        relative = covariance[:count, :count] / np.outer(spread[:count], spread[:count])
+        sizes, directions = np.linalg.eigh(relative)
         wide = np.flatnonzero(np.sqrt(sizes) > WIDE)[-MOST_WIDE:]
         # along a direction the nuisances follow
         follow = covariance[:, :count] @ np.linalg.inv(covariance[:count, :count])
@@ -160,13 +160,13 @@ class _CurvedDensity:
         of active bounds have a further, `stiff` information."""
         problem = self._problem
         even = np.array([u.is_even for u in problem.unknowns])
-        known = np.where(even, 0.0, 1.0 / problem.prior_deviations**2) + stiff
+        priors = np.where(even, 0.0, 1.0 / problem.prior_deviations**2) + stiff
         wide, pairs = self._across.shape[1], len(self._pairs)
         basis = np.hstack([self._across, self._along])
         linear = 1 + np.r_[0:wide, wide + pairs : wide + pairs + self._along.shape[1]]
         matrix = np.zeros((1 + wide + pairs + self._along.shape[1],) * 2)
         matrix += self._squares(best, workers, linear)
-        matrix[np.ix_(linear, linear)] += basis.T @ (known[:, None] * basis)
+        matrix[np.ix_(linear, linear)] += basis.T @ (priors[:, None] * basis)
         # the gradient is that of all rows; without the pull of a prior where there are bounds alone
         matrix[0, linear] = matrix[linear, 0] = -basis.T @ np.where(stiff > 0.0, 0.0, _score(problem, best))
         places = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
@@ -174,9 +174,9 @@ class _CurvedDensity:
         mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
         self._form = matrix[places[0], places[0]] + matrix[places[0], places[1]] @ mean
         # of `b`, only the share in the sought numbers is sampled
-        own = self._along[: len(problem.sought)]
-        self._mean = own @ mean
-        root: Any = np.linalg.qr((own @ np.linalg.cholesky(inverse(inner))).T, mode="r")
+        along = self._along[: len(problem.sought)]
+        self._mean = along @ mean
+        root: Any = np.linalg.qr((along @ np.linalg.cholesky(inverse(inner))).T, mode="r")
         self._root = root.T
 
     def _squares(self, best: NormalEquations, workers: int, linear: Any) -> Any:
@@ -194,12 +194,12 @@ class _CurvedDensity:
             for n, (here, there) in enumerate(zip(base, moved, strict=True)):
                 seconds[n, k] = (there.slopes - here.slopes) @ self._across[list(here.places)] / size
         total = np.zeros((1 + wide + len(self._pairs) + self._along.shape[1],) * 2)
-        for here, own, full in zip(base, seconds, best.comparisons, strict=True):
+        for here, second, full in zip(base, seconds, best.comparisons, strict=True):
             table = np.zeros((len(here.slopes), len(total)))
             table[:, linear] = here.slopes @ basis[list(here.places)]
             for n, (i, j) in enumerate(self._pairs):
                 # half of the second derivative; of a mixed one, the mean of both
-                table[:, 1 + wide + n] = 0.5 * (own[i][:, j] + (own[j][:, i] if i != j else 0.0))
+                table[:, 1 + wide + n] = 0.5 * (second[i][:, j] + (second[j][:, i] if i != j else 0.0))
             # in the thinned columns, the sizes of the noise are others by a trifle
             table *= best.weights[here.run, here.column] * here.size / full.size
             edges = np.linspace(0, len(full.residuals), len(table) + 1).round().astype(int)

@@ -21,7 +21,7 @@ from .table import RUNS, SENSORS, SOUGHT, IdentifyTable, RunTable
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 _FIXED = {"mark": "stands for the mark of a turn; give it another"}
 """Names that no run may have, each with the reason."""
-_ANALOG = [name for name, each in MEASURANDS.items() if each.analog]
+_ANALOG = [name for name, measurand in MEASURANDS.items() if measurand.analog]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,30 +88,30 @@ def read_identification(
     InputError
         with a line for each fault: the key, its value and the allowed range.
     """
-    known = {
+    numbers = {
         v.name: (v, value) for instance, name in declared for v, value in named_values(instance, f"{name}.")
     }
     faults = Faults()
 
     def read_run(entry: Entry, name: str) -> PlannedRun:
-        run = _run(entry, name, crank_speed, known, source)
+        run = _run(entry, name, crank_speed, numbers, source)
         for other in sorted(run.added.keys() - sought.keys()) if not faults.errors else ():
             entry.fault(f"added.{other}", "is not sought; add [[identify.parameter]] with this name")
         return run
 
     sought = SOUGHT.read(
-        form.parameter, faults, lambda entry, name: _sought(entry, name, *known[name]), known, fixed
+        form.parameter, faults, lambda entry, name: _sought(entry, name, *numbers[name]), numbers, fixed
     )
-    for name, words in (("parameter", "a number that is sought"), ("run", "a recording")):
+    for name, meaning in (("parameter", "a number that is sought"), ("run", "a recording")):
         if not getattr(form, name):
             key = f"identify.{name}"
-            faults.add([InputError(f"{key}: is missing; add [[{key}]] with {words}", key)])
+            faults.add([InputError(f"{key}: is missing; add [[{key}]] with {meaning}", key)])
     runs = RUNS.read(form.run, faults, read_run, fixed=_FIXED, usual="run_")
     sensors = SENSORS.read(form.sensor, faults, lambda entry, column: _sensor(entry, column, table), _ANALOG)
     faults.refuse()
     return IdentificationPlan(
         tuple(sought.values()),
-        {name: known[name][0] for name in sought},
+        {name: numbers[name][0] for name in sought},
         tuple(runs.values()),
         sensors,
         SensorKnowledge(float(table.noise), float(table.gain)),
@@ -122,16 +122,16 @@ def read_identification(
 
 def _sought(entry: Entry, name: str, variable: Variable, value: float) -> Unknown:
     """A sought number, with its bounds and its prior."""
-    given, q, place = entry.given, variable.quantity, entry.place
+    content, q, place = entry.given, variable.quantity, entry.place
     low, high = (
-        entry.quantity(end, variable, given[end]) if end in given else bound
+        entry.quantity(end, variable, content[end]) if end in content else bound
         for end, bound in (("from", q.low), ("to", q.high))
     )
     entry.refuse()
     unit = unit_behind(variable.unit)
     if not low < high:
         entry.fault("to", f"must be > from, {low:g}{unit} ({name})")
-    elif "deviation" in given:
+    elif "deviation" in content:
         deviation = _deviation(entry, variable, value)
         if not low <= value <= high:
             line = (
@@ -140,7 +140,7 @@ def _sought(entry: Entry, name: str, variable: Variable, value: float) -> Unknow
             )
             raise InputError(line, place)
         return Unknown(name, variable.unit, value, low, high, deviation)
-    elif not {"from", "to"} <= given.keys():
+    elif not {"from", "to"} <= content.keys():
         line = (
             f"{place} ({name}): must have from and to, or the standard deviation of the value of the study "
             '(deviation = "5 %"), or both'
@@ -151,62 +151,67 @@ def _sought(entry: Entry, name: str, variable: Variable, value: float) -> Unknow
 
 def _deviation(entry: Entry, variable: Variable, value: float) -> float:
     """A standard deviation: a number in the unit of the quantity, or a share of the value."""
-    given = entry.given["deviation"]
-    parts = split(given) if isinstance(given, str) else None
+    stated = entry.given["deviation"]
+    parts = split(stated) if isinstance(stated, str) else None
     if parts is not None and parts[1] == "%":
         deviation = parts[0] / 100.0 * abs(value)
     else:
         kind = "difference" if variable.unit == "K" else ""
-        of = Quantity(variable.unit, "standard deviation", low=0.0, open_low=True, kind=kind)
-        deviation = entry.quantity("deviation", Variable("", of.description, of), given)
+        quantity = Quantity(variable.unit, "standard deviation", low=0.0, open_low=True, kind=kind)
+        deviation = entry.quantity("deviation", Variable("", quantity.description, quantity), stated)
         entry.refuse()
     if not (math.isfinite(deviation) and deviation > 0.0):
         share = f"{value:g}{unit_behind(variable.unit)}"
-        entry.wrong("deviation", given, f"must be > 0; a share is one of the value of the study, {share}")
+        entry.wrong("deviation", stated, f"must be > 0; a share is one of the value of the study, {share}")
         entry.refuse()
     return deviation
 
 
 def _run(
-    entry: Entry, name: str, crank_speed: float, known: Mapping[str, tuple[Variable, float]], source: str
+    entry: Entry, name: str, crank_speed: float, numbers: Mapping[str, tuple[Variable, float]], source: str
 ) -> PlannedRun:
-    given = entry.given
+    content = entry.given
     if not _NAME.fullmatch(name):
-        words = "must begin with a small letter, and have at most 20 small letters, digits and _"
-        entry.wrong("name", name, words)
-    if "file" not in given:
+        reason = "must begin with a small letter, and have at most 20 small letters, digits and _"
+        entry.wrong("name", name, reason)
+    if "file" not in content:
         entry.fault("file", "must be given, the recording")
     begin, end = read_span(entry)
-    off = float(given["switched_off"]) if "switched_off" in given else None
+    off = float(content["switched_off"]) if "switched_off" in content else None
     if off is not None and not begin < off < end:
         bounds = (("> begin", begin), ("< end", end))
-        words = "must be " + " and ".join(f"{word} = {x:g} s" for word, x in bounds if math.isfinite(x))
+        reason = "must be " + " and ".join(f"{word} = {x:g} s" for word, x in bounds if math.isfinite(x))
         key = entry.key("switched_off")
-        entry.add([InputError(f"{key} = {off:g} s: {words}", key)])
+        entry.add([InputError(f"{key} = {off:g} s: {reason}", key)])
     added: dict[str, float] = {}
-    for full, value in leaves(given.get("added", {})):
-        if full not in known:
-            entry.fault(f"added.{full}", f"no such number of the study{near_name(full, known)}")
+    for full, value in leaves(content.get("added", {})):
+        if full not in numbers:
+            entry.fault(f"added.{full}", f"no such number of the study{near_name(full, numbers)}")
             continue
-        of = Quantity(known[full][0].unit, "amount that was added")
-        added[full] = entry.quantity(f"added.{full}", Variable("", of.description, of), value)
+        quantity = Quantity(numbers[full][0].unit, "amount that was added")
+        added[full] = entry.quantity(f"added.{full}", Variable("", quantity.description, quantity), value)
     speeds = tuple(_speeds(entry))
     values = recording_values(entry, crank_speed, source)
     return PlannedRun(
-        **values, name=name, has_feed=given.get("feed", "same") == "same", added=added, speeds=speeds, off=off
+        **values,
+        name=name,
+        has_feed=content.get("feed", "same") == "same",
+        added=added,
+        speeds=speeds,
+        off=off,
     )
 
 
 def _speeds(entry: Entry) -> Iterator[tuple[float, float, float]]:
     """The changes of the speed, in order."""
-    of = {v.name: v.quantity for v in Layout(RunTable).variables}
+    quantities = {v.name: v.quantity for v in Layout(RunTable).variables}
     duration = Quantity("s", "duration of the change", low=0.0, open_low=True)
-    kinds = (of["begin"], duration, of["crank_speed"])
+    kinds = (quantities["begin"], duration, quantities["crank_speed"])
     end = -math.inf
     for k, change in enumerate(entry.given.get("speeds", []), 1):
         if len(change) != len(kinds):
-            words = 'must be a list of begin, duration and crank speed, such as ["5 s", "1 s", "2 rad/s"]'
-            entry.wrong("speeds", change, words)
+            reason = 'must be a list of begin, duration and crank speed, such as ["5 s", "1 s", "2 rad/s"]'
+            entry.wrong("speeds", change, reason)
             continue
         begin, lasts, speed = (
             entry.quantity("speeds", Variable("", q.description, q), x)
@@ -219,14 +224,14 @@ def _speeds(entry: Entry) -> Iterator[tuple[float, float, float]]:
 
 
 def _sensor(entry: Entry, column: str, table: IdentifyTable) -> SensorKnowledge:
-    given, numbers = entry.given, dict[str, float]()
+    content, numbers = entry.given, dict[str, float]()
     for name in ("offset", "resolution"):
-        if name in given:
-            of = Quantity(MEASURANDS[column].unit, f"{name} of the sensor", low=0.0)
-            numbers[name] = entry.quantity(name, Variable("", of.description, of), given[name])
+        if name in content:
+            quantity = Quantity(MEASURANDS[column].unit, f"{name} of the sensor", low=0.0)
+            numbers[name] = entry.quantity(name, Variable("", quantity.description, quantity), content[name])
     return SensorKnowledge(
-        float(given.get("noise", table.noise)),
-        float(given.get("gain", table.gain)),
+        float(content.get("noise", table.noise)),
+        float(content.get("gain", table.gain)),
         numbers.get("offset"),
         numbers.get("resolution", 0.0),
     )

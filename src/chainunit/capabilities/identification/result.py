@@ -167,24 +167,28 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
         status=("complete" if machine.is_described else "the model does not describe the recordings")
         + (f"; {machine.failure}" if machine.failure else ""),
         sought=len(estimates),
-        told=sum(each.is_determined for each in estimates.values()),
+        told=sum(estimate.is_determined for estimate in estimates.values()),
         runs={run.name: _run(machine, k) for k, run in enumerate(machine.plan.runs)},
-        numbers={name: _number(machine, each) for name, each in estimates.items()},
+        numbers={name: _number(machine, estimate) for name, estimate in estimates.items()},
         covariance=Covariance(
-            list(estimates), [each.unknown.unit for each in estimates.values()], machine.covariance.tolist()
+            list(estimates),
+            [estimate.unknown.unit for estimate in estimates.values()],
+            machine.covariance.tolist(),
         ),
         correlations=list(_correlations(machine)),
         combinations=[
-            _sum(machine, each) for each in machine.information_at_fit.combinations if machine.is_described
+            _sum(machine, combination)
+            for combination in machine.information_at_fit.combinations
+            if machine.is_described
         ],
-        blind=[_unseen_change(machine, each) for each in machine.information_at_fit.null_space],
-        told_at_start=sum(each.is_determined for each in start.determinations),
+        blind=[_unseen_change(machine, direction) for direction in machine.information_at_fit.null_space],
+        told_at_start=sum(determination.is_determined for determination in start.determinations),
         proposals=start.proposals if machine.is_described else (),
         residuals=machine.residual_tests,
         suspects=machine.known.sets,
         sensors={
-            unknown.name: each
-            for unknown, each in fitted_values(machine.problem, best)
+            unknown.name: fitted
+            for unknown, fitted in fitted_values(machine.problem, best)
             if unknown.is_nuisance
         },
         fit=FitCounts(best.rounds, best.is_ended, best.starts, best.agreeing),
@@ -209,25 +213,25 @@ def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
     )
 
 
-def _number(machine: IdentifiedMachine, each: FittedNumber) -> IdentifiedNumber:
-    variable = machine.plan.variables[each.unknown.name]
-    name, start = system_name(each.unknown.name), machine.information_at_start
+def _number(machine: IdentifiedMachine, estimate: FittedNumber) -> IdentifiedNumber:
+    variable = machine.plan.variables[estimate.unknown.name]
+    name, start = system_name(estimate.unknown.name), machine.information_at_start
     before = next(one for one in start.determinations if one.name == name)
-    own, unit = each.unknown, variable.unit
+    unknown, unit = estimate.unknown, variable.unit
     return IdentifiedNumber(
         unit,
         variable.kind,
         title=variable.description,
-        told=each.is_determined,
-        value=each.value if each.is_determined else None,
-        fitted=each.fitted if each.is_determined else None,
-        deviation=difference(each.deviation, unit),
-        low=each.low,
-        high=each.high,
-        given=own.start,
-        given_deviation=difference(own.prior_deviation, unit),
-        least=own.low,
-        most=own.high,
+        told=estimate.is_determined,
+        value=estimate.value if estimate.is_determined else None,
+        fitted=estimate.fitted if estimate.is_determined else None,
+        deviation=difference(estimate.deviation, unit),
+        low=estimate.low,
+        high=estimate.high,
+        given=unknown.start,
+        given_deviation=difference(unknown.prior_deviation, unit),
+        least=unknown.low,
+        most=unknown.high,
         expected=difference(before.by_both, unit),
         by_runs=difference(before.by_runs, unit),
     )
@@ -235,7 +239,7 @@ def _number(machine: IdentifiedMachine, each: FittedNumber) -> IdentifiedNumber:
 
 def _correlations(machine: IdentifiedMachine) -> Iterator[Correlation]:
     """The pairs of numbers with the largest correlations."""
-    names = [each.name for each in machine.plan.sought]
+    names = [unknown.name for unknown in machine.plan.sought]
     scale = 1.0 / np.sqrt(np.diag(machine.covariance))
     matrix = machine.covariance * np.outer(scale, scale)
     pairs = sorted(((i, k) for i in range(len(names)) for k in range(i)), key=lambda pair: -abs(matrix[pair]))
@@ -244,23 +248,23 @@ def _correlations(machine: IdentifiedMachine) -> Iterator[Correlation]:
             yield Correlation(names[k], names[i], float(matrix[i, k]))
 
 
-def _sum(machine: IdentifiedMachine, each: Combination) -> DeterminedSum:
+def _sum(machine: IdentifiedMachine, combination: Combination) -> DeterminedSum:
     # of temperatures, a sum is no temperature
-    value, deviation = (difference(x, each.unit) for x in machine.value_of_sum(each))
-    return DeterminedSum(str(each), dict(each.terms), value, deviation)
+    value, deviation = (difference(x, combination.unit) for x in machine.value_of_sum(combination))
+    return DeterminedSum(str(combination), dict(combination.terms), value, deviation)
 
 
-def _unseen_change(machine: IdentifiedMachine, each: Combination) -> UnseenChange:
+def _unseen_change(machine: IdentifiedMachine, direction: Combination) -> UnseenChange:
     units = {system_name(u.name): u.unit for u in machine.plan.sought}
     changes = [
         f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"
-        for name, factor in each.terms
+        for name, factor in direction.terms
     ]
-    words = " with ".join(changes)
+    text = " with ".join(changes)
     if len(changes) > MOST_CHANGES:
-        names = ", ".join(short_name(name) for name, _ in each.terms)
-        words = f"a change of {len(changes)} numbers together ({names})"
-    return UnseenChange(words, dict(each.terms))
+        names = ", ".join(short_name(name) for name, _ in direction.terms)
+        text = f"a change of {len(changes)} numbers together ({names})"
+    return UnseenChange(text, dict(direction.terms))
 
 
 def _courses(machine: IdentifiedMachine, run: str) -> dict[str, dict[str, InUnit]]:
@@ -268,20 +272,20 @@ def _courses(machine: IdentifiedMachine, run: str) -> dict[str, dict[str, InUnit
     steady run, of the time of another one."""
     courses = dict[str, dict[str, InUnit]]()
     steady = machine.is_steady(run)
-    for each in machine.best.comparisons:
-        if each.run != run or not MEASURANDS[each.column].analog:
+    for comparison in machine.best.comparisons:
+        if comparison.run != run or not MEASURANDS[comparison.column].analog:
             continue
-        time, measured, simulated = machine.columns_over_time(each)
-        x = np.mod(each.angle, 2.0 * math.pi) if steady else time
+        time, measured, simulated = machine.columns_over_time(comparison)
+        x = np.mod(comparison.angle, 2.0 * math.pi) if steady else time
         ends = (0.0, 2.0 * math.pi) if steady else (time[0], time[-1])
         edges = np.linspace(ends[0], ends[1], (CLASSES if steady else CLASSES_OF_TIME) + 1)
         place, size = np.digitize(x, edges[1:-1]), len(edges) - 1
         count = np.bincount(place, minlength=size)
         some = count > 0
         means = [np.bincount(place, y, size)[some] / count[some] for y in (measured, simulated)]
-        unit = MEASURANDS[each.column].unit
+        unit = MEASURANDS[comparison.column].unit
         middle = 0.5 * (edges[1:] + edges[:-1])[some]
-        courses[each.column] = {
+        courses[comparison.column] = {
             "angle" if steady else "time": InUnit(middle, "rad" if steady else "s"),
             "measured": InUnit(means[0], unit),
             "simulated": InUnit(means[1], unit),
@@ -292,16 +296,21 @@ def _courses(machine: IdentifiedMachine, run: str) -> dict[str, dict[str, InUnit
 def sentence_before_fit(plan: IdentificationPlan, before: Information) -> str:
     """The numbers that the recordings can determine, in words: with the standard deviations to expect."""
     names = {system_name(u.name): u.name for u in plan.sought}
-    determined = [each for each in before.determinations if each.is_determined]
+    determined = [determination for determination in before.determinations if determination.is_determined]
     total = len(before.determinations)
-    words = f"Before the fit: these recordings can determine {len(determined)} of {total} numbers"
+    sentence = f"Before the fit: these recordings can determine {len(determined)} of {total} numbers"
     if determined:
-        listed = (f"{names[each.name]} to {each.by_both:.2g}{unit_behind(each.unit)}" for each in determined)
-        words += f" ({', '.join(listed)})"
+        listed = (
+            f"{names[determination.name]} to {determination.by_both:.2g}{unit_behind(determination.unit)}"
+            for determination in determined
+        )
+        sentence += f" ({', '.join(listed)})"
     if before.proposals and len(determined) < total:
         best = before.proposals[0]
-        words += f". Of further runs, this one would tell most: {best.words} (then {best.determined} numbers)"
-    return f"{words}."
+        sentence += (
+            f". Of further runs, this one would tell most: {best.words} (then {best.determined} numbers)"
+        )
+    return f"{sentence}."
 
 
 def sentences(machine: IdentifiedMachine) -> list[str]:
@@ -381,7 +390,7 @@ def identified_tables(machine: IdentifiedMachine, folder: Path) -> dict[str, Any
     """The tables of the study with the fitted values, as a file in `folder` has them, beside the result of the
     identification. A number that the recordings do not determine has its fitted value, too: only all of them together
     give the measured courses. Other capabilities take the errors of the values into their tables."""
-    values = {name: float(f"{each.fitted:.6g}") for name, each in machine.estimates.items()}
+    values = {name: float(f"{estimate.fitted:.6g}") for name, estimate in machine.estimates.items()}
     tables = changed_tables(machine.config, values, "identified", folder)
     tables.pop("identify", None)
     estimates = Estimates(values, machine.covariance, RESULT)
@@ -393,9 +402,9 @@ def identified_tables(machine: IdentifiedMachine, folder: Path) -> dict[str, Any
 def identified_notes(machine: IdentifiedMachine) -> dict[str, str]:
     """By full name, a sentence on each number of the study file that the recordings do not determine."""
     notes = {}
-    for name, each in machine.estimates.items():
-        if not each.is_determined:
-            unit = unit_behind(each.unknown.unit)
-            ends = f"95 % from {each.low:.4g} to {each.high:.4g}{unit}"
+    for name, estimate in machine.estimates.items():
+        if not estimate.is_determined:
+            unit = unit_behind(estimate.unknown.unit)
+            ends = f"95 % from {estimate.low:.4g} to {estimate.high:.4g}{unit}"
             notes[name] = f"not determined, {ends}; it holds only together with the other fitted values"
     return notes

@@ -42,14 +42,14 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
 
         rows = {
             name: {
-                "unit": each.unknown.unit,
-                "value": each.value if each.is_determined else float("nan"),
-                "deviation": each.deviation,
-                "low": each.low,
-                "high": each.high,
-                "is_determined": each.is_determined,
+                "unit": estimate.unknown.unit,
+                "value": estimate.value if estimate.is_determined else float("nan"),
+                "deviation": estimate.deviation,
+                "low": estimate.low,
+                "high": estimate.high,
+                "is_determined": estimate.is_determined,
             }
-            for name, each in self.found.estimates.items()
+            for name, estimate in self.found.estimates.items()
         }
         return pd.DataFrame.from_dict(rows, orient="index")
 

@@ -20,28 +20,28 @@ PICTURES = "bode_*.png"
 _MOST_ROWS = 6
 
 
-def linear_report(found: LinearResult) -> b.Report:
+def linear_report(findings: LinearResult) -> b.Report:
     """The report on a linear model."""
-    result = data(found)
+    result = data(findings)
     s = b.Source(result)
-    sections = [b.Section("point", "The point", tuple(_point(cited(found.linear))))]
-    if found.responses:
-        sections.insert(0, b.Section("bode", "Frequency responses", tuple(_responses(found))))
+    sections = [b.Section("point", "The point", tuple(_point(cited(findings.linear))))]
+    if findings.responses:
+        sections.insert(0, b.Section("bode", "Frequency responses", tuple(_responses(findings))))
     return b.Report(
         f"Linear model: {result['title']}",
         "Linear model",
         result,
-        tuple(_opening(s, found)),
+        tuple(_opening(s, findings)),
         tuple(sections),
         source=s.line("{source} · chainunit {chainunit}"),
         opening_title="Poles",
     )
 
 
-def _opening(s: b.Source, found: LinearResult) -> Iterator[b.Block]:
-    linear = found.linear
+def _opening(s: b.Source, findings: LinearResult) -> Iterator[b.Block]:
+    linear = findings.linear
     sizes = ((linear.states, "state"), (linear.inputs, "input"), (linear.outputs, "output"))
-    counts = join([f"{len(of)} {name}{'' if len(of) == 1 else 's'}" for of, name in sizes])
+    counts = join([f"{len(signals)} {name}{'' if len(signals) == 1 else 's'}" for signals, name in sizes])
     yield b.Text(line(s.words("description"), "."), form="long")
     yield b.Text(line("At ", s.words("at"), ": ", counts, "."))
     if not linear.states:
@@ -81,13 +81,13 @@ def _bends(linear: LinearModel) -> Iterator[b.Block]:
 
 
 def _point(x: LinearModel) -> Iterator[b.Block]:
-    value = ("value", lambda each: number(each.value, 6))
+    value = ("value", lambda signal: number(signal.value, 6))
     head: tuple[Any, ...] = (
-        ("name", lambda each: as_name(each.name)),
-        (b.Column("description", of_text=True), lambda each: each.description),
+        ("name", lambda signal: as_name(signal.name)),
+        (b.Column("description", of_text=True), lambda signal: signal.description),
         value,
     )
-    rate = ("time derivative", lambda each: number(each.rate, 6))
+    rate = ("time derivative", lambda state: number(state.rate, 6))
     yield from table(x.states, *head, rate, title="States, at the point", form="long")
     yield from table(x.inputs, *head, title="Inputs, at the point", form="long")
     # the states are the first outputs
@@ -95,8 +95,8 @@ def _point(x: LinearModel) -> Iterator[b.Block]:
     yield from table(outputs, *head, title="Outputs beside the states, at the point", form="long")
 
 
-def _responses(found: LinearResult) -> Iterator[b.Block]:
-    for k, response in enumerate(found.responses):
+def _responses(findings: LinearResult) -> Iterator[b.Block]:
+    for k, response in enumerate(findings.responses):
         if np.any(response.gain > 0.0):
             yield _bode(k, response)
         else:
@@ -126,8 +126,8 @@ def _bode(k: int, response: FrequencyResponse) -> fig.Figure:
     )
 
 
-def _writers(found: LinearResult, report: b.Report, folder: Path, of_report: list[Writer]) -> list[Writer]:
-    return [lambda: write_npz(found, folder), *of_report]
+def _writers(findings: LinearResult, report: b.Report, folder: Path, of_report: list[Writer]) -> list[Writer]:
+    return [lambda: write_npz(findings, folder), *of_report]
 
 
 TASK: Task[LinearQuestion, LinearResult] = Task(

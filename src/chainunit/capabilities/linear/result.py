@@ -76,20 +76,20 @@ def find(question: LinearQuestion, progress: TaskProgress) -> LinearResult:
     linear = point.linear()
     frequency = frequencies(linear)
     return LinearResult(
-        question.name, linear, tuple(_response(linear, to, of, frequency) for to, of in pairs)
+        question.name, linear, tuple(_response(linear, to, output, frequency) for to, output in pairs)
     )
 
 
 def _pairs(text: str | None) -> list[tuple[str, str]]:
     if text is None:
         return []
-    found = []
-    for each in text.split(","):
-        to, sign, of = (name.strip() for name in each.partition(":"))
-        if not (sign and to and of):
-            raise InputError(f'--pairs {shown(each.strip())}: must be INPUT:OUTPUT, such as "w_ref:w"')
-        found.append((to, of))
-    return found
+    pairs = []
+    for pair in text.split(","):
+        to, sign, output = (name.strip() for name in pair.partition(":"))
+        if not (sign and to and output):
+            raise InputError(f'--pairs {shown(pair.strip())}: must be INPUT:OUTPUT, such as "w_ref:w"')
+        pairs.append((to, output))
+    return pairs
 
 
 def frequencies(linear: LinearModel) -> np.ndarray:
@@ -102,31 +102,31 @@ def frequencies(linear: LinearModel) -> np.ndarray:
     return np.unique([*np.geomspace(low, high, _PLACES), *near])
 
 
-def _response(linear: LinearModel, to: str, of: str, frequency: np.ndarray) -> FrequencyResponse:
-    above = linear.outputs[place("output", of, linear.outputs)].unit
+def _response(linear: LinearModel, to: str, output: str, frequency: np.ndarray) -> FrequencyResponse:
+    above = linear.outputs[place("output", output, linear.outputs)].unit
     below = linear.inputs[place("input", to, linear.inputs)].unit
-    values = linear.response(to, of, frequency)
+    values = linear.response(to, output, frequency)
     return FrequencyResponse(
-        to, of, quotient(above, below), frequency, np.abs(values), np.unwrap(np.angle(values))
+        to, output, quotient(above, below), frequency, np.abs(values), np.unwrap(np.angle(values))
     )
 
 
-def data(found: LinearResult) -> dict[str, Any]:
+def data(findings: LinearResult) -> dict[str, Any]:
     """The content of linear.json."""
-    return {"chainunit": __version__, **as_data(found)}
+    return {"chainunit": __version__, **as_data(findings)}
 
 
-def write_npz(found: LinearResult, folder: Path) -> list[Path]:
+def write_npz(findings: LinearResult, folder: Path) -> list[Path]:
     """Write linear.npz: the matrices A, B, C, D, and of states, inputs and outputs (x, u, y) the values x, u, y and
     the rates dx at the point with ``_names`` and ``_units``. Returns the file."""
-    linear = found.linear
+    linear = findings.linear
     arrays: dict[str, Any] = {name: getattr(linear, name) for name in "ABCD"}
     for letter, signals in (("x", linear.states), ("u", linear.inputs), ("y", linear.outputs)):
-        arrays[letter] = np.array([each.value for each in signals], float)
-        arrays[f"{letter}_names"] = np.array([each.name for each in signals], str)
-        arrays[f"{letter}_units"] = np.array([each.unit for each in signals], str)
+        arrays[letter] = np.array([signal.value for signal in signals], float)
+        arrays[f"{letter}_names"] = np.array([signal.name for signal in signals], str)
+        arrays[f"{letter}_units"] = np.array([signal.unit for signal in signals], str)
     arrays["dx"] = np.array([state.rate.value for state in linear.states], float)
     file = folder / NPZ
-    with atomic_file(file) as own, own.open("wb") as stream:
+    with atomic_file(file) as draft, draft.open("wb") as stream:
         np.savez(stream, **arrays)
     return [file]

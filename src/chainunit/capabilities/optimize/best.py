@@ -123,8 +123,8 @@ def find_best(wishes: Wishes, progress: TaskProgress = quiet) -> Best:
     begun = Best(wishes, len(starts), moved, _values(search, search.today), search.effort, idle)
     if not good:
         assert failure is not None
-        at = failure.nearest.x
-        return replace(begun, conflict=failure, found=_values(search, at), pulls=_pulls(search, at))
+        closest = failure.nearest.x
+        return replace(begun, conflict=failure, found=_values(search, closest), pulls=_pulls(search, closest))
     best = min(good, key=lambda answer: answer.value)
     front: tuple[FrontPoint, ...] = ()
     if len(wishes.objectives) > 1:
@@ -192,8 +192,10 @@ def _pulls(search: Search, x: Any) -> tuple[float, float] | None:
     parameters `x` [N], see `Best.pulls`; NaN where one does not turn."""
     if not search.wishes.slack_free_speed:
         return None
-    today, own = (search.least_pull(at) if search.turns(at) else math.nan for at in (search.today, x))
-    return today, own
+    today, pull = (
+        search.least_pull(point) if search.turns(point) else math.nan for point in (search.today, x)
+    )
+    return today, pull
 
 
 # -- two objectives
@@ -220,10 +222,12 @@ def _front(
             allowed = TurnLimit(
                 second, None, bound * (1.0 + math.copysign(AGREES, bound)) if k == total - 1 else bound
             )
-            found = [search.solve(x, first, [*limits, allowed]) for x in (near[-1], ends[1].x, *starts[:2])]
-            found = [answer for answer in found if answer.feasible]
-            if found:
-                least = min(found, key=lambda answer: answer.value)
+            solutions = [
+                search.solve(x, first, [*limits, allowed]) for x in (near[-1], ends[1].x, *starts[:2])
+            ]
+            solutions = [answer for answer in solutions if answer.feasible]
+            if solutions:
+                least = min(solutions, key=lambda answer: answer.value)
                 points.append(_point(search, least.x))
                 near.append(least.x)
     return tuple(p for p in points if not any(_dominates(other, p) for other in points))

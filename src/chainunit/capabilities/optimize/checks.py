@@ -66,8 +66,10 @@ def neighbours(
     # the values at the angles of a grid are a little too small: the candidates are computed exactly
     candidates = np.flatnonzero(better)
     # and a limit may be exceeded no more than at the best machine: a steep objective gains from any share
-    own = [_widened(limit, search.value(limit.quantity, x)) for limit in limits] if len(candidates) else []
-    exact = [k for k in candidates if _is_better(search, points[k], objective, own, value)]
+    widened = (
+        [_widened(limit, search.value(limit.quantity, x)) for limit in limits] if len(candidates) else []
+    )
+    exact = [k for k in candidates if _is_better(search, points[k], objective, widened, value)]
     return Neighbours(len(points), int(np.sum(met)), len(exact))
 
 

@@ -39,8 +39,8 @@ def optimum_report(
     machine."""
     units = units_of(best, file.tables, units)
     with shown_in(units):
-        found = best_machine(best, Heading.of(title, file))
-        result, x = as_data(found), cited(found)
+        machine = best_machine(best, Heading.of(title, file))
+        result, x = as_data(machine), cited(machine)
     s = b.Source(result)
     sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best, x)))]
     if live:
@@ -141,25 +141,25 @@ def _opening(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     if not best.met:
         sentences = s.lines("conflict.sentences")
         yield b.Judgement("bad", sentences[0], items=())
-        for each in sentences[1:]:
-            yield b.Text(each)
+        for sentence in sentences[1:]:
+            yield b.Text(sentence)
         return
     for k, objective in enumerate(best.wishes.objectives):
         sought = x.quantities[objective.name]
-        words = line(
+        text = line(
             f"{objective.name}: ", number(sought.best), ", today ", number(sought.today), _share(sought), "."
         )
-        yield b.Judgement("good", words) if k == 0 else b.Text(words)
+        yield b.Judgement("good", text) if k == 0 else b.Text(text)
     parts = (
-        line(Name(free), " ", number(each.best, 5), Aside(line("today ", number(each.today, 5))))
-        for free, each in x.parameters.items()
+        line(Name(free), " ", number(parameter.best, 5), Aside(line("today ", number(parameter.today, 5))))
+        for free, parameter in x.parameters.items()
     )
     yield b.Text(line("The best machine has ", join(parts), "."))
     for i in range(len(s.result["organs"])):
         path = f"organs.{i}"
-        words = s.line(f"{{{path}.text}}: the crank turns at {{speed}}")
+        text = s.line(f"{{{path}.text}}: the crank turns at {{speed}}")
         yield b.Judgement(
-            "warning", line(words, s.line(f", and the limit of the best machine is {{{path}.limit}}."))
+            "warning", line(text, s.line(f", and the limit of the best machine is {{{path}.limit}}."))
         )
     yield _turns(best)
 
@@ -201,7 +201,9 @@ def _machine(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     )
     if best.idle:
         yield b.Text(s.words("without_effect_words"))
-    limited: list[tuple[Line, WebPull]] = [(Name(sought), each) for sought, each in x.quantities.items()]
+    limited: list[tuple[Line, WebPull]] = [
+        (Name(sought), quantity) for sought, quantity in x.quantities.items()
+    ]
     if x.least_pull is not None:
         limited.append(("web mean pull, least", x.least_pull))
     # if no machine meets all limits, a column marks the limits that the nearest machine misses
@@ -223,11 +225,11 @@ def _machine(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
 def _binding(s: b.Source) -> Iterator[b.Block]:
     if not s.result["bindings"]:
         yield b.Text("No limit and no bound holds the best machine back.")
-    for each in s.lines("bindings"):
-        yield b.Text(line(each, "."))
-    for words in s.lines("clearances"):
+    for binding in s.lines("bindings"):
+        yield b.Text(line(binding, "."))
+    for clearance in s.lines("clearances"):
         yield b.Text(
-            line("It is as near as the clearance allows to a limit within which it turns: ", words, ".")
+            line("It is as near as the clearance allows to a limit within which it turns: ", clearance, ".")
         )
 
 
@@ -240,7 +242,8 @@ def _front(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
         "lead",
     )
     columns: list[Any] = [
-        (Name(of.name), lambda point, key=of.name: number(point.values[key], 4)) for of in (first, second)
+        (Name(objective.name), lambda point, key=objective.name: number(point.values[key], 4))
+        for objective in (first, second)
     ]
     columns += [(Name(key), lambda point, key=key: number(point.parameters[key], 4)) for key in names]
     chosen_file: Any = ("file", lambda point: FILE if point.chosen else "")

@@ -192,7 +192,7 @@ def units_of(best: Best, tables: Mapping[str, Any], units: Units) -> Units:
 
 
 def _limit_of(best: Best, name: str) -> TurnLimit | None:
-    return next((each for each in best.wishes.limits if each.name == name), None)
+    return next((limit for limit in best.wishes.limits if limit.name == name), None)
 
 
 def _parameters(best: Best) -> Iterator[tuple[str, FreeParameter]]:

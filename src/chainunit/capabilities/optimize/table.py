@@ -99,8 +99,8 @@ def read_wishes(
         form.limits.items(), "optimize.limits", faults, lambda entry, name: _limit(entry, name, model)
     )
     if table.slack_free_speed and machine is not None and not machine.loaded_sides(feed):
-        words = "needs webs with mass or load, which this machine has not; leave it out"
-        faults.add([InputError(f"optimize.{SLACK}: {words}", f"optimize.{SLACK}")])
+        reason = "needs webs with mass or load, which this machine has not; leave it out"
+        faults.add([InputError(f"optimize.{SLACK}: {reason}", f"optimize.{SLACK}")])
     faults.refuse()
     if machine is None:
         return None
@@ -165,12 +165,12 @@ def _free(
     return dict(read_entries(leaves(tables, is_nested), "optimize.free", faults, read))
 
 
-def _hint(name: str, known: Collection[str]) -> str:
+def _hint(name: str, names: Collection[str]) -> str:
     """Words on the parameter that was meant, or on all of them."""
-    own = name.removeprefix("machine.")
-    if own in known:
-        return f"; write optimize.free.{own}"
-    return near_name(own, known) or f"; there are {', '.join(known)}"
+    parameter = name.removeprefix("machine.")
+    if parameter in names:
+        return f"; write optimize.free.{parameter}"
+    return near_name(parameter, names) or f"; there are {', '.join(names)}"
 
 
 def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, str]:

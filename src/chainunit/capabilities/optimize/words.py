@@ -49,22 +49,22 @@ def step_of(unit: str) -> tuple[float, str]:
 def bindings(best: Best) -> list[Binding]:
     """The limits, the slack-free speed and the bounds of parameters that bind, the strongest first."""
     assert best.answer is not None
-    wishes, found = best.wishes, []
+    wishes, entries = best.wishes, []
     size = abs(best.answer.value) or 1.0
     limits = {limit.name: limit for limit in wishes.limits}
     for (name, side), slope in best.answer.sensitivities.items():
         if name in limits:
             limit = limits[name]
             value = limit.low if side == "min" else limit.high
-            found.append(_binding(best, name, side, value, limit.quantity.unit, slope))
+            entries.append(_binding(best, name, side, value, limit.quantity.unit, slope))
         elif name == SLACK:
             # the limit is a pull of 0: its slope is that by the pull
-            found.append(_binding(best, name, side, 0.0, "N", slope))
+            entries.append(_binding(best, name, side, 0.0, "N", slope))
     units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
     for (name, side), slope in best.answer.at_bounds.items():
-        found.append(_binding(best, name, side, wishes.free[name][side == "max"], units[name], slope))
-    active = [each for each in found if abs(each.change.value) > _ACTIVE * size]
-    return sorted(active, key=lambda each: -abs(each.change.value))
+        entries.append(_binding(best, name, side, wishes.free[name][side == "max"], units[name], slope))
+    active = [binding for binding in entries if abs(binding.change.value) > _ACTIVE * size]
+    return sorted(active, key=lambda binding: -abs(binding.change.value))
 
 
 def _binding(best: Best, name: str, side: str, value: Any, unit: str, slope: float) -> Binding:
@@ -118,8 +118,8 @@ def conflict_sentences(best: Best) -> Iterator[str]:
         [_wish_words(best, name) for name in names] for names in (conflict.alone, conflict.together)
     )
     if alone:
-        each = " Each of these limits is impossible alone." if len(alone) > 1 else ""
-        yield f"No machine within the bounds has {'; none has '.join(alone)}.{each}"
+        remark = " Each of these limits is impossible alone." if len(alone) > 1 else ""
+        yield f"No machine within the bounds has {'; none has '.join(alone)}.{remark}"
     if together:
         begin = "Beside that, no machine" if alone else "No machine within the bounds"
         yield (
@@ -143,11 +143,11 @@ def conflict_sentences(best: Best) -> Iterator[str]:
         yield f"The machine that comes nearest has {', '.join(reached)}."
     if conflict.bounds:
         units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
-        words = (
+        bounds = (
             f"{name}.{side} = {number(wishes.free[name][side == 'max'], units[name], full=False)}"
             for name, side in conflict.bounds
         )
-        yield f"The bounds that hold {'the nearest to all of them' if several else 'it'}: {', '.join(words)}."
+        yield f"The bounds that hold {'the nearest to all of them' if several else 'it'}: {', '.join(bounds)}."
 
 
 def _wish_words(best: Best, name: str) -> str:

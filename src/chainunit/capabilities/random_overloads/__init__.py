@@ -54,8 +54,8 @@ class RandomOverloads(Capability):
         """They need a model of the machine, and an event of its own where it has no sides."""
         some = is_above_zero("monte_carlo.runs")
         yield Rule("monte_carlo.runs", MACHINE_FMU, NEEDS_MODEL, some)
-        words = "draws jams of two sides, and the machine is {machine}; give the event in monte_carlo.event"
-        yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given(_EVENT)), words, some)
+        reason = "draws jams of two sides, and the machine is {machine}; give the event in monte_carlo.event"
+        yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given(_EVENT)), reason, some)
 
     def plan(self, reading: FileReading) -> RandomPlan:
         """The plan, also of a file without the table."""
@@ -117,8 +117,8 @@ class RandomOverloads(Capability):
         """Their number and event."""
         if "monte_carlo" not in study.findings:
             return ()
-        words = " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}."
-        return s.line(words, event=study.config.plans[self.name].event.title)
+        sentence = " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}."
+        return s.line(sentence, event=study.config.plans[self.name].event.title)
 
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """The largest quantile of the crank torque, and how often a run ends badly."""

@@ -21,10 +21,10 @@ def summary(s: b.Source, study: StudyRecord) -> Line:
     ends = OUTCOMES if study.config.coupling else {"stalls": OUTCOMES["stalls"]}
     parts: list[Line] = [
         line(
-            f"{of_driver(words, s.driver)} in ",
+            f"{of_driver(outcome, s.driver)} in ",
             s.estimate(f"monte_carlo.quantiles.{name}.share", ".low", ".high"),
         )
-        for name, words in ends.items()
+        for name, outcome in ends.items()
         if name in quantiles
     ]
     if quantile_names := list(quantiles.get(_LARGEST, ())):

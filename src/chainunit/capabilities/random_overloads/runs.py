@@ -243,7 +243,11 @@ def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:
         crank_angle=angle % (2.0 * math.pi),
         event=begin,
         trip_torque=chance.trip_torque if operation.coupling else None,
-        **{each.name: read_measure(each.name, window) for each in fields(Sample) if each.name in MEASURES},
+        **{
+            answer.name: read_measure(answer.name, window)
+            for answer in fields(Sample)
+            if answer.name in MEASURES
+        },
         stalls=float(stalls),
         trips=float(run.ended),
     )
@@ -347,8 +351,10 @@ class MonteCarloResult(Findings):
                 estimates_of[v.name] = {"share": replace(of_runs, unit="1", kind="percent")}
                 continue
             estimates = {f"q{100 * q:.0f}": quantile(values, q) for q in QUANTILES}
-            known = {name: each for name, each in estimates.items() if each is not None}
-            estimates_of[v.name] = {name: replace(each, unit=v.unit) for name, each in known.items()}
+            present = {name: estimate for name, estimate in estimates.items() if estimate is not None}
+            estimates_of[v.name] = {
+                name: replace(estimate, unit=v.unit) for name, estimate in present.items()
+            }
         return estimates_of
 
     def remark(self, study: StudyRecord) -> None:
@@ -360,7 +366,7 @@ class MonteCarloResult(Findings):
                 study.say(code, share=share.value)
         if self.shortage:
             study.say(_TOO_FEW, text=self.shortage)
-        currents = [each.value for each in shares.get("current_peak", {}).values()]
+        currents = [estimate.value for estimate in shares.get("current_peak", {}).values()]
         limit = limit_reached(study.drive, currents)
         if limit is not None:
             study.say(_AT_LIMIT, limit=limit)
@@ -374,8 +380,8 @@ class MonteCarloResult(Findings):
         omissions = [q for q in QUANTILES if count < runs_needed(q)]
         if not omissions:
             return ""
-        each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omissions)
-        return f"{count} runs are too few for some quantiles: {each} (monte_carlo.runs)."
+        needs = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omissions)
+        return f"{count} runs are too few for some quantiles: {needs} (monte_carlo.runs)."
 
     @derived("1")
     def sides(self) -> dict[SideName, int]:
@@ -386,7 +392,7 @@ class MonteCarloResult(Findings):
     @cached_property
     def reasons(self) -> dict[int, str]:
         """Why a run failed, by its number."""
-        return {k: words for k, words in enumerate(self.dataset["failed"].values.tolist()) if words}
+        return {k: reason for k, reason in enumerate(self.dataset["failed"].values.tolist()) if reason}
 
     @derived("1", name="failed")
     def failures(self) -> int:

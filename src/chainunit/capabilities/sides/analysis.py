@@ -63,11 +63,11 @@ class Sides:
             speeds[torque] = {}
             for side in SIDES:
                 excess = self.peaks[f"{torque}_{side}"] - self.peaks[f"{torque}_both"]
-                at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
-                slope = np.diff(excess)[at]
+                places = np.flatnonzero(np.diff(np.sign(excess)) != 0)
+                slope = np.diff(excess)[places]
                 roots = (
                     self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d
-                    for k, d in zip(at, slope, strict=True)
+                    for k, d in zip(places, slope, strict=True)
                 )
                 speeds[torque][side] = [InUnit(float(w), "rad/s", "speed") for w in roots]
         return speeds
@@ -158,7 +158,7 @@ class OrganAnalysis(Analysis):
         (right, _), (left, _) = machine.rocker_extremes()
         empties = any(study.config.events[name].empties for name in study.overloads)
         mode, limits = two_bar_limits(machine, feed, empties=empties)
-        good = {each.topic: each.speed for each in limits}
+        good = {limit.topic: limit.speed for limit in limits}
         return OrganFindings(
             factors={side: overload_factors(machine, speed, feed, side) for side in SIDES},
             sides=sides_over_speed(machine, feed),

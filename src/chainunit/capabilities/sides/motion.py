@@ -78,7 +78,7 @@ class OrganMotion(Supplement):
             if self.study.drive.machine.in_place:
                 inner, force = self._chain(part, state, side)
                 between = _joints(names, _rods(self.study))[1:-1]
-                joints |= {pin: (at.x, at.y) for pin, at in zip(between, inner, strict=True)}
+                joints |= {pin: (place.x, place.y) for pin, place in zip(between, inner, strict=True)}
             arrows.append(Arrow(f"processing force {side}", names.b, force.x, force.y, "P", side, load=True))
             material = part[f"machine.{side}.material_mass"].values
             loads |= {names.wall: (1.0 - share) * material, names.web: share * material}

@@ -28,7 +28,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 def _factors(s: b.Source, study: StudyRecord) -> b.Table:
     sides = cited(OrganFindings.of_study(study), "findings.organs").overload_factors
-    by = f", of {words}" if (words := study.drive.machine.in_place) else ""
+    by = f", of {organs}" if (organs := study.drive.machine.in_place) else ""
     title = s.line("Overload factor, one side against both, at {=run.crank_speed:4}" + by)
     first = next(iter(sides.values()))
     rows = (
@@ -75,8 +75,8 @@ def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[Line]:
         "slack_speed": "a web goes slack from {} on",
     }
     parts = [
-        words.format(f"{{organs.limits.{name}}}")
-        for name, words in limits.items()
+        template.format(f"{{organs.limits.{name}}}")
+        for name, template in limits.items()
         if finite(getattr(findings.limits, name)) is not None
     ]
     if parts:
@@ -94,21 +94,25 @@ _SHADED = (
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
 def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
     sides = OrganFindings.of_study(study).sides
-    words = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
+    titles = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 
-    def items(of: str) -> Iterator[fig.Item]:
-        for look, (which, name) in enumerate(words.items()):
-            yield fig.Curve(name, sides.speed, sides.peaks[f"{of}_{which}"], look)
+    def items(torque: str) -> Iterator[fig.Item]:
+        for look, (which, name) in enumerate(titles.items()):
+            yield fig.Curve(name, sides.speed, sides.peaks[f"{torque}_{which}"], look)
         yield from (
-            fig.Mark(at.value, look="thin") for speeds in sides.crossings[of].values() for at in speeds
+            fig.Mark(crossing.value, look="thin")
+            for speeds in sides.crossings[torque].values()
+            for crossing in speeds
         )
         yield fig.Mark(study.config.run.crank_speed, "normal running")
-        if mode is not None and _GOOD[of] * mode < sides.speed[-1]:
-            yield fig.Shade(_GOOD[of] * mode, float(sides.speed[-1]), "two bars may be off by more than 10 %")
+        if mode is not None and _GOOD[torque] * mode < sides.speed[-1]:
+            yield fig.Shade(
+                _GOOD[torque] * mode, float(sides.speed[-1]), "two bars may be off by more than 10 %"
+            )
 
     mode = finite(OrganFindings.of_study(study).limits.chain_resonance)
     x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
-    axes = {of: fig.Axis(f"{of} torque, peak", "N.m", low=0.0) for of in ("crank", "rocker")}
+    axes = {torque: fig.Axis(f"{torque} torque, peak", "N.m", low=0.0) for torque in ("crank", "rocker")}
     caption = (
         "Largest torques of a turn by inverse dynamics of two bars. Where lines cross, one side alone asks as much "
         "as both"

@@ -69,8 +69,8 @@ class SizingCapability(Capability):
         yield Rule("run.winding_temperature", is_sized, "is sizing.temperature with [sizing]; leave it out")
         without_gear = is_one_of("sizing.gear_kind", "none")
         for key in ("gear", "sizing.ratios"):
-            words = 'is of a gear, and sizing.gear_kind = "none"; leave out one of the two'
-            yield Rule(key, without_gear, words, has_entries(key))
+            reason = 'is of a gear, and sizing.gear_kind = "none"; leave out one of the two'
+            yield Rule(key, without_gear, reason, has_entries(key))
         yield Rule("machine.ratio", is_sized, "[sizing] finds it; to have it kept, give gear.ratio")
 
     def plan(self, reading: FileReading) -> SizingPlan | None:

@@ -127,7 +127,9 @@ def _worst(study: StudyRecord) -> StartNumbers:
 
 def _loaded_starts(study: StudyRecord) -> list[Event]:
     """The starts under load that the study has run."""
-    return [each for each in study.config.events.values() if each.from_rest and each.name in study.answers]
+    return [
+        event for event in study.config.events.values() if event.from_rest and event.name in study.answers
+    ]
 
 
 _Trial = tuple[Rig, float, dict[str, float], DriveTables]
@@ -192,7 +194,7 @@ def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **
         setting=least if least < setting.gear else None,
         running=running,
         start=start,
-        start_time=max(each.start_time for each in starts),
+        start_time=max(entry.start_time for entry in starts),
         **more,
     )
 
@@ -207,21 +209,21 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting, chosen: Chosen
     def rigs() -> Iterator[_Trial]:
         for voltage, time in SOFT_STARTERS:
             starter = dataclasses.replace(tables.starter, soft_start=SoftStart(voltage=voltage, time=time))
-            own = dataclasses.replace(tables, start="soft", starter=starter)
-            p = with_starter(own, rig.drive.parameters, plate)
+            soft_tables = dataclasses.replace(tables, start="soft", starter=starter)
+            p = with_starter(soft_tables, rig.drive.parameters, plate)
             soft = dataclasses.replace(
                 rig,
                 operation=dataclasses.replace(rig.operation, starter_time=time),
                 drive=dataclasses.replace(rig.drive, parameters=p),
             )
-            yield soft, usual + time, {"voltage": voltage, "ramp": time}, own
+            yield soft, usual + time, {"voltage": voltage, "ramp": time}, soft_tables
 
     best = _gentlest(rigs(), study, chosen, setting.running, starting(None, plate).limit)
     if best is None:
         return Alternative(Way.SOFT_STARTER, WayNumbers.of(), {})
     _, starts, numbers = best
-    found = _as_numbers(setting, setting.running, starts, **numbers)
-    return _tried(study, Way.SOFT_STARTER, found, setting.overloads)
+    result = _as_numbers(setting, setting.running, starts, **numbers)
+    return _tried(study, Way.SOFT_STARTER, result, setting.overloads)
 
 
 def _tried(
@@ -255,16 +257,16 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
     def rigs(boost: float) -> Iterator[_Trial]:
         inverter = dataclasses.replace(tables.starter.inverter, boost=boost)
         starter = dataclasses.replace(tables.starter, inverter=inverter)
-        own = dataclasses.replace(tables, start="inverter", starter=starter)
+        inverter_tables = dataclasses.replace(tables, start="inverter", starter=starter)
         for ramp in RAMPS:
             run = dataclasses.replace(rig.operation.run, ramp=ramp)
             operation = dataclasses.replace(rig.operation, run=run, starter_time=0.0)
-            p = with_starter(own, rig.drive.parameters, plate)
+            p = with_starter(inverter_tables, rig.drive.parameters, plate)
             drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
             fed = dataclasses.replace(
-                rig, operation=operation, drive=with_inertia(own, drive, drive.added_inertia)
+                rig, operation=operation, drive=with_inertia(inverter_tables, drive, drive.added_inertia)
             )
-            yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, own
+            yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, inverter_tables
 
     for boost in boosts(tables.starter.inverter.boost, "starter.inverter.boost" in tables.given):
         best = _gentlest(rigs(boost), study, chosen, setting.running, math.inf)
@@ -275,14 +277,14 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
     fed, starts, numbers = best
     fed = dataclasses.replace(fed, fed_from=None)
     running, shocks = _runs(study, fed, on_coupling)
-    found = _as_numbers(setting, running, starts, **numbers)
+    result = _as_numbers(setting, running, starts, **numbers)
     overloads = {name: on_coupling(fed.drive, run) for name, run in shocks.items()}
-    return _tried(study, Way.INVERTER, found, overloads, shocks)
+    return _tried(study, Way.INVERTER, result, overloads, shocks)
 
 
-def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr.Dataset]]:
-    """The largest torque `of` normal duty of another drive, at the crank [N m], and its runs with the overloads from
-    their begin on, by name."""
+def _runs(study: StudyRecord, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[str, xr.Dataset]]:
+    """The largest torque of normal duty of another drive by `peak_of`, at the crank [N m], and its runs with the
+    overloads from their begin on, by name."""
     operation = rig.operation
     duty: list[tuple[str, xr.Dataset]] = []
     shocks: dict[str, xr.Dataset] = {}
@@ -302,11 +304,11 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
                 duty.append((event.name, run))
             elif event.role is Role.SHOCK:
                 shocks[event.name] = run
-        for side in (each for each in SIDES if each in rig.drive.machine.model.sides):
+        for side in (side for side in SIDES if side in rig.drive.machine.model.sides):
             event = one_sided_event(study.config.events, side)
             run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * operation.turn).run
             duty.append((all_feed_on(side), run))
-    return duty_peak(rig.drive, [(STEADY, steady), *duty], of).torque, shocks
+    return duty_peak(rig.drive, [(STEADY, steady), *duty], peak_of).torque, shocks
 
 
 def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None:

@@ -73,7 +73,7 @@ def effects(
     if runs is None:
         names = peaks_in_events(study, Role.SHOCK)
         runs = {name: from_event_on(study, name) for name in names}
-    found = {}
+    by_shock = {}
     for name, run in runs.items():
         time, torque = run["time"].values, np.abs(run[drive.motor_torque].values) * drive.ratio
         passed = np.flatnonzero(torque > setting)
@@ -92,5 +92,5 @@ def effects(
         above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
         in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
         with_coupling = max(at_gear(drive, until), at_gear(drive, last))
-        found[name] = CouplingEffect(without, with_coupling, wanted, in_time)
-    return found
+        by_shock[name] = CouplingEffect(without, with_coupling, wanted, in_time)
+    return by_shock

@@ -72,8 +72,8 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     hardest, running = hardest_start(study), running_peak(study)
     start = hardest.named(study)
     by = " by load and acceleration" if setting.is_of_start else ""
-    of = f"that {start}" if setting.is_of_start else f"that {running_words(study, running.run)}"
-    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of} puts on it{by}"
+    cause = f"that {start}" if setting.is_of_start else f"that {running_words(study, running.run)}"
+    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {cause} puts on it{by}"
     if setting.obstacle is not None:
         return of_driver(_OBSTACLES[setting.obstacle], study.driver_noun).format(
             start=start,
@@ -92,7 +92,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
         f"Recommended torque limiter{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
-        f"{_torque(setting.normal)} {of} puts on it{by}; the warm motor gives {_torque(setting.motor)} at the "
+        f"{_torque(setting.normal)} {cause} puts on it{by}; the warm motor gives {_torque(setting.motor)} at the "
         f"{study.driver_noun}, and may give 10 % less by IEC 60034-1. It opens where "
         f"{_effects(study, setting.effects)}"
     )
@@ -148,10 +148,12 @@ def _too_late(study: StudyRecord, setting: Setting, alternatives: Sequence[Alter
         for name, effect in setting.passed.items()
     )
     cures = []
-    for each in alternatives:
-        if each.way is Way.RELEASE:
+    for alternative in alternatives:
+        if alternative.way is Way.RELEASE:
             declared = number(Coupling().release_time, "s")
-            cures.append(f"a release time of {number(each.numbers.release_time, 's')} in place of {declared}")
+            cures.append(
+                f"a release time of {number(alternative.numbers.release_time, 's')} in place of {declared}"
+            )
     cures.append(f"a gear that may carry {_torque(max(e.with_coupling for e in setting.passed.values()))}")
     cures.append("a device at the machine, nearer to the overload")
     return (
@@ -189,35 +191,36 @@ _FAILURES = {
 """By way, the sentence on one with which the machine does not start."""
 
 
-def way_words(study: StudyRecord, each: Alternative, setting: Setting) -> str:
+def way_words(study: StudyRecord, alternative: Alternative, setting: Setting) -> str:
     """The sentence on a way to a torque limiter that a start does not open, beside the one of that `setting`."""
-    if each.numbers.start is None:
-        return of_driver(_FAILURES[each.way], study.driver_noun)
+    if alternative.numbers.start is None:
+        return of_driver(_FAILURES[alternative.way], study.driver_noun)
     numbers = {
         v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp", "boost"))
         for v in variables(WayNumbers)
-        if (value := getattr(each.numbers, v.name)) is not None
+        if (value := getattr(alternative.numbers, v.name)) is not None
     }
-    if each.numbers.setting is not None:
-        numbers["setting"] = _at_both(study, each.numbers.setting)
-    return _WAYS[each.way].format(
-        **numbers, opens=_list_of(study, each.opens), set=_set(study, each, setting)
+    if alternative.numbers.setting is not None:
+        numbers["setting"] = _at_both(study, alternative.numbers.setting)
+    return _WAYS[alternative.way].format(
+        **numbers, opens=_list_of(study, alternative.opens), set=_set(study, alternative, setting)
     )
 
 
-def _set(study: StudyRecord, each: Alternative, setting: Setting) -> str:
+def _set(study: StudyRecord, alternative: Alternative, setting: Setting) -> str:
     """The setting of a way and what it protects, in words."""
     gear = study.config.drive.gear.torque_limit
-    if each.numbers.setting is None:
+    if alternative.numbers.setting is None:
         return f"no setting is left below the {_torque(gear)} that the gear may carry"
-    text = f"set to {_at_both(study, each.numbers.setting)}, it opens "
-    if not each.opens:
+    text = f"set to {_at_both(study, alternative.numbers.setting)}, it opens "
+    if not alternative.opens:
         return text + "in no overload of this study and protects nothing"
-    text += f"where {_effects(study, each.effects) if each.effects else _list_of(study, each.opens)}"
-    if each.effects and not spares(each.effects, gear):
+    effects, opens = alternative.effects, alternative.opens
+    text += f"where {_effects(study, effects) if effects else _list_of(study, opens)}"
+    if effects and not spares(effects, gear):
         text += ", too late to save anything"
-    if shut := [name for name in setting.overloads if name not in each.opens]:
+    if shut := [name for name in setting.overloads if name not in opens]:
         text += f", but stays shut where {', '.join(map(study.title_of, shut))}"
-    if each.numbers.rocker is not None:
-        text += f"; the rocker sees up to {_torque(each.numbers.rocker)}"
+    if alternative.numbers.rocker is not None:
+        text += f"; the rocker sees up to {_torque(alternative.numbers.rocker)}"
     return text

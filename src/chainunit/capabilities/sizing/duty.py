@@ -76,7 +76,7 @@ def duty_of(task: SizingTask, values: Mapping[str, Any], folder: Path, backend: 
     one_sided = {side: cycle(machine, w, case) for side, case in loads.items()}
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
     # if both sides are alike it is the left one
-    heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
+    heavier = min(sizes, key=lambda size: -size[0])[1] if sizes else None
     for capability in registered():
         if turns := capability.turns(values, machine, w, (feed, *loads.values()), folder, backend):
             normal, *others = turns

@@ -178,13 +178,13 @@ class SizingFindings(Findings):
         if (needed := self._gear_needed(study, setting)) is not None:
             order, remedy = needed
             decides = order.decides
-            words = f"{decides.words}{decides.rule} takes one that permits {number(order.rated, 'N.m')} in running"
-            listed = replace(listed, open=[f"The gear is too weak: {words}; {remedy}.", *listed.open])
+            sentence = f"{decides.words}{decides.rule} takes one that permits {number(order.rated, 'N.m')} in running"
+            listed = replace(listed, open=[f"The gear is too weak: {sentence}; {remedy}.", *listed.open])
         if best.motor.is_packaged:
-            words = (
+            sentence = (
                 "The motor is one of the packaged table: typical values of no maker. Ask for offers to them."
             )
-            listed = replace(listed, open=[words, *listed.open])
+            listed = replace(listed, open=[sentence, *listed.open])
         return listed
 
     def data(self, study: StudyRecord) -> dict[str, Any]:

@@ -69,38 +69,40 @@ def gear_order(
     if study.plate is not None:
         rated = study.plate.nameplate.torque * study.drive.ratio * gear.efficiency
         loads["service"] = GearLoad(rated, "the motor at its rating", 1.0 / service, times)
-    found = StartFindings.found_in(study)
-    starts, overloads = _starts(study, found, peaks), _overloads(study, setting, peaks)
+    findings = StartFindings.found_in(study)
+    starts, overloads = _starts(study, findings, peaks), _overloads(study, setting, peaks)
     left_out = tuple(name for name in wrong if name in overloads)
     if starts := {name: torque for name, torque in starts.items() if name not in wrong}:
         name = max(starts, key=lambda name: starts[name])
-        words = f"a start ({study.title_of(name)})" if name else "a start"
+        title = f"a start ({study.title_of(name)})" if name else "a start"
         rule = f", permitted {factor:g} x rated,{times}"
-        loads["start"] = GearLoad(starts[name], words, factor / service, rule)
+        loads["start"] = GearLoad(starts[name], title, factor / service, rule)
     if overloads := {name: torque for name, torque in overloads.items() if name not in wrong}:
         name = max(overloads, key=lambda name: overloads[name])
         with_coupling = setting is not None and setting.torque and name in setting.effects
-        words = f"an overload ({study.title_of(name)}{', with the limiter' if with_coupling else ''})"
+        title = f"an overload ({study.title_of(name)}{', with the limiter' if with_coupling else ''})"
         rule = f", permitted {factor:g} x rated{free}"
-        loads["overload"] = GearLoad(overloads[name], words, factor * kept, rule)
+        loads["overload"] = GearLoad(overloads[name], title, factor * kept, rule)
     least = max(load.rated for load in loads.values())
-    transient = None if found is None else found.transient
+    transient = None if findings is None else findings.transient
     return GearOrder(ordered_torque(least), loads, left_out, transient)
 
 
-def _starts(study: StudyRecord, found: StartFindings | None, peaks: Mapping[str, float]) -> dict[str, float]:
+def _starts(
+    study: StudyRecord, findings: StartFindings | None, peaks: Mapping[str, float]
+) -> dict[str, float]:
     """Peak torque of starts at the output of the gear by load and acceleration [N m], of the `peaks` by the name of
     their event; that of the starts from all angles has no name."""
     events = study.config.events
-    own = {name: peak for name, peak in peaks.items() if name in events and events[name].from_rest}
-    return own if found is None else {"": found.worst.quasi_static} | own
+    starts = {name: peak for name, peak in peaks.items() if name in events and events[name].from_rest}
+    return starts if findings is None else {"": findings.worst.quasi_static} | starts
 
 
 def _overloads(study: StudyRecord, setting: Setting | None, peaks: Mapping[str, float]) -> dict[str, float]:
     """Peak torque at the output of the gear in each shock and disturbance [N m], of the `peaks` by name: that which
     passes the coupling where one is recommended."""
     events, roles = study.config.events, (Role.SHOCK, Role.DISTURBANCE)
-    own = {name: peak for name, peak in peaks.items() if name in events and events[name].role in roles}
+    overloads = {name: peak for name, peak in peaks.items() if name in events and events[name].role in roles}
     if setting is not None and setting.torque is not None:
-        own |= {name: effect.with_coupling for name, effect in setting.effects.items()}
-    return own
+        overloads |= {name: effect.with_coupling for name, effect in setting.effects.items()}
+    return overloads

@@ -54,11 +54,11 @@ def strong_enough(gears: Iterable[CatalogueGear], torque: float) -> list[Catalog
 
 
 def gear_faults(
-    gears: Sequence[CatalogueGear], given: Iterable[str], ratio: float, torque: float
+    gears: Sequence[CatalogueGear], keys: Iterable[str], ratio: float, torque: float
 ) -> Iterator[InputError]:
-    """Refusals of keys beside the `gears` of a catalogue, of those that are `given`; `ratio` is `gear.ratio`, and
+    """Refusals of keys beside the `gears` of a catalogue; `keys` are those of the file, `ratio` is `gear.ratio`, and
     `torque` is `sizing.gear_torque` [N m]."""
-    given = set(given)
+    keys = set(keys)
     most = max(gear.transmission.torque_limit for gear in gears)
     if torque > most:
         yield InputError(
@@ -68,9 +68,9 @@ def gear_faults(
         return
     gears = strong_enough(gears, torque)
     for name in OWN_KEYS:
-        if name in given:
+        if name in keys:
             yield InputError(f"{name}: each gear of the catalogue has its own; leave it out", name)
-    if "gear.ratio" in given and not _of_ratio(gears, ratio):
+    if "gear.ratio" in keys and not _of_ratio(gears, ratio):
         near = nearest(ratio, (gear.data.ratio for gear in gears))
         yield InputError(
             f"gear.ratio = {ratio:g}: no gear of the catalogue has it; must be a ratio of the catalogue, such as "
@@ -81,8 +81,8 @@ def gear_faults(
 
 def unit_of(gear: CatalogueGear) -> GearUnit:
     """The gear as one unit."""
-    of = gear.data
-    return GearUnit(gear.designation, of.ratio, of.ratio, of.efficiency)
+    data = gear.data
+    return GearUnit(gear.designation, data.ratio, data.ratio, data.efficiency)
 
 
 def _of_ratio(gears: Iterable[CatalogueGear], ratio: float) -> list[CatalogueGear]:
@@ -106,7 +106,7 @@ def rows_for(
 
 
 def gear_checks(
-    of: GearRating, drive: Drive, running: Sequence[xr.Dataset], cases: Sequence[tuple[float, xr.Dataset]]
+    rating: GearRating, drive: Drive, running: Sequence[xr.Dataset], cases: Sequence[tuple[float, xr.Dataset]]
 ) -> dict[str, Check]:
     """The checks of a gear beside those of its torque, as far as its ratings have their limits.
 
@@ -120,16 +120,16 @@ def gear_checks(
     cases : the runs of the duty, each with its share of the time
     """
     checks = dict[str, Check]()
-    if of.thermal_power:
+    if rating.thermal_power:
         passed = sum(share * float(np.mean(np.abs(shaft_power(drive, run)))) for share, run in cases)
-        checks["gear_thermal"] = Check("mean power of the gear", passed, of.thermal_power, "W")
-    if of.overhung_load and (bearing := driver_bearing(drive)):
+        checks["gear_thermal"] = Check("mean power of the gear", passed, rating.thermal_power, "W")
+    if rating.overhung_load and (bearing := driver_bearing(drive)):
         largest = max(peak(pin_force(drive, run, bearing)) for run in running)
-        checks["gear_overhung"] = Check("overhung load of the gear", largest, of.overhung_load, "N")
-    if of.largest_speed:
+        checks["gear_overhung"] = Check("overhung load of the gear", largest, rating.overhung_load, "N")
+    if rating.largest_speed:
         fastest = max(peak(run["motor.w"].values) for run in running)
         checks["gear_speed"] = Check(
-            "speed of the gear's input shaft", fastest, of.largest_speed, "rad/s", "speed"
+            "speed of the gear's input shaft", fastest, rating.largest_speed, "rad/s", "speed"
         )
     return checks
 
@@ -143,26 +143,26 @@ def spent(c: Candidate, tried: Iterable[Candidate]) -> Candidate | None:
     """The candidate `c`, whose gear the runs of a candidate that was `tried` with another gear surely rule out, with
     the values of these runs beside its own limits; None where it has to be tried itself."""
     assert c.sold is not None
-    of, transmission = c.sold.data, c.sold.transmission
+    data, transmission = c.sold.data, c.sold.transmission
     limits = {
         "gear": transmission.torque_limit,
         "gear_start": transmission.start_limit,
         "gear_service": transmission.torque_limit,
-        "gear_thermal": of.thermal_power,
-        "gear_overhung": of.overhung_load,
-        "gear_speed": of.largest_speed,
+        "gear_thermal": data.thermal_power,
+        "gear_overhung": data.overhung_load,
+        "gear_speed": data.largest_speed,
     }
     for other in tried:
-        own = {name: check for name, check in other.checks.items() if name not in limits}
-        own |= {
+        checks = {name: check for name, check in other.checks.items() if name not in limits}
+        checks |= {
             name: dataclasses.replace(check, limit=limits[name])
             for name, check in other.checks.items()
             if limits.get(name)
         }
         judged = dataclasses.replace(
-            c, trial=dataclasses.replace(other.trial, checks=own), runs_with=other.runs_with or other.gear
+            c, trial=dataclasses.replace(other.trial, checks=checks), runs_with=other.runs_with or other.gear
         )
-        if any(judged.sizes[name] > SURELY for name in own if name in limits):
+        if any(judged.sizes[name] > SURELY for name in checks if name in limits):
             return judged
     return None
 
@@ -188,4 +188,4 @@ def stronger(gears: Iterable[CatalogueGear], chosen: CatalogueGear, torque: floa
 
 def unknown_limits(gear: CatalogueGear) -> list[str]:
     """The limits of a gear that its catalogue leaves out, in words."""
-    return [words for column, words in _MAY_LACK.items() if not getattr(gear.data, column)]
+    return [limit for column, limit in _MAY_LACK.items() if not getattr(gear.data, column)]

@@ -11,5 +11,5 @@ from ...study.drive_tables import DriveTables
 def with_gear(tables: DriveTables, gear: CatalogueGear) -> DriveTables:
     """The tables of a study with this gear; its drag that grows with speed is that of the file."""
     transmission = dataclasses.replace(gear.transmission, d=tables.gear.d)
-    own = {f"gear.{name}" for name in ("ratio", "efficiency", "J", "torque_limit", "start_factor")}
-    return dataclasses.replace(tables, gear=transmission, given=tables.given | own)
+    keys = {f"gear.{name}" for name in ("ratio", "efficiency", "J", "torque_limit", "start_factor")}
+    return dataclasses.replace(tables, gear=transmission, given=tables.given | keys)

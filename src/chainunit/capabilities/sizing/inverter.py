@@ -31,12 +31,12 @@ def _with_boost(c: Candidate, boost: float) -> Candidate:
 def least_boost(c: Candidate, judged: Callable[[Candidate], Candidate], is_given: bool) -> Candidate:
     """The candidate, as `judged`, with the least boost with which it starts; where it starts with none, with the
     first. A boost with which the run fails is none with which it starts; one that the file gives is kept."""
-    own = float(c.drive.parameters.inverter.boost)
-    first = judged(_with_boost(c, own))
+    first_boost = float(c.drive.parameters.inverter.boost)
+    first = judged(_with_boost(c, first_boost))
     if first.starts or not c.drive.follows:
         return first
-    others = (judged(_with_boost(c, boost)) for boost in boosts(own, is_given)[1:])
-    return next((each for each in others if each.starts), first)
+    others = (judged(_with_boost(c, boost)) for boost in boosts(first_boost, is_given)[1:])
+    return next((candidate for candidate in others if candidate.starts), first)
 
 
 def misses_by_a_hair(c: Candidate) -> bool:

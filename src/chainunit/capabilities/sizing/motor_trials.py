@@ -133,9 +133,9 @@ class MotorTrials:
         last = tried[-1]
         if last.drive.follows and not self.has_given_ratio and misses_by_a_hair(last):
             above = next_ratio(last.drive.ratio, [gear.data.ratio for gear in self.task.gears])
-            known = {c.gear for c in tried}
+            gears = {c.gear for c in tried}
             more = [] if above is None else self._over_gears(motor, above, judge)
-            tried += [c for c in more if c.gear not in known]
+            tried += [c for c in more if c.gear not in gears]
         return tried
 
     def _needed_ratio(self, motor: CatalogueMotor) -> float:

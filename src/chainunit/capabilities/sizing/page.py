@@ -77,37 +77,39 @@ def _share(check: Check, x: Check) -> b.Share:
     if check.reason is not None:
         return b.Share(number(x.utilisation, none="none permitted", over=True), x.reason or "")
     over = (finite(check.utilisation) or 0.0) > 1.0
-    of = line(number(x.value), " of ", number(x.limit))
-    return b.Share(number(x.utilisation, none="no value", over=over), of)
+    note = line(number(x.value), " of ", number(x.limit))
+    return b.Share(number(x.utilisation, none="no value", over=over), note)
 
 
 def _parts(drive: SizedDrive, x: SizedDrive) -> Iterator[b.Block]:
     """The parts to order from catalogues, with what these leave open."""
     if drive.parts is None or x.parts is None:
-        words = (
+        sentence = (
             "Order numbers: none, as motor and gear are typical values of no maker. Ask for offers to them, or "
             "give catalogues of makers (catalogue = [...])."
         )
-        yield b.Text(words, "note", "long")
+        yield b.Text(sentence, "note", "long")
         return
     rows = [
         b.TableRow(
             (
                 capital(item.kind),
-                each.designation,
-                each.order_number if item.order_number else "-",
-                number(each.price, as_given=True, none="-"),
+                shown.designation,
+                shown.order_number if item.order_number else "-",
+                number(shown.price, as_given=True, none="-"),
             )
         )
-        for item, each in zip(drive.parts.items, x.parts.items, strict=True)
+        for item, shown in zip(drive.parts.items, x.parts.items, strict=True)
     ]
     if len(rows) > 1 and drive.parts.total is not None:
         rows.append(b.TableRow(("These parts together", "", "", number(x.parts.total, as_given=True))))
     columns = b.heads("part", "designation", "order number", "price")
     yield b.Table(tuple(rows), columns, title="Parts to order", numeric=False, form="long")
-    sources = {item.source: each.source for item, each in zip(drive.parts.items, x.parts.items, strict=True)}
+    sources = {
+        item.source: shown.source for item, shown in zip(drive.parts.items, x.parts.items, strict=True)
+    }
     yield b.Text(line("Source of their values: ", *join(sources.values()), "."), "note", "long")
-    yield from (b.Text(each, form="long") for each in x.parts.open)
+    yield from (b.Text(remark, form="long") for remark in x.parts.open)
 
 
 def _how_to_order(drive: SizedDrive, x: SizedDrive, k: int) -> Iterator[Line]:
@@ -217,9 +219,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     drive, x = findings.sized(study), cited(findings, "findings.sizing")
     sized = cited(drive, "findings.sizing")
     if findings.chosen is None:
-        reasons = (line(Strong(each.designation), ": ", each.reason) for each in x.candidates[:_REASONS])
-        words = Strong("No candidate fits. The reasons:")
-        yield b.Judgement("alarm", words, items=tuple(reasons), form="long")
+        reasons = (
+            line(Strong(candidate.designation), ": ", candidate.reason)
+            for candidate in x.candidates[:_REASONS]
+        )
+        heading = Strong("No candidate fits. The reasons:")
+        yield b.Judgement("alarm", heading, items=tuple(reasons), form="long")
     yield from _best(s, drive, sized, x.candidates[0])
     if isinstance(drive.protection, DriveProtection):
         protection: Any = sized.protection
@@ -237,7 +242,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Text(
             f"{len(findings.candidates) - row_count} more were tried; report.html lists them.", form="short"
         )
-    order = "; ".join(f"{i}. {words}" for i, words in enumerate(findings.order, 1))
+    order = "; ".join(f"{i}. {criterion}" for i, criterion in enumerate(findings.order, 1))
     yield b.Text(f"Order of preference among drives that fit: {order}.", form="long")
     yield b.Tables(tuple(_numbers(s, study, findings)))
 
@@ -268,13 +273,13 @@ def _best(s: b.Source, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Ite
     doubt = line(" (", s.words("verdict.model.caveat"), ")") if drive.caveat else ()
     # a motor that does not suffice is not ordered
     parts = () if drive.parts is None else drive.parts.items
-    motor = [line("motor ", best.designation, " of ", each) for each in _data(s)]
-    order: list[Line] = [line(each, *_how_to_order(drive, x, 0)) for each in motor]
-    if not any(each.kind == "gear" for each in parts):
+    motor = [line("motor ", best.designation, " of ", source) for source in _data(s)]
+    order: list[Line] = [line(title, *_how_to_order(drive, x, 0)) for title in motor]
+    if not any(part.kind == "gear" for part in parts):
         order += (*_belt(x.belt), *_gear_torque(x))
-    for k, each in enumerate(x.parts.items if x.parts is not None else ()):
+    for k, item in enumerate(x.parts.items if x.parts is not None else ()):
         if k:
-            order.append(line(f"{parts[k].kind} ", each.designation, *_how_to_order(drive, x, k)))
+            order.append(line(f"{parts[k].kind} ", item.designation, *_how_to_order(drive, x, k)))
     order += _starter(s, x, best.numbers)
     if order and not drive.insufficient:
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
@@ -312,20 +317,20 @@ def _candidates(findings: SizingFindings, x: SizingFindings, row_count: int) -> 
     rows = [
         b.TableRow(
             (
-                line(each.designation, Aside(_behind(candidate, each))),
-                each.verdict or "",
-                _flywheel(candidate, each),
-                number(each.numbers.mass),
+                line(shown.designation, Aside(_behind(candidate, shown))),
+                shown.verdict or "",
+                _flywheel(candidate, shown),
+                number(shown.numbers.mass),
                 *(
-                    _share(candidate.checks[name], each.checks[name]) if name in candidate.checks else ""
+                    _share(candidate.checks[name], shown.checks[name]) if name in candidate.checks else ""
                     for name in titles
                 ),
             ),
-            line(f"{_SIGN.get(candidate.verdict or Standing.REJECTED, '✗')} ", each.reason),
+            line(f"{_SIGN.get(candidate.verdict or Standing.REJECTED, '✗')} ", shown.reason),
             _SEVERITY.get(candidate.verdict, "bad"),
             "both" if i < row_count else "long",
         )
-        for i, (candidate, each) in enumerate(zip(findings.candidates, x.candidates, strict=True))
+        for i, (candidate, shown) in enumerate(zip(findings.candidates, x.candidates, strict=True))
     ]
     long = (b.Column(title, form="long") for title in ("flywheel", "mass", *titles.values()))
     return b.Table(
@@ -350,17 +355,17 @@ def _gears(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Table]:
     """The gears of the catalogue that were tried with the motors, with the share of each of its limits."""
     titles = {n: title for n, title in _titles(findings.candidates).items() if n.startswith("gear")}
     rows = []
-    for candidate, each in zip(findings.candidates, x.candidates, strict=True):
+    for candidate, shown in zip(findings.candidates, x.candidates, strict=True):
         if candidate.sold is None:
             continue
-        gear = each.parts[-1]
+        gear = shown.parts[-1]
         cells = (
-            _share(candidate.checks[name], each.checks[name]) if name in candidate.checks else "not known"
+            _share(candidate.checks[name], shown.checks[name]) if name in candidate.checks else "not known"
             for name in titles
         )
-        note = line("ruled out by the runs with ", each.runs_with) if each.runs_with is not None else ()
+        note = line("ruled out by the runs with ", shown.runs_with) if shown.runs_with is not None else ()
         price = number(gear.price, as_given=True, none="-")
-        rows.append(b.TableRow((gear.designation, each.designation, price, *cells), note))
+        rows.append(b.TableRow((gear.designation, shown.designation, price, *cells), note))
     if rows:
         columns = b.heads("gear", "motor", "price", *titles.values())
         yield b.Table(

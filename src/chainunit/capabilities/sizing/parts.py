@@ -67,15 +67,15 @@ def parts_list(
     flywheel, coupling : words on a flywheel and a torque limiter that no catalogue has; empty where none is needed
     """
     lacking = {
-        "an order number": [each.kind for each in items if not each.order_number],
-        "a price": [each.kind for each in items if each.price is None],
+        "an order number": [item.kind for item in items if not item.order_number],
+        "a price": [item.kind for item in items if item.price is None],
     }
     sentences = [f"Without {what}: {', '.join(kinds)}." for what, kinds in lacking.items() if kinds]
     if unknown:
         sentences.append(
             f"Left out of the choice, as the catalogue of gears does not give it: {', '.join(unknown)}."
         )
-    sentences += [f"In no catalogue: {words}." for words in (flywheel, coupling) if words]
+    sentences += [f"In no catalogue: {remark}." for remark in (flywheel, coupling) if remark]
     return PartsList(items, sentences)
 
 
@@ -84,9 +84,9 @@ def coupling_for(
 ) -> CatalogueCoupling | None:
     """The cheapest of the torque limiters that can be set to this `torque` [N m] and may turn at this `speed`
     [rad/s]; of those without a price, which come last, the one with the smallest range. None where there is none."""
-    fitting = [each for each in couplings if each.can_be_set(torque, speed)]
+    fitting = [coupling for coupling in couplings if coupling.can_be_set(torque, speed)]
     return min(
         fitting,
-        key=lambda each: (each.price or math.inf, each.data.setting_most, each.designation),
+        key=lambda coupling: (coupling.price or math.inf, coupling.data.setting_most, coupling.designation),
         default=None,
     )

@@ -55,13 +55,13 @@ _BY_PRICE = (
 
 def order_words(larger: float, objective: str) -> list[str]:
     """The criteria of `choice` in their order, in words."""
-    words = dict(ORDER)
+    texts = dict(ORDER)
     if objective == PRICE:
         rest = {
-            name: text for name, text in words.items() if name not in (Criterion.MARGIN, Criterion.LARGER)
+            name: text for name, text in texts.items() if name not in (Criterion.MARGIN, Criterion.LARGER)
         }
-        words = {Criterion.MARGIN: words[Criterion.MARGIN], Criterion.PRICE: _BY_PRICE} | rest
-    return [text.format(larger=f"{larger:g}") for text in words.values()]
+        texts = {Criterion.MARGIN: texts[Criterion.MARGIN], Criterion.PRICE: _BY_PRICE} | rest
+    return [text.format(larger=f"{larger:g}") for text in texts.values()]
 
 
 def poles_rank(poles: float) -> float:
@@ -116,7 +116,7 @@ def choice(
     dropped: dict[int, Criterion] = {}
     for criterion, keep in _steps(larger, objective):
         kept = keep(left)
-        dropped |= {id(c): criterion for c in left if not any(c is each for each in kept)}
+        dropped |= {id(c): criterion for c in left if not any(c is candidate for candidate in kept)}
         left = kept
     return left[0], dropped | {id(c): Criterion.USE for c in left[1:]}
 
@@ -171,10 +171,10 @@ def _cheaper(left: list[Candidate]) -> list[Candidate]:
     costs = [c.price for c in left]
     if None in costs:
         costs = [c.mass for c in left]
-    known = [cost for cost in costs if cost is not None]
-    if len(known) < len(left):
+    amounts = [cost for cost in costs if cost is not None]
+    if len(amounts) < len(left):
         return left
-    return [c for c, cost in zip(left, known, strict=True) if cost <= (1.0 + ALIKE) * min(known)]
+    return [c for c, cost in zip(left, amounts, strict=True) if cost <= (1.0 + ALIKE) * min(amounts)]
 
 
 def _less_used(left: list[Candidate]) -> list[Candidate]:
@@ -213,8 +213,8 @@ def _flywheels(c: Candidate) -> str:
     if not c.stop:
         return ""
     limit = c.checks["inertia"].limit if "inertia" in c.checks else math.inf
-    words = STOPS[c.stop].format(J=number(c.heaviest, "kg.m2"), limit=limit)
-    return f"; {'no flywheel' if c.stop in ('inertia', MEAN, SPARED) else 'flywheels'} {words}"
+    reason = STOPS[c.stop].format(J=number(c.heaviest, "kg.m2"), limit=limit)
+    return f"; {'no flywheel' if c.stop in ('inertia', MEAN, SPARED) else 'flywheels'} {reason}"
 
 
 def _unstarted(c: Candidate) -> str:
@@ -278,7 +278,7 @@ def _behind(c: Candidate, best: Candidate) -> str:
     if c.criterion is Criterion.USE:
         is_more = c.use > best.use + ALIKE
         return "more used than the chosen one" if is_more else "as good as the chosen one"
-    poles = (each.motor.nameplate.poles for each in (c, best))
+    poles = (candidate.motor.nameplate.poles for candidate in (c, best))
     return {
         Criterion.MARGIN: f"leaves less than the margin of {_margin(c)}",
         Criterion.FIELD: f"{_weakened(c)}",

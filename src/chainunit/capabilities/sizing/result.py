@@ -284,23 +284,23 @@ def drive_protection(
         disturbances=_peaks(study, setting.disturbances, "a nuisance trip", setting.nuisances),
         alternatives=[
             TriedWay(
-                each.way,
-                way_words(study, each, setting),
-                each.numbers,
-                each.opens,
-                _effects(study, each.effects),
+                alternative.way,
+                way_words(study, alternative, setting),
+                alternative.numbers,
+                alternative.opens,
+                _effects(study, alternative.effects),
             )
-            for each in alternatives
+            for alternative in alternatives
         ],
     )
 
 
 def _peaks(
-    study: StudyRecord, peaks: Mapping[str, float], words: str, opening: Mapping[str, float]
+    study: StudyRecord, peaks: Mapping[str, float], phrase: str, opening: Mapping[str, float]
 ) -> dict[str, InUnit]:
-    """The peaks on the coupling, by run, with the `words` on each run that is among those `opening` it."""
+    """The peaks on the coupling, by run, with the `phrase` on each run that is among those `opening` it."""
     return {
-        name: _torque(peak, f"{study.title_of(name)}: {words if name in opening else 'leaves it shut'}")
+        name: _torque(peak, f"{study.title_of(name)}: {phrase if name in opening else 'leaves it shut'}")
         for name, peak in peaks.items()
     }
 
@@ -311,9 +311,9 @@ def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[
     return {
         name: {
             key: _torque(
-                getattr(effect, key), f"{study.title_of(name)}: peak at the output of the gear, {words}"
+                getattr(effect, key), f"{study.title_of(name)}: peak at the output of the gear, {phrase}"
             )
-            for key, words in titles.items()
+            for key, phrase in titles.items()
         }
         for name, effect in effects.items()
     }
@@ -323,8 +323,8 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    words, caveat = class_words(study.relay_class), _tolerance(study)
-    trip_class = {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
+    title, caveat = class_words(study.relay_class), _tolerance(study)
+    trip_class = {"value": title, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
     if study.drive.star_delta is None:
         return MotorProtection(
             InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
@@ -344,11 +344,11 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
 def _tolerance(study: StudyRecord) -> str | None:
     """The class whose relay holds in each start of a motor at the tolerance of its current, in words; None if the
     ordered one does."""
-    found = StartFindings.found_in(study)
-    if found is None or found.stuck or study.relay_class > HEAVIEST:
+    starts = StartFindings.found_in(study)
+    if starts is None or starts.stuck or study.relay_class > HEAVIEST:
         return None
-    holding = class_holding(MORE_CURRENT**2 * found.relay_seconds, study.relay_class)
-    words = f"{'of ' if holding <= HEAVIEST else ''}{class_words(holding)}"
+    holding = class_holding(MORE_CURRENT**2 * starts.relay_seconds, study.relay_class)
+    phrase = f"{'of ' if holding <= HEAVIEST else ''}{class_words(holding)}"
     more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
-    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; one {words} holds"
+    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; one {phrase} holds"
     return None if holding == study.relay_class else said

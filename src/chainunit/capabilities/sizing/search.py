@@ -43,9 +43,9 @@ _WORSE_WITH_POWER = ("gear_start", "gear_service")
 """Checks that a larger motor makes worse."""
 
 
-def motors_on_offer(task: SizingTask, own: Sequence[CatalogueMotor]) -> list[CatalogueMotor]:
+def motors_on_offer(task: SizingTask, own_motors: Sequence[CatalogueMotor]) -> list[CatalogueMotor]:
     """The motors of the catalogue for the requested frequency with the requested numbers of poles, the smallest
-    first, with the user's `own` ones.
+    first, with the user's `own_motors`.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def motors_on_offer(task: SizingTask, own: Sequence[CatalogueMotor]) -> list[Cat
         for a catalogue that has no such motor, and as `check_ratios`.
     """
     limits, tables = task.plan.demands, task.tables
-    offered = own if task.plan.own_only else [*catalogue(), *own]
+    offered = own_motors if task.plan.own_only else [*catalogue(), *own_motors]
     motors = [m for m in offered if limits.poles_least <= m.nameplate.poles <= limits.poles_most]
     if not motors and task.plan.own_only:
         raise InputError(
@@ -67,18 +67,18 @@ def motors_on_offer(task: SizingTask, own: Sequence[CatalogueMotor]) -> list[Cat
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
-    known = sorted({float(m.nameplate.frequency) for m in motors})
+    frequencies = sorted({float(m.nameplate.frequency) for m in motors})
     motors = [m for m in motors if abs(m.nameplate.frequency / limits.frequency - 1.0) < _SAME_FREQUENCY]
     if not motors:
-        words = " or ".join(f'"{frequency:g} Hz"' for frequency in known)
+        text = " or ".join(f'"{frequency:g} Hz"' for frequency in frequencies)
         raise InputError(
             f"sizing.frequency = {limits.frequency:g} Hz: the catalogue has no such motor with so many poles; must "
-            f"be {words}",
+            f"be {text}",
             "sizing.frequency",
         )
     if limits.gear_torque and not task.gears:
-        words = "sizing.gear_torque: is of gears of a catalogue; name one by catalogue, or leave it out"
-        raise InputError(words, "sizing.gear_torque")
+        text = "sizing.gear_torque: is of gears of a catalogue; name one by catalogue, or leave it out"
+        raise InputError(text, "sizing.gear_torque")
     if tables.start != "inverter" and "gear.ratio" not in tables.given:
         key = "sizing.ratios" if task.plan.ratios else "sizing.gear_kind"
         check_ratios(task.plan.offered, task.operation.crank_speed, motors, key)
@@ -132,7 +132,7 @@ def size(
             "power that its efficiency costs."
         )
     ends = _end_of_catalogue(best, motors), _cost_of_wishes(trials, strong, candidates, progress)
-    best.reason += "".join(f"; {words}" for words in ends if words)
+    best.reason += "".join(f"; {reason}" for reason in ends if reason)
     notes += [
         f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
         for c in candidates[1:]
@@ -156,10 +156,10 @@ def size(
 def _without_price(motors: Sequence[CatalogueMotor], gears: Sequence[CatalogueGear]) -> Iterator[str]:
     """The note on rows without a price, where the lowest price is wanted."""
     counts = {"motor": sum(m.price is None for m in motors), "gear": sum(g.price is None for g in gears)}
-    words = [f"{n} {noun}{'s' if n > 1 else ''}" for noun, n in counts.items() if n]
-    if words:
+    nouns = [f"{n} {noun}{'s' if n > 1 else ''}" for noun, n in counts.items() if n]
+    if nouns:
         have = "have" if sum(counts.values()) > 1 else "has"
-        yield f"{' and '.join(words)} of the catalogues {have} no price: drives with them come last."
+        yield f"{' and '.join(nouns)} of the catalogues {have} no price: drives with them come last."
     if not gears:
         yield "The catalogues have no gear: the price is that of the motor alone."
 
@@ -188,18 +188,18 @@ def check_ratios(
             return
         needed.setdefault(plate.poles, least)
     wanted = sorted((ratio, poles) for poles, ratio in needed.items())
-    near, _ = min(wanted, key=lambda each: abs(math.log(each[0] / nearest(each[0], ratios))))
-    words = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
+    near, _ = min(wanted, key=lambda pair: abs(math.log(pair[0] / nearest(pair[0], ratios))))
+    choices = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
     if key == "sizing.gear_kind":
         raise InputError(
             f'{key} = "none": no motor of the catalogue turns at {number(w, "rad/s", "speed")} on the line: '
-            f"a ratio of about {words} is needed; give another sizing.gear_kind, change run.crank_speed, or take an "
-            "inverter (start)",
+            f"a ratio of about {choices} is needed; give another sizing.gear_kind, change run.crank_speed, or take "
+            "an inverter (start)",
             key,
         )
     raise InputError(
         f"{key}: no ratio on offer brings the crank to {number(w, 'rad/s', 'speed')} with a motor of the "
-        f"catalogue: about {words} is needed, the nearest on offer is {nearest(near, ratios):g}; add such a ratio, "
+        f"catalogue: about {choices} is needed, the nearest on offer is {nearest(near, ratios):g}; add such a ratio, "
         "change run.crank_speed, or take an inverter (start)",
         key,
     )
@@ -294,17 +294,17 @@ def _least_power(
     powers = sorted({m.nameplate.power for m in motors})
     candidates: list[Candidate] = []
 
-    def of(power: float) -> list[CatalogueMotor]:
+    def motors_of(power: float) -> list[CatalogueMotor]:
         same = [m for m in motors if m.nameplate.power == power]
         return sorted(same, key=lambda m: poles_rank(m.nameplate.poles))
 
     def suffices_bare(n: int) -> bool:
-        motor = of(powers[n])[0]
+        motor = motors_of(powers[n])[0]
         says(motor)
         return not _is_weak(trials.candidates_of(motor, trials.with_least_boost)[-1])
 
     def suffices(n: int) -> bool:
-        for motor in of(powers[n]):
+        for motor in motors_of(powers[n]):
             says(motor)
             tries = trials.candidates_of(motor)
             candidates.extend(tries)
@@ -362,16 +362,16 @@ def _cost_of_wishes(
         return ""
     wheel = f"a flywheel of {other.flywheel_words}" if other.disc else "no flywheel"
     verb = "decide" if len(wishes) > 1 else "decides"
-    words = f"{names} {verb}: else {other.motor.designation} with {wheel} would do"
+    sentence = f"{names} {verb}: else {other.motor.designation} with {wheel} would do"
     if not best.fits:
-        return words
+        return sentence
     starts = [c.checks["gear_start"].value for c in (best, other) if "gear_start" in c.checks]
     if len(starts) == 2:
         here, there = (number(torque, "N.m") for torque in starts)
-        words += f", and its start would put {there} on the gear in place of {here}"
+        sentence += f", and its start would put {there} on the gear in place of {here}"
     if best.price is not None and other.price is not None:
-        words += f", at a price of {other.price:g} in place of {best.price:g}"
-    return words
+        sentence += f", at a price of {other.price:g} in place of {best.price:g}"
+    return sentence
 
 
 def _wishes_of(c: Candidate) -> set[str]:

@@ -188,8 +188,8 @@ class SizingPlan:
     def belt_factor(self, inertia_factor: float, start: str) -> float:
         """The service factor of a belt, of a motor with that `start`."""
         load, hours = self.load(inertia_factor), float(self.demands.hours)
-        own = belt_factor(load, hours, is_on_line=start == "direct")
-        return float(self.demands.service_factor) or own
+        factor = belt_factor(load, hours, is_on_line=start == "direct")
+        return float(self.demands.service_factor) or factor
 
     def service_words(self, inertia_factor: float) -> str:
         """The source of the service factor in words; see `gear_factor`."""

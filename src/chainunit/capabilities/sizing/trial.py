@@ -211,7 +211,7 @@ class Trial:
         if not plate.starts or self.drive.follows or self._first is None:
             return starts
         rise = self._from_rest.sel(time=slice(None, self._first))
-        of = starting_data(
+        data = starting_data(
             self.drive,
             plate,
             rise,
@@ -220,7 +220,7 @@ class Trial:
             bare=plate.starts,
             current=self._rms(f"motor.{self.drive.motor.current}"),
         )
-        return permitted_starts(of, starts).permitted
+        return permitted_starts(data, starts).permitted
 
     @property
     def _cooling(self) -> float:

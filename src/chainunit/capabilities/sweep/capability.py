@@ -67,11 +67,11 @@ class SweepCapability(Capability):
             "coupling_trip_time is of a torque limiter; add [coupling], or leave it out",
             has_entry("sweep.measures", "coupling_trip_time"),
         )
-        words = "need a model of the motor, which is an FMU; leave them out"
-        yield Rule("sweep.measures", MOTOR_FMU, words, has_entries("sweep.measures"))
+        reason = "need a model of the motor, which is an FMU; leave them out"
+        yield Rule("sweep.measures", MOTOR_FMU, reason, has_entries("sweep.measures"))
         for other in other_models():
-            words = f"{other.refusal}, or give measures"
-            yield Rule("sweep.quantities", other.on, words, has_entries("sweep.quantities"))
+            reason = f"{other.refusal}, or give measures"
+            yield Rule("sweep.quantities", other.on, reason, has_entries("sweep.quantities"))
 
     def plan(self, reading: FileReading) -> SweepPlan | None:
         """The plan of the table; None for a machine that was refused."""

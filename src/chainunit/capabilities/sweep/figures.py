@@ -50,7 +50,7 @@ def over_parameters(summary: SweepSummary) -> Iterator[fig.Figure]:
 def _levels(z: Any) -> tuple[float, ...]:
     """Even levels around the finite values, in rounded steps, at most `_CLASSES` + 1; levels that grow where values
     reach over decades, or where most of them would stand in one even class."""
-    low, most, high = (float(each) for each in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
+    low, most, high = (float(level) for level in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
     if not high - low > 1e-9 * max(abs(low), abs(high)):
         wide = max(abs(low), 1e-9)
         return (low - wide, low, low + wide)
@@ -83,8 +83,8 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     plan, dataset = summary.findings.plan, summary.findings.dataset
     across, up = plan.parameters
     order = {
-        each.name: np.argsort(each.values)[:: -(-len(each.values) // _MOST_OF_AXIS)]
-        for each in plan.parameters
+        parameter.name: np.argsort(parameter.values)[:: -(-len(parameter.values) // _MOST_OF_AXIS)]
+        for parameter in plan.parameters
     }
     part = dataset.isel(order).transpose(up.name, across.name)
     x, y, z = part[across.name].values, part[up.name].values, part[name].values
@@ -99,8 +99,8 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     items.append(fig.Curve("the study", [across.centre], [up.centre], 1, "o", has_line=False))
     if summary.best and name == plan.best:
         k = np.unravel_index(summary.findings.passed.best[0], plan.shape)
-        at = [float(each.values[int(i)]) for each, i in zip(plan.parameters, k, strict=True)]
-        items.append(fig.Curve(plan.best_is, [at[0]], [at[1]], 3, "s", has_line=False))
+        point = [float(parameter.values[int(i)]) for parameter, i in zip(plan.parameters, k, strict=True)]
+        items.append(fig.Curve(plan.best_is, [point[0]], [point[1]], 3, "s", has_line=False))
     ends = [{"low": float(axis[0]), "high": float(axis[-1])} for axis in (x, y)]
     panel = fig.Panel(_axis(across.variable, **ends[0]), _axis(up.variable, **ends[1]), tuple(items))
     return fig.Figure(
@@ -118,8 +118,8 @@ def _infeasible(summary: SweepSummary, x: Any, y: Any, reason: Any) -> Iterator[
     corners = np.stack([reason[:-1, :-1], reason[1:, :-1], reason[:-1, 1:], reason[1:, 1:]])
     worst = np.max(corners, axis=0)
     for look, code in enumerate(np.unique(worst[worst > 0])):
-        words = textwrap.shorten(str(summary.findings.task.reasons[int(code)]), _NARROW, placeholder=" ...")
-        yield fig.Hatch(words, x, y, worst == code, look)
+        title = textwrap.shorten(str(summary.findings.task.reasons[int(code)]), _NARROW, placeholder=" ...")
+        yield fig.Hatch(title, x, y, worst == code, look)
 
 
 def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
@@ -158,11 +158,11 @@ def _gaps(summary: SweepSummary, x: Any, reason: Any) -> Iterator[fig.Shade]:
     for part in np.split(np.arange(len(x)), edges):
         if reason[part[0]]:
             low, high = x[max(0, part[0] - 1)], x[min(len(x) - 1, part[-1] + 1)]
-            words = textwrap.shorten(
+            title = textwrap.shorten(
                 str(summary.findings.task.reasons[int(reason[part[0]])]), _NARROW, placeholder=" ..."
             )
             look = ("dark", "pale", "band")[int(reason[part[0]]) % 3]
-            yield fig.Shade(0.5 * (x[part[0]] + low), 0.5 * (x[part[-1]] + high), words, look=look)
+            yield fig.Shade(0.5 * (x[part[0]] + low), 0.5 * (x[part[-1]] + high), title, look=look)
 
 
 def _in_pairs(panels: list[fig.Panel]) -> tuple[tuple[fig.Panel | None, ...], ...]:
@@ -178,12 +178,15 @@ def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
     for k, some in enumerate(_pieces(summary.influences.items(), _MOST_PANELS)):
         panels = []
         for name, table in some:
-            size = {each: (of.share.value if of.share else 0.0, abs(of.rank)) for each, of in table.items()}
+            size = {
+                parameter: (influence.share.value if influence.share else 0.0, abs(influence.rank))
+                for parameter, influence in table.items()
+            }
             order = sorted(table, key=size.__getitem__, reverse=True)
-            shares = [table[each].share for each in order]
-            words = tuple("" if x is None else f"{100.0 * x.value:.0f} %" for x in shares)
-            ranks = [table[each].rank for each in order]
-            bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=words)
+            shares = [table[parameter].share for parameter in order]
+            labels = tuple("" if x is None else f"{100.0 * x.value:.0f} %" for x in shares)
+            ranks = [table[parameter].rank for parameter in order]
+            bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=labels)
             # beside the longest bars there is room for the words
             x = fig.Axis("rank correlation", low=-1.3, high=1.3, ticks=(-1.0, -0.5, 0.0, 0.5, 1.0))
             panels.append(

@@ -81,27 +81,27 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             s.line("; {=feasible} of them have results."),
         )
     )
-    for i, each in enumerate(s.result["reasons"]):
-        if each["points"]["value"]:
+    for i, entry in enumerate(s.result["reasons"]):
+        if entry["points"]["value"]:
             path = f"reasons.{i}"
             yield b.Judgement(
                 "warning", s.line(f"No result at {{{path}.share}} of the points: {{{path}.reason}}.")
             )
     for i in range(len(s.result["organs"])):
         path = f"organs.{i}"
-        words = s.line(
+        sentence = s.line(
             f"{{{path}.text}}: {{{path}.share}} of the points. The limit of the study's machine and feed "
         )
-        yield b.Judgement("warning", line(words, s.line(f"is {{{path}.limit}}.")))
+        yield b.Judgement("warning", line(sentence, s.line(f"is {{{path}.limit}}.")))
     if not s.result["feasible"]["value"]:
         yield b.Judgement("bad", "No point of the sweep has a result; take other ranges.", form="both")
 
 
 def _range(s: b.Source, name: str) -> Line:
-    path, words = f"parameters.{name}", Name(name)
+    path, title = f"parameters.{name}", Name(name)
     if s.result["parameters"][name]["tolerance"]["value"] is None:
-        return line(words, s.line(f" {{={path}.from}} to {{={path}.to}}"))
-    return line(words, s.line(f" {{={path}.study}} ± {{={path}.tolerance}}"))
+        return line(title, s.line(f" {{={path}.from}} to {{={path}.to}}"))
+    return line(title, s.line(f" {{={path}.study}} ± {{={path}.tolerance}}"))
 
 
 def _columns(names: list[str]) -> tuple[b.Column, ...]:
@@ -139,7 +139,7 @@ def _extremes(summary: SweepSummary) -> Iterator[b.Block]:
         b.TableRow(
             (
                 line(Name(name), f", {end}"),
-                *(_value(summary, ends[end], each) for each in (name, *parameters)),
+                *(_value(summary, ends[end], column) for column in (name, *parameters)),
             )
         )
         for name, ends in cited(summary).extremes.items()
@@ -156,24 +156,26 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     parameters, table = list(s.result["parameters"]), s.result["influences"]
     if not table or len(parameters) < 2:
         return
-    for name, of in table.items():
-        if not all(each["share"] for each in of.values()):
+    for name, influences in table.items():
+        if not all(influence["share"] for influence in influences.values()):
             continue
-        most = max(of, key=lambda each: of[each]["share"]["value"])
+        most = max(influences, key=lambda parameter: influences[parameter]["share"]["value"])
         path = f"influences.{name}.{most}"
-        words = f"{{name}}: {{most}} moves it most; alone it explains {{{path}.share}} of the variance."
-        yield b.Text(s.line(words, name=Name(name), most=Name(most)), form="long")
+        sentence = f"{{name}}: {{most}} moves it most; alone it explains {{{path}.share}} of the variance."
+        yield b.Text(s.line(sentence, name=Name(name), most=Name(most)), form="long")
 
-    def cell(name: str, each: str) -> Line:
-        if each not in table[name]:
+    def cell(name: str, parameter: str) -> Line:
+        if parameter not in table[name]:
             return "-"
-        path = f"influences.{name}.{each}"
-        if table[name][each]["share"] is None:
+        path = f"influences.{name}.{parameter}"
+        if table[name][parameter]["share"] is None:
             return s.line(f"{{{path}.rank:2}}")
         return s.line(f"{{{path}.rank:2}} ({{{path}.share:2}})")
 
-    rows = (b.TableRow((Name(each), *(cell(name, each) for name in table))) for each in parameters)
-    has_shares = any(each["share"] for of in table.values() for each in of.values())
+    rows = (
+        b.TableRow((Name(parameter), *(cell(name, parameter) for name in table))) for parameter in parameters
+    )
+    has_shares = any(influence["share"] for row in table.values() for influence in row.values())
     title = "Rank correlation"
     if has_shares:
         title += "; in brackets the share of the variance that the parameter explains alone"
@@ -181,8 +183,13 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     wide = [name for name, gap in summary.gaps.items() if gap > MOST_GAPS]
     if wide:
         worst = max(wide, key=lambda name: summary.gaps[name])
-        words = "No shares of the variance: up to {gap} of the points have no value, and the parameters of the others"
-        yield b.Text(s.line(f"{words} are not independent.", gap=number(cited(summary).gaps[worst])), "note")
+        sentence = (
+            "No shares of the variance: up to {gap} of the points have no value, and the parameters of the "
+            "others"
+        )
+        yield b.Text(
+            s.line(f"{sentence} are not independent.", gap=number(cited(summary).gaps[worst])), "note"
+        )
     if has_shares:
         yield _shares(s, parameters, table)
     yield b.Text(
@@ -198,15 +205,15 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
 def _shares(s: b.Source, parameters: list[str], table: Mapping[str, Any]) -> b.Table:
     """The shares of the variance with their intervals."""
 
-    def cell(name: str, each: str, key: str) -> Line:
-        if each not in table[name] or table[name][each][key] is None:
+    def cell(name: str, parameter: str, key: str) -> Line:
+        if parameter not in table[name] or table[name][parameter][key] is None:
             return "-"
-        return s.estimate(f"influences.{name}.{each}.{key}", ".low", ".high")
+        return s.estimate(f"influences.{name}.{parameter}.{key}", ".low", ".high")
 
     rows = (
-        b.TableRow((line(Name(each), f", {words}"), *(cell(name, each, key) for name in table)))
-        for each in parameters
-        for key, words in (("share", "alone"), ("total", "in all"))
+        b.TableRow((line(Name(parameter), f", {kind}"), *(cell(name, parameter, key) for name in table)))
+        for parameter in parameters
+        for key, kind in (("share", "alone"), ("total", "in all"))
     )
     title = "Shares of the variance: of a parameter alone, and in all with what it does together with others"
     return b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title, form="long")
@@ -221,21 +228,23 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     spread = x.spread.spread
     if not spread:
         return
-    quantiles = list(dict.fromkeys(key for of in summary.spread.spread.values() for key in of.quantiles))
+    quantiles = list(
+        dict.fromkeys(key for numbers in summary.spread.spread.values() for key in numbers.quantiles)
+    )
     rows = (
         b.TableRow(
             (
                 Name(name),
                 _value(summary, x.nominal, name) if name in x.nominal else "-",
-                number(of.mean, summary.digits(name)),
-                number(of.deviation),
+                number(numbers.mean, summary.digits(name)),
+                number(numbers.deviation),
                 *(
-                    number(of.quantiles[key], summary.digits(name)) if key in of.quantiles else "-"
+                    number(numbers.quantiles[key], summary.digits(name)) if key in numbers.quantiles else "-"
                     for key in quantiles
                 ),
             )
         )
-        for name, of in spread.items()
+        for name, numbers in spread.items()
     )
     of_study = (
         b.Column("at the study's values", "study"),
@@ -247,9 +256,9 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles", groups=groups)
     if summary.spread.evenly:
         ranges = join(map(Name, summary.spread.evenly))
-        words = " has no tolerance" if len(summary.spread.evenly) == 1 else " have no tolerance"
+        verb = " has no tolerance" if len(summary.spread.evenly) == 1 else " have no tolerance"
         yield b.Text(
-            line(ranges, words, ": the spread counts each of their values as equally frequent."), "note"
+            line(ranges, verb, ": the spread counts each of their values as equally frequent."), "note"
         )
     yield b.Text(
         s.line(
@@ -302,8 +311,10 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
             "note",
         )
     if summary.current_limit is not None:
-        words = "The current is at its limit, {=current_limit}, at the points with the largest current_peak."
-        yield b.Text(s.line(words), "note")
+        sentence = (
+            "The current is at its limit, {=current_limit}, at the points with the largest current_peak."
+        )
+        yield b.Text(s.line(sentence), "note")
     if s.result["made_anew"]:
         yield b.Text(s.line("{made_anew}."), "note")
     yield b.Text(s.line("All points: {store} (NetCDF)."), "fine", "long")

@@ -95,26 +95,32 @@ class SweepPlan:
     @property
     def shape(self) -> tuple[int, ...]:
         """The number of values of each parameter of a grid; of others the number of points."""
-        return tuple(len(each.values) for each in self.parameters) if self.is_grid else (self.points,)
+        return (
+            tuple(len(parameter.values) for parameter in self.parameters) if self.is_grid else (self.points,)
+        )
 
     @property
     def dims(self) -> tuple[str, ...]:
         """The dimensions of the results: the parameters of a grid, else ``point``."""
-        return tuple(each.name for each in self.parameters) if self.is_grid else ("point",)
+        return tuple(parameter.name for parameter in self.parameters) if self.is_grid else ("point",)
 
     def values(self, begin: int, end: int) -> dict[str, Any]:
         """The values of the parameters at the points from `begin` to `end` - 1, by name, shape (end - begin,)."""
         if self.is_grid:
             places = np.unravel_index(np.arange(begin, end), self.shape)
             return {
-                each.name: np.array(each.values)[k] for each, k in zip(self.parameters, places, strict=True)
+                parameter.name: np.array(parameter.values)[k]
+                for parameter, k in zip(self.parameters, places, strict=True)
             }
         size = len(self.parameters)
         if self.method == "sobol":
             shares = _sobol(self.seed, size)(begin, end)
         else:
             shares = _hypercube(self.seed, size, self.points)[begin:end]
-        return {each.name: each.of_share(u) for each, u in zip(self.parameters, shares.T, strict=True)}
+        return {
+            parameter.name: parameter.of_share(u)
+            for parameter, u in zip(self.parameters, shares.T, strict=True)
+        }
 
 
 @lru_cache(maxsize=4)

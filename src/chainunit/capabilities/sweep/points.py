@@ -85,8 +85,8 @@ class SweepTask:
     def reasons(self) -> list[StateReason]:
         """The reasons for which a point has no result, by their codes."""
         bounds = (
-            StateReason(ReasonKind.BOUNDS, each.name, each.variable.quantity.allowed_range)
-            for each in self.plan.parameters
+            StateReason(ReasonKind.BOUNDS, parameter.name, parameter.variable.quantity.allowed_range)
+            for parameter in self.plan.parameters
         )
         runs = (Cause.LEFT_BOUNDS, Cause.UNSETTLED) if self.plan.measures else ()
         return [*reasons_of(self.machine.model), *bounds, *map(StateReason, (Beside.BOUNDS, *runs))]
@@ -101,19 +101,19 @@ class SweepTask:
         import xarray as xr
 
         arrays = {name: xr.DataArray(x, dims="point") for name, x in values.items()}
-        own = {
+        varied = {
             name.partition(".")[2]: x for name, x in arrays.items() if name.startswith(("machine.", "feed."))
         }
-        if not own:
+        if not varied:
             # the shape of the results
             name, value = next(iter(self.machine.by_name.items()))
-            own = {name: xr.DataArray(np.full(len(next(iter(values.values()))), value), dims="point")}
+            varied = {name: xr.DataArray(np.full(len(next(iter(values.values()))), value), dims="point")}
         return evaluate(
             self.machine,
             self.quantities or [cycle_quantity("peak(crank_torque)", self.machine.model)],
             arrays.get(SPEED, self.crank_speed),
             self.feed,
-            own,
+            varied,
             self.plan.basis,
             self.plan.angles,
             workers=self.threads,
@@ -123,11 +123,11 @@ class SweepTask:
 
     def codes_of_turns(self, table: xr.Dataset) -> Any:
         """The codes of the sweep for those of `turns`, shape (points,)."""
-        known = len(reasons_of(self.machine.model))
-        names = {each.name.partition(".")[2]: each.name for each in self.plan.parameters}
+        count = len(reasons_of(self.machine.model))
+        names = {parameter.name.partition(".")[2]: parameter.name for parameter in self.plan.parameters}
         other = self.codes[Beside.BOUNDS, ""]
-        outside = (names.get(x, x) for x in table.reason.attrs["subjects"][known:])
-        codes = [*range(known), *(self.codes.get((ReasonKind.BOUNDS, name), other) for name in outside)]
+        outside = (names.get(x, x) for x in table.reason.attrs["subjects"][count:])
+        codes = [*range(count), *(self.codes.get((ReasonKind.BOUNDS, name), other) for name in outside)]
         return np.array(codes, np.int16)[table.reason.values]
 
     def digest(self) -> str:
@@ -173,23 +173,23 @@ def plain_name(name: str) -> str:
 
 def batch_of(plan: SweepPlan) -> int:
     """The number of points of a batch, a power of 2: some tenths of a second of work, and some 100 MB."""
-    has_ratio = any(each.name == "machine.ratio" for each in plan.parameters)
+    has_ratio = any(parameter.name == "machine.ratio" for parameter in plan.parameters)
     states = (_STATES_OF_RATIOS if has_ratio else _STATES) / plan.angles
     return _RUNS if plan.measures else 1 << max(4, int(math.log2(states)))
 
 
 def result_variables(task: SweepTask) -> list[ResultVariable]:
     """The results of a point: its parameters, its quantities and measures, and the reason why it has none."""
-    plan, known = task.plan, {v.name: v for v in Layout(Answers).variables}
-    words = [re.sub(r"[^\w.+@-]+", "_", str(reason)).strip("_") for reason in task.reasons]
+    plan, answers = task.plan, {v.name: v for v in Layout(Answers).variables}
+    flags = [re.sub(r"[^\w.+@-]+", "_", str(reason)).strip("_") for reason in task.reasons]
     return [
         *(
             ResultVariable(plain_name(p.name), p.variable.unit, p.variable.description)
             for p in plan.parameters
         ),
         *(ResultVariable(plain_name(q.name), q.unit, q.description) for q in task.quantities),
-        *(ResultVariable(name, known[name].unit, known[name].description) for name in plan.measures),
-        ResultVariable("reason", "1", "reason for which there is no result", "int16", flags=tuple(words)),
+        *(ResultVariable(name, answers[name].unit, answers[name].description) for name in plan.measures),
+        ResultVariable("reason", "1", "reason for which there is no result", "int16", flags=tuple(flags)),
     ]
 
 
@@ -199,9 +199,9 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
     values = plan.values(begin, end)
     table = task.turns(values)
     reason = task.codes_of_turns(table)
-    for each in plan.parameters:
-        inside = each.variable.quantity.admits(values[each.name])
-        reason[~inside] = task.codes[ReasonKind.BOUNDS, each.name]
+    for parameter in plan.parameters:
+        inside = parameter.variable.quantity.admits(values[parameter.name])
+        reason[~inside] = task.codes[ReasonKind.BOUNDS, parameter.name]
     results = {plain_name(name): x for name, x in values.items()}
     for name in plan.quantities:
         results[plain_name(name)] = np.where(
@@ -211,9 +211,9 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
         results |= {name: np.full(end - begin, np.nan) for name in plan.measures}
         sound = np.flatnonzero(reason == 0)
         if len(sound):
-            own = {name: x[sound] for name, x in values.items()}
+            sound_values = {name: x[sound] for name, x in values.items()}
             assert task.event is not None
-            measured, causes = measures(task.block, plan, task.event, own)
+            measured, causes = measures(task.block, plan, task.event, sound_values)
             for name, x in measured.items():
                 results[name][sound] = x
             reason[sound] = [task.codes[cause, ""] if cause else 0 for cause in causes]
@@ -294,12 +294,12 @@ class SweepFindings:
     @cached_property
     def variables(self) -> dict[str, Variable]:
         """Parameters and results by name."""
-        own = {each.name: each.variable for each in self.plan.parameters}
-        for each in self.task.quantities:
-            of_turn = Quantity(each.unit, each.description, kind=each.kind)
-            own[each.name] = Variable(each.name, each.description, of_turn)
+        declared = {parameter.name: parameter.variable for parameter in self.plan.parameters}
+        for quantity in self.task.quantities:
+            of_turn = Quantity(quantity.unit, quantity.description, kind=quantity.kind)
+            declared[quantity.name] = Variable(quantity.name, quantity.description, of_turn)
         measures = {v.name: v for v in Layout(Answers).variables}
-        return own | {name: measures[name] for name in self.plan.measures}
+        return declared | {name: measures[name] for name in self.plan.measures}
 
     def in_unit(self, name: str, value: float | None) -> InUnit:
         """A value of a parameter or result, with its unit."""
@@ -313,7 +313,7 @@ class SweepFindings:
         names = {plain_name(name): name for name in (*(p.name for p in plan.parameters), *self.results)}
         dataset = self.outcome.dataset.rename(names)
         dataset["reason"].attrs["reasons"] = [str(reason) for reason in self.task.reasons]
-        return dataset.set_coords([each.name for each in plan.parameters])
+        return dataset.set_coords([parameter.name for parameter in plan.parameters])
 
     def parts(self, names: Sequence[str]) -> Iterator[tuple[int, xr.Dataset]]:
         """The variables `names` of all points in parts, each with the number of its first point."""
@@ -339,9 +339,9 @@ class SweepFindings:
             best += [(float(x[k]), begin + int(k)) for k in order if np.isfinite(x[k])]
             best = sorted(best)[:BEST]
         extremes = {
-            name: (min(of)[1], max(of, key=lambda each: (each[0], -each[1]))[1])
-            for name, of in ends.items()
-            if of
+            name: (min(places)[1], max(places, key=lambda pair: (pair[0], -pair[1]))[1])
+            for name, places in ends.items()
+            if places
         }
         return PassedPoints(tuple(map(int, counts)), extremes, tuple(k for _, k in best))
 
@@ -354,8 +354,11 @@ class SweepFindings:
         plan, points = self.plan, self.points
         if not plan.is_grid:
             return points
-        about = {each.name: points[each.name].attrs for each in plan.parameters}
-        axes = {each.name: (each.name, list(each.values), about[each.name]) for each in plan.parameters}
+        about = {parameter.name: points[parameter.name].attrs for parameter in plan.parameters}
+        axes = {
+            parameter.name: (parameter.name, list(parameter.values), about[parameter.name])
+            for parameter in plan.parameters
+        }
         variables = {
             name: (plan.dims, x.values.reshape(plan.shape), x.attrs) for name, x in points.data_vars.items()
         }

@@ -42,18 +42,18 @@ class Sweepable:
     @classmethod
     def of(cls, machine: Any, feed: Any, run: Any, events: Mapping[str, Event]) -> Sweepable:
         """Those of a machine with its parameters, its feed, the table [run] and the events of a study."""
-        own = [
+        pairs = [
             *named_values(machine.p, "machine."),
             *named_values(feed, "feed."),
-            *(each for each in named_values(run, "run.") if each[0].name == SPEED),
+            *(pair for pair in named_values(run, "run.") if pair[0].name == SPEED),
             *(
-                each
+                pair
                 for name, event in events.items()
-                for each in named_values(event.p, f"event.{name}.")
-                if each[0].type == "Real"
+                for pair in named_values(event.p, f"event.{name}.")
+                if pair[0].type == "Real"
             ),
         ]
-        return cls({v.name: v for v, _ in own}, {v.name: x for v, x in own}, events)
+        return cls({v.name: v for v, _ in pairs}, {v.name: x for v, x in pairs}, events)
 
 
 def read_plan(
@@ -84,11 +84,14 @@ def read_plan(
     event = ""
     with faults.collected():
         event = _event(form, names, quantities.events)
-    known = (*results[0], *results[1])
-    best = form.best or known[0]
-    if best not in known:
-        words = f"must be one of the quantities and measures of the sweep: {', '.join(known)}{near_name(best, known)}"
-        faults.add([InputError(f"sweep.best = {shown(best)}: {words}", "sweep.best")])
+    result_names = (*results[0], *results[1])
+    best = form.best or result_names[0]
+    if best not in result_names:
+        reason = (
+            f"must be one of the quantities and measures of the sweep: {', '.join(result_names)}"
+            f"{near_name(best, result_names)}"
+        )
+        faults.add([InputError(f"sweep.best = {shown(best)}: {reason}", "sweep.best")])
     faults.refuse()
     basis = CycleBasis(**{v.name: getattr(table, v.name) for v in variables(CycleBasis)})
     return SweepPlan(
@@ -142,7 +145,7 @@ def _points(form: Any, points: int, parameters: list[SweptParameter]) -> int:
                 "sweep.points",
             )
         return points
-    product = math.prod(len(each.values) for each in parameters)
+    product = math.prod(len(parameter.values) for parameter in parameters)
     if product > _MOST_OF_GRID:
         raise InputError(
             f"sweep.parameter: the grid has {product:.3g} points: must be <= {_MOST_OF_GRID:.0e}; give fewer points, "
@@ -170,32 +173,32 @@ def _event(form: Any, names: list[str], events: Mapping[str, Event]) -> str:
     candidates = [form.event] if form.event else swept or running
     wrong = [name for name in (*candidates, *swept) if name not in running]
     if wrong or not candidates:
-        given, hint = (shown(wrong[0]), near_name(wrong[0], running)) if wrong else ('""', "")
-        words = f"must be one of the events in steady running: {', '.join(running) or 'none'}{hint}"
-        raise InputError(f"sweep.event = {given}: {words}", "sweep.event")
+        shown_name, hint = (shown(wrong[0]), near_name(wrong[0], running)) if wrong else ('""', "")
+        reason = f"must be one of the events in steady running: {', '.join(running) or 'none'}{hint}"
+        raise InputError(f"sweep.event = {shown_name}: {reason}", "sweep.event")
     if len({*candidates, *swept}) != 1:
-        words = f"must be given, one of {', '.join(dict.fromkeys((*candidates, *swept)))}; a sweep follows one event"
-        raise InputError(f"sweep.event: {words}", "sweep.event")
+        reason = f"must be given, one of {', '.join(dict.fromkeys((*candidates, *swept)))}; a sweep follows one event"
+        raise InputError(f"sweep.event: {reason}", "sweep.event")
     return candidates[0]
 
 
 def _parameter(entry: Entry, variable: Variable, centre: float, of_grid: bool) -> SweptParameter:
     """A parameter of the sweep, in the one of three forms that its entry has."""
-    given = entry.given
+    content = entry.given
     forms = [
         form
         for form in ("from", "values", "tolerance")
-        if form in given or (form == "from" and "to" in given)
+        if form in content or (form == "from" and "to" in content)
     ]
     if len(forms) != 1:
-        words = "take one of these ways only" if forms else "has no values"
-        line = f"{entry.place} ({variable.name}): {words}: from and to, values, or tolerance"
+        reason = "take one of these ways only" if forms else "has no values"
+        line = f"{entry.place} ({variable.name}): {reason}: from and to, values, or tolerance"
         raise InputError(line, entry.place)
     entry.more = f" ({variable.name})"
     if forms == ["values"]:
         _without(entry, "points", "is of from and to, or of a tolerance; leave it out")
         _without(entry, "distribution", "is of a tolerance; leave it out")
-        values = tuple(entry.quantity("values", variable, each) for each in given["values"])
+        values = tuple(entry.quantity("values", variable, value) for value in content["values"])
         if not values:
             entry.fault("values", "must have at least one value")
         if len(set(values)) < len(values):
@@ -203,7 +206,7 @@ def _parameter(entry: Entry, variable: Variable, centre: float, of_grid: bool) -
         return SweptParameter(variable, centre, values)
     wide = None
     if forms == ["tolerance"]:
-        wide = entry.quantity("tolerance", _tolerance_of(variable), given["tolerance"])
+        wide = entry.quantity("tolerance", _tolerance_of(variable), content["tolerance"])
         low, high = centre - wide, centre + wide
     else:
         low, high = (_end(entry, name, variable) for name in ("from", "to"))
@@ -213,10 +216,10 @@ def _parameter(entry: Entry, variable: Variable, centre: float, of_grid: bool) -
         _without(entry, "distribution", "is of a tolerance with points that are no grid; leave it out")
     if not of_grid:
         _without(entry, "points", "is of a grid; the number of all points is sweep.points")
-        distribution = given.get("distribution", "uniform")
+        distribution = content.get("distribution", "uniform")
         return SweptParameter(variable, centre, (), low, high, wide, distribution)
     usual = _VALUES if wide is None else _VALUES_OF_TOLERANCE
-    count = entry.quantity("points", _COUNT, given.get("points", usual))
+    count = entry.quantity("points", _COUNT, content.get("points", usual))
     entry.refuse()
     values = tuple(float(x) for x in np.linspace(low, high, int(count)))
     return SweptParameter(variable, centre, values, low, high, wide)
@@ -244,6 +247,6 @@ def _end(entry: Entry, name: str, variable: Variable) -> float:
     return math.nan
 
 
-def _without(entry: Entry, key: str, words: str) -> None:
+def _without(entry: Entry, key: str, reason: str) -> None:
     if key in entry.given:
-        entry.fault(key, words)
+        entry.fault(key, reason)

@@ -36,17 +36,17 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
     faults = Faults()
     if not rig.takes(event):
         faults.add([InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")])
-    known = rig.drive.simulated_machine.model.parameter_layout.names
-    for name in (each.name for each in plan.parameters):
-        words = ""
+    names = rig.drive.simulated_machine.model.parameter_layout.names
+    for name in (parameter.name for parameter in plan.parameters):
+        reason = ""
         if name == SPEED and not rig.drive.follows:
-            words = "changes no run, as the motor has the speed of its supply"
-        elif name.startswith("machine.") and name.partition(".")[2] not in known:
-            words = "is not of the drive"
+            reason = "changes no run, as the motor has the speed of its supply"
+        elif name.startswith("machine.") and name.partition(".")[2] not in names:
+            reason = "is not of the drive"
         elif name == _RATIO and rig.drive.whole_line:
-            words = "is not one number of the drive"
-        if words:
-            line = f"sweep.parameter: {name} {words}; leave it out, or sweep it without measures"
+            reason = "is not one number of the drive"
+        if reason:
+            line = f"sweep.parameter: {name} {reason}; leave it out, or sweep it without measures"
             faults.add([InputError(line, "sweep.parameter")])
     if not can_run():
         line = f"sweep.measures: need a C compiler ({COMPILERS}); install one, or leave them out"
@@ -56,7 +56,7 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
 
 def block_of(rig: Rig, plan: SweepPlan, event: Event) -> BlockRuns:
     """The compiled system of a rig whose values a sweep varies; see `check_drive`."""
-    varying = [full for each in plan.parameters for full in _of_system(each.name)]
+    varying = [full for parameter in plan.parameters for full in _of_system(parameter.name)]
     return BlockRuns(rig, [event], varying)
 
 

@@ -86,9 +86,11 @@ def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
     if not whole > 0.0:
         return Estimate(0.0, 0.0, 1.0)
     share = part / whole
-    own = phi[:, some] @ c[some]
-    others = phi[:, 1:] @ c[1:] - own
-    error = 2.0 * float(np.std(((1.0 - share) * own - share * others) * e)) / math.sqrt(len(e)) / whole
+    contribution = phi[:, some] @ c[some]
+    others = phi[:, 1:] @ c[1:] - contribution
+    error = (
+        2.0 * float(np.std(((1.0 - share) * contribution - share * others) * e)) / math.sqrt(len(e)) / whole
+    )
     reach, left = most * rest, (1.0 - most) * rest
     low = (part - reach) / (whole - reach + left) - _SIGMAS * error - _ROUNDING
     high = (part + reach) / max(part + reach, whole + reach - left) + _SIGMAS * error + _ROUNDING
@@ -111,7 +113,9 @@ def _terms(parameters: Sequence[SweptParameter]) -> Any:
     """The degrees of the terms in each parameter, shape (terms, parameters): the constant, then those of the least
     product of the degrees plus one (a hyperbolic cross)."""
     d = len(parameters)
-    most = [min(_DEGREE, len(each.values) - 1) if each.values else _DEGREE for each in parameters]
+    most = [
+        min(_DEGREE, len(parameter.values) - 1) if parameter.values else _DEGREE for parameter in parameters
+    ]
     rows: list[tuple[int, ...]] = []
 
     def add(row: list[int], begin: int, left: int) -> None:
@@ -136,9 +140,9 @@ def _terms(parameters: Sequence[SweptParameter]) -> Any:
 def _polynomials(parameters: Sequence[SweptParameter], x: Any, terms: Any) -> Any:
     """The terms at the points, shape (points, terms)."""
     phi = np.ones((len(x), len(terms)))
-    for i, each in enumerate(parameters):
-        own = _of_one(each, x[:, i], int(np.max(terms[:, i])))
-        phi *= own[:, terms[:, i]]
+    for i, parameter in enumerate(parameters):
+        polynomials = _of_one(parameter, x[:, i], int(np.max(terms[:, i])))
+        phi *= polynomials[:, terms[:, i]]
     return phi
 
 
@@ -151,14 +155,14 @@ def _of_one(parameter: SweptParameter, x: Any, degree: int) -> Any:
         t = (x - parameter.centre) / parameter.deviation
         return hermite_e.hermevander(t, degree) / np.sqrt([math.factorial(k) for k in range(degree + 1)])
     low, high = parameter.ends
-    own = legendre.legvander((2.0 * x - low - high) / (high - low), degree) * np.sqrt(
+    polynomials = legendre.legvander((2.0 * x - low - high) / (high - low), degree) * np.sqrt(
         2.0 * np.arange(degree + 1) + 1.0
     )
     if not parameter.values:
-        return own
+        return polynomials
     values = np.array(parameter.values)
-    at = legendre.legvander((2.0 * values - low - high) / (high - low), degree)
-    q, _ = np.linalg.qr(at)
+    matrix = legendre.legvander((2.0 * values - low - high) / (high - low), degree)
+    q, _ = np.linalg.qr(matrix)
     q *= math.sqrt(len(values)) * np.sign(q[0, 0])
     order = np.argsort(values)
     return q[order][np.searchsorted(values[order], x)]
@@ -179,7 +183,9 @@ def _fitted(phi: Any, y: Any) -> _Polynomial:
     grams, moments = [p.T @ p for p, _ in parts], [p.T @ v for p, v in parts]
     gram, moment = sum(grams), sum(moments)
     most = min(phi.shape[1], len(y) // 3, _CHOSEN)
-    paths = [_path(gram - g, moment - m, *own, most) for g, m, own in zip(grams, moments, parts, strict=True)]
+    paths = [
+        _path(gram - g, moment - m, *part, most) for g, m, part in zip(grams, moments, parts, strict=True)
+    ]
     best = int(np.argmin(np.sum([np.sum(path.errors**2, axis=0) for path in paths], axis=0)))
     errors = np.empty(len(y))
     for k, path in enumerate(paths):
@@ -208,16 +214,16 @@ def _path(gram: Any, moment: Any, phi: Any, y: Any, most: int) -> _Path:
     left, rest = size.copy(), moment.copy()
     basis, along, errors = np.zeros((len(gram), most)), np.zeros(most), np.empty((len(y), most))
     chosen: list[int] = []
-    at, e, term = np.zeros((len(y), most)), y.copy(), 0
+    columns, e, term = np.zeros((len(y), most)), y.copy(), 0
     while True:
         j, row = len(chosen), basis[term].copy()
         root = math.sqrt(left[term])
         basis[:, j] = (gram[:, term] - basis @ row) / root
-        at[:, j] = (phi[:, term] - at @ row) / root
+        columns[:, j] = (phi[:, term] - columns @ row) / root
         along[j] = rest[term] / root
         rest -= along[j] * basis[:, j]
         left -= basis[:, j] ** 2
-        e = e - along[j] * at[:, j]
+        e = e - along[j] * columns[:, j]
         errors[:, j:] = e[:, None]
         chosen.append(term)
         gain = np.where(left > 1e-6 * size, rest**2 / np.maximum(left, 1e-300), 0.0)

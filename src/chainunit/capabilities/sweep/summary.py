@@ -189,7 +189,7 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
     influences = _influences(findings, sample, gaps)
     rows = _rows(findings, sorted({*passed.best, *(k for ends in passed.extremes.values() for k in ends)}))
     # points are those of tolerances; a parameter without one is evenly distributed
-    has_spread = not plan.is_grid and any(each.tolerance is not None for each in plan.parameters)
+    has_spread = not plan.is_grid and any(parameter.tolerance is not None for parameter in plan.parameters)
     damaged, file = findings.outcome.damaged_batches, findings.outcome.file.name
     return SweepSummary(
         findings=findings,
@@ -212,7 +212,7 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
         basis=plan.basis,
         event=config.events[plan.event].title if plan.event else None,
         best_by=f"{plan.best_is} {plan.best}",
-        parameters={each.name: _range(each, plan.is_grid) for each in plan.parameters},
+        parameters={parameter.name: _range(parameter, plan.is_grid) for parameter in plan.parameters},
         results={name: {"description": findings.variables[name].description} for name in findings.results},
         nominal={name: findings.in_unit(name, x) for name, x in _nominal(findings).items()},
         extremes={
@@ -223,7 +223,9 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
         gaps={name: gaps[name] for name in influences},
         current_limit=_current_limit(findings),
         spread=SweepSpread(
-            [each.name for each in plan.parameters if each.tolerance is None] if has_spread else [],
+            [parameter.name for parameter in plan.parameters if parameter.tolerance is None]
+            if has_spread
+            else [],
             _spread(findings, sample) if has_spread else {},
         ),
         store=PointStore(made_anew(damaged, "points", file) if damaged else None, damaged, file),
@@ -244,17 +246,17 @@ class SweptStudy:
             return summary_of(self.findings)
 
 
-def _range(each: SweptParameter, is_grid: bool) -> SweptRange:
-    v, (low, high) = each.variable, each.ends
+def _range(parameter: SweptParameter, is_grid: bool) -> SweptRange:
+    v, (low, high) = parameter.variable, parameter.ends
     return SweptRange(
         description=v.description,
         unit=v.unit,
         kind=v.kind,
         low=low,
         high=high,
-        centre=each.centre,
-        tolerance=InUnit(each.tolerance, v.unit, "difference" if v.unit == "K" else v.kind),
-        distribution=each.distribution if each.tolerance is not None and not is_grid else None,
+        centre=parameter.centre,
+        tolerance=InUnit(parameter.tolerance, v.unit, "difference" if v.unit == "K" else v.kind),
+        distribution=parameter.distribution if parameter.tolerance is not None and not is_grid else None,
     )
 
 
@@ -283,7 +285,7 @@ def _influences(
     from scipy.stats import rankdata
 
     plan = findings.plan
-    parameters = {each.name: each for each in plan.parameters}
+    parameters = {parameter.name: parameter for parameter in plan.parameters}
     ranks = {name: rankdata(sample[name]) for name in parameters}
     table: dict[str, dict[str, Influence]] = {}
     for name in findings.results:
@@ -292,16 +294,16 @@ def _influences(
         if has.sum() < _LEAST or np.ptp(y[has]) <= 1e-12 * np.max(np.abs(y[has])):
             continue
         order = rankdata(y[has])
-        varying = [each for each in parameters if np.ptp(sample[each][has]) > 0.0]
+        varying = [full for full in parameters if np.ptp(sample[full][has]) > 0.0]
         shares: list[Shares] = []
         if plan.is_grid and len(y) == plan.points and has.all():
             shares = shares_on_grid(y.reshape([n for n in plan.shape if n > 1]))
         elif gaps[name] <= MOST_GAPS and has.sum() >= LEAST_POINTS:
-            x = np.stack([sample[each][has] for each in varying], axis=1)
-            shares = shares_of_points([parameters[each] for each in varying], x, y[has])
+            x = np.stack([sample[full][has] for full in varying], axis=1)
+            shares = shares_of_points([parameters[full] for full in varying], x, y[has])
         table[name] = {
-            each: Influence(_correlation(ranks[each][has], order), *map(_in_percent, own or (None, None)))
-            for each, own in zip_longest(varying, shares)
+            full: Influence(_correlation(ranks[full][has], order), *map(_in_percent, pair or (None, None)))
+            for full, pair in zip_longest(varying, shares)
         }
     return table
 
@@ -313,7 +315,7 @@ def _in_percent(share: Estimate | None) -> Estimate | None:
 def _nominal(findings: SweepFindings) -> dict[str, float]:
     """The quantities of a turn at the values of the study, by name."""
     plan, task = findings.plan, findings.task
-    turn = task.turns({each.name: np.array([each.centre]) for each in plan.parameters})
+    turn = task.turns({parameter.name: np.array([parameter.centre]) for parameter in plan.parameters})
     values = {name: float(np.ravel(turn[name].values)[0]) for name in plan.quantities}
     return {name: x for name, x in values.items() if np.isfinite(x)}
 
@@ -328,11 +330,11 @@ def _organs(findings: SweepFindings) -> list[tuple[SpeedLimit, int]]:
     empties = bool(plan.event) and config.events[plan.event].empties
     limits = limits_of_organs(task.machine, config.feed, units, empties=empties)
     if not limits or SPEED not in findings.points:
-        return [(each, plan.points) for each in passed_limits(limits, task.crank_speed)]
+        return [(limit, plan.points) for limit in passed_limits(limits, task.crank_speed)]
     counts = np.zeros(len(limits), np.int64)
     for _, some in findings.parts([SPEED]):
-        counts += [np.count_nonzero(each.passed(some[SPEED].values)) for each in limits]
-    return [(each, int(count)) for each, count in zip(limits, counts, strict=True) if count]
+        counts += [np.count_nonzero(limit.passed(some[SPEED].values)) for limit in limits]
+    return [(limit, int(count)) for limit, count in zip(limits, counts, strict=True) if count]
 
 
 def _current_limit(findings: SweepFindings) -> float | None:
@@ -356,9 +358,9 @@ def _spread(findings: SweepFindings, sample: Mapping[str, Any]) -> dict[str, Res
             findings.in_unit(name, float(np.mean(x))),
             findings.in_unit(name, float(np.std(x))),
             {
-                key: replace(each, unit=v.unit, kind=v.kind)
-                for key, each in estimates.items()
-                if each is not None
+                key: replace(estimate, unit=v.unit, kind=v.kind)
+                for key, estimate in estimates.items()
+                if estimate is not None
             },
         )
     return spread

@@ -267,8 +267,8 @@ class LineAnalysis:
     @derived()
     def resonance(self) -> Resonance:
         """The steady motion over the speed."""
-        found = self.resonances()
-        peaks = Peaks([speed for speed, _ in found], [torque for _, torque in found])
+        resonances = self.resonances()
+        peaks = Peaks([speed for speed, _ in resonances], [torque for _, torque in resonances])
         unstable, missing = self.unstable_ranges(), self.missing_ranges()
         return Resonance(self.speed, self.steady, peaks, self.rigid, unstable, missing)
 

@@ -124,9 +124,9 @@ def _campbell(analysis: LineAnalysis) -> fig.Figure:
         fig.Curve("order 1: parametric resonance at speed = k", ends, ends, 3),
         _running(analysis),
         *(
-            fig.Label(at, 0.5 * (low + high), "k" if n == 1 else f"k/{n}", "above")
-            for n, at in crossing_labels.items()
-            if analysis.slowest < at < analysis.fastest
+            fig.Label(speed, 0.5 * (low + high), "k" if n == 1 else f"k/{n}", "above")
+            for n, speed in crossing_labels.items()
+            if analysis.slowest < speed < analysis.fastest
         ),
     )
     y = fig.Axis("frequency", "rad/s", "frequency", low=0.0, high=1.7 * high)
@@ -177,7 +177,9 @@ def _stability(analysis: LineAnalysis) -> fig.Figure:
 def _resonance(analysis: LineAnalysis) -> fig.Figure:
     simulation, panels = analysis.simulation, []
     for shaft, static in ((2, analysis.static2), (3, analysis.rotation.load)):
-        steady, rigid = (np.asarray(getattr(of, f"peak{shaft}")) for of in (analysis.steady, analysis.rigid))
+        steady, rigid = (
+            np.asarray(getattr(motion, f"peak{shaft}")) for motion in (analysis.steady, analysis.rigid)
+        )
         items: list[fig.Item] = [
             fig.Curve("steady motion", analysis.speed, steady),
             fig.Curve("rigid shafts", analysis.speed, rigid, 2),
@@ -194,7 +196,9 @@ def _resonance(analysis: LineAnalysis) -> fig.Figure:
             items.append(fig.Mark(static, "load alone", axis="y", look=3))
         if shaft == 2:
             peaks = analysis.resonances()
-            items += [fig.Label(at, peak, number_words(peak, "N.m", digits=4), "above") for at, peak in peaks]
+            items += [
+                fig.Label(speed, peak, number_words(peak, "N.m", digits=4), "above") for speed, peak in peaks
+            ]
         # torques that are all zero get an axis that hides their roundoff
         largest = max(static, *(float(np.nanmax(y, initial=0.0)) for y in (steady, rigid)))
         low, high = (1e-3, 1.0) if largest < 1e-3 else (None, None)

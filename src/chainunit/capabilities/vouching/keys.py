@@ -50,17 +50,17 @@ def make_key(file: Path) -> tuple[Path, str]:
     secret = key.private_bytes(forms.Encoding.PEM, forms.PrivateFormat.PKCS8, forms.NoEncryption())
     public = key.public_key()
     text = public.public_bytes(forms.Encoding.PEM, forms.PublicFormat.SubjectPublicKeyInfo)
-    made: list[Path] = []
+    written: list[Path] = []
     try:
         for path, content, mode in ((file, secret, 0o600), (public_file, text, 0o644)):
             with writing(path):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-                made.append(path)
+                written.append(path)
                 with os.fdopen(handle, "wb") as stream:
                     stream.write(content)
     except BaseException:
-        for path in made:
+        for path in written:
             path.unlink(missing_ok=True)
         raise
     return public_file, fingerprint(public.public_bytes_raw())

@@ -55,12 +55,12 @@ class WatchCapability(Capability):
 
     def rules(self) -> Iterable[Rule]:
         """Recordings need models of motor and machine, and the observer the two sides of a chain unit."""
-        words = (
+        reason = (
             "is of the chain unit, and the machine is {machine}: the observer compares the feed and the force of two "
             "sides, which this machine does not have; leave it out. chainunit identify finds the loads of this "
             "machine from its recordings"
         )
-        yield Rule("watch", ~has_sides(), words)
+        yield Rule("watch", ~has_sides(), reason)
         yield Rule(
             "observer", ~has_sides(), "knows the chain unit, and the machine is {machine}; leave it out"
         )

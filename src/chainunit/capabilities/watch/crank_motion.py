@@ -69,9 +69,11 @@ def _counted_speed(recording: Recording, phi: Any) -> Any:
     return (phi[later] - phi[sooner]) / (recording.time[later] - recording.time[sooner])
 
 
-def _extended(time: Any, at: Any, values: Any) -> Any:
+def _extended(time: Any, places: Any, values: Any) -> Any:
     """Linear between the points, and beyond them on the lines through their first and last ones."""
-    inside = np.interp(time, at, values)
-    few = min(len(at), NEIGHBOURS + 1)
-    first, last = (np.polynomial.Polynomial.fit(at[s], values[s], 1) for s in (slice(few), slice(-few, None)))
-    return np.where(time < at[0], first(time), np.where(time > at[-1], last(time), inside))
+    inside = np.interp(time, places, values)
+    few = min(len(places), NEIGHBOURS + 1)
+    first, last = (
+        np.polynomial.Polynomial.fit(places[s], values[s], 1) for s in (slice(few), slice(-few, None))
+    )
+    return np.where(time < places[0], first(time), np.where(time > places[-1], last(time), inside))

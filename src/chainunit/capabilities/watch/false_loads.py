@@ -88,24 +88,29 @@ def false_loads(
     if sigma.shape != (len(names), len(names)):
         raise InputError(f"covariance: has the shape {sigma.shape}, must be {(len(names), len(names))}")
     symbols, phi, a = casadi.SX.sym("p", len(names)), casadi.SX.sym("phi"), casadi.SX.sym("a")
-    own = layout.from_names(dict(zip(names, casadi.vertsplit(symbols), strict=True)), p)
+    parameters = layout.from_names(dict(zip(names, casadi.vertsplit(symbols), strict=True)), p)
     u = Inputs(phi=phi, w=crank_speed * p.ratio)
     assert LoadObserver.state_layout is not None
     start = LoadObserver.start(casadi_(), p, u)
     free = balance(casadi_(), p, u, start)
     # with this offset the right machine has the acceleration
     offset = free.inertia * (free.acceleration - a * p.ratio)
-    b = balance(casadi_(), own, u, LoadObserver.state_layout.from_names({"torque_offset": offset}, start))
+    b = balance(
+        casadi_(), parameters, u, LoadObserver.state_layout.from_names({"torque_offset": offset}, start)
+    )
     # the torque that is missing at this acceleration, and its derivatives by the loads
     missing = b.inertia * (b.acceleration - a * p.ratio)
     rows = casadi.horzcat(*(b.inertia * g for g in b.gradient[1:]), casadi.jacobian(missing, symbols))
     function = casadi.Function("rows", [symbols, phi, a], [rows])
     values = layout.by_name(p)
     angles = np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
-    at = np.broadcast_to(np.asarray(acceleration, float), (ANGLES,))
-    known = [values[name] for name in names]
+    accelerations = np.broadcast_to(np.asarray(acceleration, float), (ANGLES,))
+    numbers = [values[name] for name in names]
     table = np.array(
-        [np.asarray(function(known, q * p.ratio, x)).ravel() for q, x in zip(angles, at, strict=True)]
+        [
+            np.asarray(function(numbers, q * p.ratio, x)).ravel()
+            for q, x in zip(angles, accelerations, strict=True)
+        ]
     )
     loads, errors = table[:, : len(LOADS)], table[:, len(LOADS) :]
     # the observer's machine has the error, the loads make up for it

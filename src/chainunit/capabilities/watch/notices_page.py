@@ -67,16 +67,16 @@ _SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
 def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
     """All events beside each other, for print."""
     events = [_event(study, name) for name in ObserverFindings.of_study(study).notices]
-    rows = zip(*(each.panels for each in events), strict=True)
+    rows = zip(*(figure.panels for figure in events), strict=True)
     panels = (
         tuple(
-            panel and replace(panel, title="" if k else each.title)
-            for each, (panel,) in zip(events, row, strict=True)
+            panel and replace(panel, title="" if k else figure.title)
+            for figure, (panel,) in zip(events, row, strict=True)
         )
         for k, row in enumerate(rows)
     )
-    words = "The load observer in every event"
-    return fig.Figure("observers", words, f"{words}: loads and imbalances.", tuple(panels), on_page=False)
+    title = "The load observer in every event"
+    return fig.Figure("observers", title, f"{title}: loads and imbalances.", tuple(panels), on_page=False)
 
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices)
@@ -98,17 +98,17 @@ def _event(study: StudyRecord, name: str) -> fig.Figure:
     def shares() -> Iterator[fig.Item]:
         for look, ground in enumerate(("feed", "force")):
             yield fig.Curve(f"of the {ground}", time, run[f"observer.grounds.{ground}"].values, look + 2)
-        yield from (fig.Mark(at, axis="y", look="limit") for at in (-1.0, 1.0))
+        yield from (fig.Mark(threshold, axis="y", look="limit") for threshold in (-1.0, 1.0))
 
     begin = fig.Mark(0.0, "event", look="thin")
     marks = [begin] if notice.time is None else [begin, fig.Mark(notice.time, "alarm")]
     panels = {_MASS: loads("material_mass"), _FORCE: loads("processing_force"), _SHARE: shares()}
-    words = run_names.title(study, name)
+    title = run_names.title(study, name)
     return fig.Figure(
         f"observer-{name.replace('_', '-')}",
-        words[:1].upper() + words[1:],
+        title[:1].upper() + title[1:],
         f"Estimated and true feed and processing force of both sides over time, and the imbalances in parts of their "
-        f"thresholds: {words}.",
+        f"thresholds: {title}.",
         fig.stacked(
             fig.Axis("time after the event", "s", low=low, high=float(time[-1])),
             ((axis, (*items, *marks)) for axis, items in panels.items()),

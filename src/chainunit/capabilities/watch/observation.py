@@ -100,9 +100,9 @@ def false_imbalance_of(
     values = estimates.values
     loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
     feed = Layout(type(usual)).from_names(loads, usual)
-    own = {name.removeprefix("machine."): x for name, x in values.items()}
-    known = machine.by_name | own | usual_loads(feed)
-    return false_imbalance(known, list(own), estimates.covariance, crank_speed)
+    machine_values = {name.removeprefix("machine."): x for name, x in values.items()}
+    parameters = machine.by_name | machine_values | usual_loads(feed)
+    return false_imbalance(parameters, list(machine_values), estimates.covariance, crank_speed)
 
 
 def false_imbalance(
@@ -118,8 +118,8 @@ def false_imbalance(
     crank_speed : mean speed of the crank [rad/s]
     """
     layout = LoadObserver.parameter_layout
-    known = [k for k, name in enumerate(names) if name in layout.names]
-    own = layout.from_names({name: x for name, x in values.items() if name in layout.names})
-    sigma = np.asarray(covariance)[np.ix_(known, known)]
-    loads = false_loads(own, [names[k] for k in known], sigma, crank_speed)
+    places = [k for k, name in enumerate(names) if name in layout.names]
+    parameters = layout.from_names({name: x for name, x in values.items() if name in layout.names})
+    sigma = np.asarray(covariance)[np.ix_(places, places)]
+    loads = false_loads(parameters, [names[k] for k in places], sigma, crank_speed)
     return {"uncertainty": loads.imbalance, "force_uncertainty": loads.force_imbalance}

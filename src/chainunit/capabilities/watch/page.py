@@ -89,22 +89,22 @@ def _opening(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
                 "of the machine are not bounded by those of {identification}."
             ),
         )
-    for name, of in (("signal", "signal"), ("speed", "measured speed")):
+    for name, noun in (("signal", "signal"), ("speed", "measured speed")):
         if (number(x.noise[name]).value or 0.0) > EXCESS_NOISE:
-            louder = f"The noise of the {of} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
+            louder = f"The noise of the {noun} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
             yield b.Judgement("warning", s.line(f"{louder}: the thresholds follow from the measured noise."))
-    for each in s.lines("constant_parts"):
+    for part in s.lines("constant_parts"):
         more = ": a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
-        yield b.Judgement("warning", line(each, more))
+        yield b.Judgement("warning", line(part, more))
     yield b.Judgement("remark", s.line("{file} is read with {understood}."))
     for k in range(len(s.result["gaps"])):
-        words = f"No rows from {{gaps.{k}.from:4}} to {{gaps.{k}.to:4}}: the observer starts anew behind this gap."
-        yield b.Judgement("remark", s.line(words))
+        sentence = f"No rows from {{gaps.{k}.from:4}} to {{gaps.{k}.to:4}}: the observer starts anew behind this gap."
+        yield b.Judgement("remark", s.line(sentence))
     if not s.result["alarms"]:
         yield b.Judgement("good", s.line("No alarm in {turns:3} turns ({duration:3})."))
-    for k, each in enumerate(s.result["alarms"]):
+    for k, alarm in enumerate(s.result["alarms"]):
         path = f"alarms.{k}"
-        if each["in_learning"]:
+        if alarm["in_learning"]:
             yield b.Text(
                 s.line(
                     "This alarm is within the time of learning: the recording may begin in an overload, or the "
@@ -134,14 +134,14 @@ def _opening(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
         )
         yield b.Text(f"The thresholds take the numbers of the machine for exact. {remedy}")
     else:
-        words = "Errors of the machine's parameters make"
+        sentence = "Errors of the machine's parameters make"
         if named:
-            words = "The machine's parameters are those of an identification. Their errors make"
+            sentence = "The machine's parameters are those of an identification. Their errors make"
         more = (
             "a false imbalance of {uncertainty:2} and {force_uncertainty:2} (standard deviations); the thresholds of "
             "feed and forces are wider by the factors {widening:3} and {force_widening:3}."
         )
-        yield b.Text(s.line(f"{words} {more}"))
+        yield b.Text(s.line(f"{sentence} {more}"))
 
 
 def _series(s: b.Source, name: str) -> Any:
@@ -149,7 +149,7 @@ def _series(s: b.Source, name: str) -> Any:
 
 
 def _loads(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
-    usual = [(words, x.usual[name]) for name, words in _USUAL.items() if name in x.usual]
+    usual = [(quantity, x.usual[name]) for name, quantity in _USUAL.items() if name in x.usual]
     yield from table(
         usual,
         ("quantity", lambda row: row[0]),
@@ -166,11 +166,11 @@ def _loads(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
         )
     time, axis = _series(s, "time"), fig.Axis("time", "s")
     panels = []
-    for name, words, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
+    for name, title, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
         courses = {side: _series(s, f"{side}.{name}") for side in ("left", "right")}
         low, high = _span(time, list(courses.values()))
         items = [fig.Curve(side, time, x, look) for look, (side, x) in enumerate(courses.items())]
-        y = fig.Axis(words, unit, low=low, high=high)
+        y = fig.Axis(title, unit, low=low, high=high)
         panels.append((fig.Panel(axis, y, (*_marks(s), *items)),))
     yield fig.Figure(
         "loads",
@@ -180,11 +180,11 @@ def _loads(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
         file=PICTURES[0],
     )
     panels = []
-    for name, words, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
+    for name, title, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
         x, limit = _series(s, f"imbalance.{name}"), _series(s, f"imbalance.{name}_threshold")
         low, high = _span(time, [x, limit, -limit])
         band = fig.Between("below the threshold", time, -limit, limit, "band")
-        y = fig.Axis(words, unit, low=low, high=high)
+        y = fig.Axis(title, unit, low=low, high=high)
         panels.append((fig.Panel(axis, y, (*_marks(s), band, fig.Curve("imbalance", time, x, 0))),))
     yield fig.Figure(
         "imbalance",
@@ -207,10 +207,10 @@ def _span(time: Any, courses: list[Any]) -> tuple[float, float]:
 def _marks(s: b.Source) -> Iterator[fig.Shade]:
     """The times of the alarms."""
     named = set[str]()
-    for each in s.result["alarms"]:
-        name = f"alarm, {each['side']}"
-        ends = each["begin"]["value"], each["end"]["value"]
-        yield fig.Shade(*ends, "" if name in named else name, look=f"{each['side']} alarm")
+    for alarm in s.result["alarms"]:
+        name = f"alarm, {alarm['side']}"
+        ends = alarm["begin"]["value"], alarm["end"]["value"]
+        yield fig.Shade(*ends, "" if name in named else name, look=f"{alarm['side']} alarm")
         named.add(name)
 
 

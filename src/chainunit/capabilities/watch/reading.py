@@ -40,12 +40,12 @@ def read_watch(form: Any, crank_speed: float, source: str) -> WatchPlan:
     InputError
         with a line for each fault.
     """
-    given, usual = given_values(form), instance(WatchTable, {})
-    entry = Entry("watch", given)
-    if not given.get("file"):
+    content, usual = given_values(form), instance(WatchTable, {})
+    entry = Entry("watch", content)
+    if not content.get("file"):
         entry.fault("file", "must be given, the recording")
     read_span(entry)
     values = recording_values(entry, crank_speed, source)
-    values |= {name: float(given.get(name, getattr(usual, name))) for name in _NUMBERS}
-    file = given.get("identification")
+    values |= {name: float(content.get(name, getattr(usual, name))) for name in _NUMBERS}
+    file = content.get("identification")
     return WatchPlan(**values, identification=Path(source).parent / file if file else None)

@@ -132,8 +132,8 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
             learning=plan.learning,
         ),
         learned={
-            file_name(unknown.name): each
-            for unknown, each in fitted_values(watched.problem, watched.learned)
+            file_name(unknown.name): fitted
+            for unknown, fitted in fitted_values(watched.problem, watched.learned)
             # without the orders of a motion
             if ".order." not in unknown.name
         },
@@ -142,16 +142,16 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
         doubts=[
             *(() if watched.learned.is_ended else ("the fit still improved in its last round",)),
             *(
-                f"order {each.orders[0][0]} of the crank remains in {each.column}"
-                if each.reason == "orders"
-                else f"slow changes remain in {each.column}"
-                for each in watched.residual_tests
-                if not each.is_noise
+                f"order {test.orders[0][0]} of the crank remains in {test.column}"
+                if test.reason == "orders"
+                else f"slow changes remain in {test.column}"
+                for test in watched.residual_tests
+                if not test.is_noise
             ),
             *map(str, watched.prior_conflicts),
         ],
         of_feed_alone=watched.only_feed_differs,
-        alarms=[_alarm(watched, each) for each in watched.alarms],
+        alarms=[_alarm(watched, alarm) for alarm in watched.alarms],
         thresholds=_thresholds(watched),
         false_imbalance=FalseImbalance(*watched.uncertainty, *watched.widening),
         noise=dict(zip(("signal", "speed"), watched.noises, strict=True)),
@@ -179,18 +179,18 @@ def _thresholds(watched: WatchedRecording) -> Thresholds:
     return Thresholds(*(float(x) for pair in ends for x in pair))
 
 
-def _alarm(watched: WatchedRecording, each: Alarm) -> ReportedAlarm:
-    units, after = _units(), each.begin - float(watched.recording.time[0])
+def _alarm(watched: WatchedRecording, alarm: Alarm) -> ReportedAlarm:
+    units, after = _units(), alarm.begin - float(watched.recording.time[0])
     return ReportedAlarm(
-        side=each.side,
-        ground=GROUNDS[each.ground],
-        begin=each.begin,
-        end=each.end,
-        lasts=each.lasts,
+        side=alarm.side,
+        ground=GROUNDS[alarm.ground],
+        begin=alarm.begin,
+        end=alarm.end,
+        lasts=alarm.lasts,
         in_learning=after < watched.plan.learning,
         turn=after / watched.plan.turn,
-        at=each.at,
-        values={name: InUnit(x, units[name]) for name, x in each.values.items()},
+        at=alarm.at,
+        values={name: InUnit(x, units[name]) for name, x in alarm.values.items()},
     )
 
 
@@ -209,8 +209,8 @@ def _usual(watched: WatchedRecording) -> Iterator[tuple[str, UsualOutput]]:
 
     for name in OUTPUTS:
         if not name.endswith(("_deviation", "_threshold")):
-            of = (f"{name}{kind}" for kind in ("", "_deviation", "_threshold"))
-            yield name, UsualOutput(*(median(each, units[name]) for each in of))
+            names = (f"{name}{kind}" for kind in ("", "_deviation", "_threshold"))
+            yield name, UsualOutput(*(median(column, units[name]) for column in names))
 
 
 def _course(watched: WatchedRecording) -> dict[str, InUnit]:
@@ -229,5 +229,5 @@ def _units() -> dict[str, str]:
 
 def declared_outputs() -> dict[str, Variable]:
     """The declarations of the outputs and states of the observer, by name."""
-    layouts = [*(each.layout for each in LoadObserver.parts), LoadObserver.state_layout]
+    layouts = [*(block.layout for block in LoadObserver.parts), LoadObserver.state_layout]
     return {v.name: v for layout in layouts if layout is not None for v in layout.variables}

@@ -143,7 +143,7 @@ class WatchedRecording:
     def prior_conflicts(self) -> list[PriorConflict]:
         """The numbers of clock and sensors that are not as they are known, and feeds that are not as stated."""
         loads = prior_conflicts(self.problem.sought, self.learned)
-        named = (replace(each, name=file_name(each.name)) for each in loads)
+        named = (replace(conflict, name=file_name(conflict.name)) for conflict in loads)
         return [*sensor_conflicts(self.problem, self.learned), *named]
 
     @property
@@ -213,7 +213,7 @@ def watch(config: Config, progress: TaskProgress = quiet) -> WatchedRecording:
     learned_values = {u.name: float(x) for u, x in zip(problem.unknowns, learned.z, strict=True)}
     shaft = is_of_shaft(recording.columns)
     ratio = 1.0 if shaft else drive.ratio
-    angle = next(each.angle[0] for each in learned.comparisons if each.rows is not None)
+    angle = next(comparison.angle[0] for comparison in learned.comparisons if comparison.rows is not None)
     angle = float(angle) if "motor.count" in recording.columns else learned_values.get(MARK_ANGLE, 0.0)
     phi, w = crank_motion(recording, angle, drive.ratio)
     checks = tuple(residual_tests(learned))
@@ -303,15 +303,15 @@ def _parameters(
     """The parameters of the observer by name, by the recording of the begin; `louder` are the factors on the stated
     noise of signal and speed."""
     columns = recording.columns
-    own = drive.machine.by_name | {"ratio": ratio}
+    values = drive.machine.by_name | {"ratio": ratio}
     if is_of_shaft(columns):
         # the observer wants a rotor: at the crank its inertia and that of the crank are one
-        own |= {
-            "rotor.J": (1.0 - _LIGHT) * own["crank.I"],
-            "crank.I": _LIGHT * own["crank.I"],
+        values |= {
+            "rotor.J": (1.0 - _LIGHT) * values["crank.I"],
+            "crank.I": _LIGHT * values["crank.I"],
             "rotor.d": 0.0,
         }
-        own |= {
+        values |= {
             "signal.torque": 1.0,
             "signal.current": 0.0,
             "signal.zero": _zero(learned_values, "crank.tau"),
@@ -326,8 +326,8 @@ def _parameters(
             raise InputError(
                 f"{recording.source}: the load of this motor is watched by {' and '.join(missing)}, too; record it"
             )
-        own |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d} | weights(signals)
-        own |= {"signal.zero": signals.per_current * _zero(learned_values, "motor.i")}
+        values |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d} | weights(signals)
+        values |= {"signal.zero": signals.per_current * _zero(learned_values, "motor.i")}
         torque = signals.per_current * rms(columns["motor.i"])
         torque += signals.per_power * rms(columns["motor.power"]) if signals.per_power else 0.0
     layout = drive.machine.model.feed_layout
@@ -338,7 +338,7 @@ def _parameters(
         speed_noise=plan.noise * louder[1],
         rate=1.0 / recording.step,
     )
-    return own | tuning(table, feed, plan.crank_speed * ratio, torque)
+    return values | tuning(table, feed, plan.crank_speed * ratio, torque)
 
 
 def _zero(learned_values: Mapping[str, float], column: str) -> float:
@@ -444,11 +444,11 @@ def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
             rows = slice(first, last)
             shares = {name: sign * outputs[f"grounds.{name}"][rows] for name in ("feed", "force")}
             ground = max(shares, key=lambda name: float(np.max(shares[name])))
-            at = first + int(np.argmax(shares[ground]))
-            values = {name: float(x[at]) for name, x in outputs.items()}
+            place = first + int(np.argmax(shares[ground]))
+            values = {name: float(x[place]) for name, x in outputs.items()}
             begin, end = float(time[first]), float(time[last - 1])
             # an alarm begins on the ground that is beyond its threshold first
             first_ground = max(shares, key=lambda name: float(shares[name][0]))
             lasts = last == len(time)
-            alarms.append(Alarm(side, begin, end, first_ground, lasts, float(time[at]), values))
+            alarms.append(Alarm(side, begin, end, first_ground, lasts, float(time[place]), values))
     return sorted(alarms, key=lambda alarm: alarm.begin)
