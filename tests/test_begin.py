@@ -121,7 +121,7 @@ def test_a_ripple_that_the_line_makes_is_not_the_flywheels(done):
     assert own.speed_ripple == pytest.approx(np.ptp(crank) / np.mean(crank), rel=1e-2)
     assert own.speed_ripple > findings.permitted_fluctuation > own.motor_ripple and findings.least is None
     messages = {warning.code: warning.text for warning in study.warnings}
-    assert "make the bends equal" in messages["ripple-behind-flywheel"]
+    assert "Make the bends equal" in messages["ripple-behind-flywheel"]
     # nor is a heavier one praised with which the drive swings
     assert heavy.speed_ripple > 2.0 * own.speed_ripple and "0.100 kg m" in messages["heavier-flywheel-worse"]
     assert " at motor " in said_of(study)

@@ -6,7 +6,7 @@ import json
 import math
 import re
 import tomllib
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,7 +18,13 @@ from synthetic import HiddenRun, Logger, synthetic
 from chainunit import InputError, Study
 from chainunit.capabilities.identification import identification, suspects
 from chainunit.capabilities.identification import page as report
-from chainunit.capabilities.identification.result import _number, identified_tables, sentences
+from chainunit.capabilities.identification.information import Proposal
+from chainunit.capabilities.identification.result import (
+    IdentificationSummary,
+    _number,
+    identified_tables,
+    sentences,
+)
 from chainunit.capabilities.identification.study_method import IdentificationResult
 from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.errors import InterruptedRunError
@@ -30,6 +36,7 @@ from chainunit.recordings import fit as fitting
 from chainunit.recordings.measurands import MEASURANDS
 from chainunit.recordings.unknown import Unknown
 from chainunit.report import blocks
+from chainunit.report.cited import cited
 from chainunit.report.console import Forecast, carry_out
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
@@ -289,14 +296,19 @@ def test_a_speed_that_wanders_is_refused_where_its_changes_are_not_stated(tmp_pa
 def test_further_runs_beside_numbers_that_are_all_determined():
     """No run can determine one more of them."""
 
-    def shown(told):
-        numbers = {"told": told, "sought": 3.0, "told_at_start": 2.0}
-        proposals = [
-            {"text": "empty", "factor": {"value": 1.2, "unit": "1"}, "told": {"value": 2.0, "unit": "1"}}
-        ]
-        result = {name: {"value": x, "unit": "1"} for name, x in numbers.items()}
-        result |= {"blind": [], "combinations": [], "proposals": proposals}
-        return str(list(report._limits(blocks.Source(result))))
+    def shown(determined):
+        parts = {
+            **dict.fromkeys(field.name for field in fields(IdentificationSummary)),
+            "told": determined,
+            "sought": 3,
+            "told_at_start": 2,
+            "blind": [],
+            "combinations": [],
+            "proposals": (Proposal("empty", 1.2, 2),),
+        }
+        numbers = {name: {"value": parts[name], "unit": "1"} for name in ("told", "sought", "told_at_start")}
+        source = blocks.Source(numbers | {"blind": []})
+        return str(list(report._limits(source, cited(IdentificationSummary(**parts)))))
 
     assert "None of these runs determines one more number" in shown(2.0) and "without one" in shown(2.0)
     assert "None of these runs" not in shown(3.0) and "would make the numbers sharper" in shown(3.0)
