@@ -142,7 +142,6 @@ def test_both_routes_to_the_torque_and_the_power_balance(name):
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
-@pytest.mark.slow
 @pytest.mark.parametrize("make", ["python", "native 2", "native 3"])
 @pytest.mark.parametrize("name", ["double_rocker", "watt"])
 def test_fmus_agree_with_the_independent_solution_and_refuse_an_angle_outside(name, make, tmp_path):

@@ -120,6 +120,27 @@ NEEDED = {"cryptography", "fmpy", "numpy", "pydantic", "rich", "typer"}
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "vouching.md"
 
 
+REFUSED = """
+import fmpy
+from chainunit.app.cli import app
+
+app(["verify", "it.fmu", "--key", "chainunit.key.pub"], standalone_mode=False)
+for _ in range(20):
+    try:
+        fmpy.simulate_fmu("it.fmu", stop_time=0.01, start_values={"l": -1.0})
+    except fmpy.fmi1.FMICallException as error:
+        print(error)
+"""
+
+
+@pytest.mark.compiler
+def test_an_fmu_can_tell_its_refusal_after_a_verification(made):
+    """Its message ran a logger of the verification that was gone: a crash of the whole process."""
+    run = subprocess.run([sys.executable, "-c", REFUSED], cwd=made, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.count("fmi2EnterInitializationMode failed") == 20
+
+
 @pytest.mark.compiler
 def test_a_receiver_needs_few_packages(made):
     """The others, as casadi, are not to be had for every machine."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,7 @@ from ...core.errors import InputError, RunError, printable
 from ...core.files import full, scratch
 from ...core.native.compilers import COMPILERS, compiler
 from ...core.quantities import Type
-from ...fmu.loading import loading
+from ...fmu.loading import fmi2_callbacks, loading
 from ...fmu.native.platforms import build_here, units_of
 
 TYPES: Mapping[str, Type] = {
@@ -179,6 +179,25 @@ class TimeTable(NamedTuple):
     values: Any
 
 
+def _instance(fmu: UnpackedFmu, keep: Callable[..., None]) -> Any:
+    """An instance of an FMU whose messages go to `keep`. The loggers that fmpy makes for FMI 2.0 share one pointer in
+    C, which outlives them: a later message of any FMU in the process would run freed memory."""
+    from fmpy import fmi2, instantiate_fmu
+
+    if fmu.description.fmiVersion != "2.0":
+        return instantiate_fmu(
+            str(fmu.folder), fmu.description, "CoSimulation", logger=keep, require_functions=False
+        )
+    instance = fmi2.FMU2Slave(
+        guid=fmu.description.guid,
+        unzipDirectory=str(fmu.folder),
+        modelIdentifier=fmu.description.coSimulation.modelIdentifier,
+        requireFunctions=False,
+    )
+    instance.instantiate(callbacks=fmi2_callbacks(keep))
+    return instance
+
+
 def simulated(
     fmu: UnpackedFmu, start: Mapping[str, float], outputs: Sequence[str], inputs: TimeTable | None = None
 ) -> TimeTable:
@@ -206,11 +225,13 @@ def simulated(
         )
     try:
         with loading():
+            instance = _instance(fmu, keep)
             result = simulate_fmu(
                 str(fmu.folder), validate=False, start_time=0.0, stop_time=end, output_interval=step,
-                fmi_type="CoSimulation", start_values=dict(start), input=signals, output=list(outputs), logger=keep,
-                model_description=fmu.description, set_stop_time=False,
+                fmi_type="CoSimulation", start_values=dict(start), input=signals, output=list(outputs),
+                model_description=fmu.description, set_stop_time=False, fmu_instance=instance,
             )  # fmt: skip
+            instance.freeInstance()
     except Exception as error:  # fmpy has no class of its own
         cause = log[-1] if log else printable(str(error).replace(f"{fmu.folder}/", ""), 300)
         raise RunError(f"{fmu.name} does not run on this machine: {cause}") from error
