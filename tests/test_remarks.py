@@ -29,6 +29,8 @@ def test_the_reference_lists_each_declared_remark():
     (section,) = (each for each in reference((), {}).sections if each.name == "remarks")
     assert [row.cells[0] for row in section.blocks[1].rows] == [each.code for each in declared_remarks()]
     assert set(codes) <= {each.code for each in declared_remarks()}
+    # a switch of a sentence, as in "stalls it{turns}.", was shown
+    assert not [row for row in section.blocks[1].rows if re.search(r"[a-z]\{", " ".join(map(str, row.cells)))]
 
 
 def test_a_sentence_is_short_and_has_one_clause():

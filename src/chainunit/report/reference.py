@@ -4,6 +4,7 @@ tables that follow from the declarations."""
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, get_type_hints
 
@@ -169,6 +170,10 @@ def _parts(result_type: type) -> Table:
     return Table(tuple(rows), heads("name", "unit", "meaning"), numeric=False)
 
 
+_ADDED = re.compile(r"(?<=\w)\{\w+\}(?=\.)")
+"""What a remark adds to the end of a sentence in some studies, and the switches of sentences."""
+
+
 def _remarks() -> Iterator[Block]:
     """A row for each declared remark."""
     meanings = "; ".join(f"{severity}: {meaning}" for severity, meaning in SEVERITIES.items())
@@ -178,8 +183,8 @@ def _remarks() -> Iterator[Block]:
             (
                 remark.code,
                 remark.severity,
-                of_driver(" ".join(remark.sentences)),
-                of_driver(remark.remedy) or "-",
+                _ADDED.sub("", of_driver(" ".join(remark.sentences))),
+                _ADDED.sub("", of_driver(remark.remedy)) or "-",
                 ", ".join(f"{name} [{size.unit}]" for name, size in remark.sizes.items()) or "-",
             )
         )

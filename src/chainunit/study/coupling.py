@@ -136,7 +136,7 @@ _OPENS_IN_TRANSIENT = warning(
     "coupling-opens-in-transient",
     "The torque limiter is set to {trip}, and load and acceleration put {start} on it in a start at most. The "
     "{transient}, with {most} at most ({where}).",
-    *(f"{sentence}." for sentence in TRIPS_IN_TRANSIENT.split(". ")),
+    f"{TRIPS_IN_TRANSIENT}.",
     sizes={"N.m": "trip start most"},
 )
 _NUISANCE = warning(

@@ -96,13 +96,13 @@ def _relay(w: Window) -> float | None:
     if w.phase is Phase.LOADED_START:
         current = w.drive.relay_current(w.since, current)
     before = w.steady.rms(w.current)
-    lasts = lasting_current(current, before if w.passes and not stalls(w) else None)
+    lasts = lasting_current(current, before if w.passes and _stall(w) is None else None)
     return relay_trip(w.since, current, setting, before, lasts, w.relay_class, TRIPS_AT)
 
 
-def stalls(w: Window) -> bool:
-    """Whether the crank stands after an overload."""
-    return stall(w.since, w.speed, w.normal_speed) is not None
+def _stall(w: Window) -> float | None:
+    """Time after an overload from which the crank stands [s], or None."""
+    return stall(w.since, w.speed, w.normal_speed)
 
 
 def _slack_time(w: Window) -> float | None:
@@ -355,9 +355,7 @@ class Answers:
     )
     shaking_moment: Value = measure("N.m", "shaking moment", lambda w: w.swing("machine.frame.moment"))
     torque_reserve: Value = measure("1", "reserve of torque", _reserve, kind="percent", during=_AT_SPEED)
-    stall_time: Value = measure(
-        "s", "{driver} stands after", lambda w: stall(w.since, w.speed, w.normal_speed), during=_EVENTS
-    )
+    stall_time: Value = measure("s", "{driver} stands after", _stall, during=_EVENTS)
     thermal_trip_time: Value = measure(
         "s", "thermal relay trips after, at the latest", _relay, during=_EVENTS
     )

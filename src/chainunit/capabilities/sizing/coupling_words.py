@@ -7,7 +7,13 @@ from collections.abc import Mapping, Sequence
 from ...core.descriptions import of_driver
 from ...core.quantities import variables
 from ...reading.text import aside, number
-from ...study.coupling import TRIPS_IN_TRANSIENT, at_motor_shaft, hardest_start, transient_of_starts
+from ...study.coupling import (
+    LESS_TORQUE,
+    TRIPS_IN_TRANSIENT,
+    at_motor_shaft,
+    hardest_start,
+    transient_of_starts,
+)
 from ...study.event_torques import running_peak, running_words
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
@@ -90,10 +96,11 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
             bound=_bound(study, setting),
         ) + _transient(study, setting)
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
+    less = number(LESS_TORQUE, "1", "percent", full=False)
     text = (
         f"Recommended torque limiter{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
         f"{_torque(setting.normal)} {cause} puts on it{by}; the warm motor gives {_torque(setting.motor)} at the "
-        f"{study.driver_noun}, and may give 10 % less by IEC 60034-1. It opens where "
+        f"{study.driver_noun}, and may give {less} less by IEC 60034-1. It opens where "
         f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."

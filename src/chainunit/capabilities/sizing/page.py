@@ -163,8 +163,8 @@ def _belt(x: OrderedBelt | None) -> Iterator[Line]:
         yield line(
             *("V-belt with a design power of ", number(x.design_power)),
             *(" (rated power of the motor times the belt service factor ", number(x.service_factor)),
-            *("), belt speed ", number(x.speed), ", ratio ", number(x.ratio)),
-            *(", pulleys of ", number(x.small_pulley), " and ", number(x.large_pulley), " (pitch diameters)"),
+            *("), belt speed ", number(x.speed), ", standard pulleys of ", number(x.small_pulley), " and "),
+            *(number(x.large_pulley), " (pitch diameters, ratio ", number(x.ratio), ")"),
         )
 
 
