@@ -84,7 +84,7 @@ class ModelInstance:
         self._settable, self._states, self._all = (frozenset(range(end)) for end in ends)
         self._known = self._settable
         self._read, self._growths = self._states, 0
-        """variables that were read, with all but outputs, and how often more outputs were"""
+        """the outputs that were read, with all other variables, and how often outputs were added"""
         self._p: list[float] | None = None
         self._derived: Sequence[float] | None = None
         """from the fixed parameters, which do not change after the initialization"""
@@ -273,7 +273,7 @@ class ModelInstance:
         try:
             self._known, outputs, function = _evaluation(self.model, references)
             values = function(self._p, self._inputs(), self._x, *self._more)
-            # the sum of finite numbers is finite, except of the largest, and takes a fifth of the time
+            # the sum of finite numbers is finite, except of the largest, and takes a third of the time
             if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
                 raise ArithmeticError
         except (ArithmeticError, ValueError):

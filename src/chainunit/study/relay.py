@@ -71,16 +71,18 @@ def protecting_class(
     hardest start heats a relay as `start_seconds` says. Other arguments as of `stall_trip`; the rotor of a warm motor
     may be locked for the `stall_time` [s]."""
 
+    named = {candidate.name: candidate for candidate in CLASSES}
+
     def protects(number: int) -> bool:
-        trip_class = next(candidate for candidate in CLASSES if candidate.name == str(number))
-        trip = stall_trip(trip_class, setting, before, stall_current)
+        trip = stall_trip(named[str(number)], setting, before, stall_current)
         return trip is not None and trip <= stall_time
 
     tolerant = class_holding(MORE_CURRENT**2 * seconds, least)
     if tolerant <= HEAVIEST and protects(tolerant):
         return tolerant
-    quick = next(candidate for candidate in CLASSES if candidate.name == str(QUICK))
-    saves = least == LIGHT and seconds <= quick.shortest and not protects(LIGHT) and protects(QUICK)
+    saves = (
+        least == LIGHT and seconds <= named[str(QUICK)].shortest and not protects(LIGHT) and protects(QUICK)
+    )
     return QUICK if saves else least
 
 

@@ -283,7 +283,8 @@ def test_the_torques_of_a_cold_and_of_a_warm_motor_have_their_names():
         (
             10,
             3.42,
-            "(20 % more current, the tolerance of IEC 60034-1, may trip it in a start; one of class 20 holds",
+            "(20 % more current, the tolerance of IEC 60034-1, may trip it in a start; one of class 20 holds, "
+            "but trips too late with the rotor locked",
         ),
         (30, 6.0, None),
         (30, 7.0, "one heavier than class 30 holds"),

@@ -342,13 +342,15 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
 
 
 def _tolerance(study: StudyRecord) -> str | None:
-    """The class whose relay holds in each start of a motor at the tolerance of its current, in words; None if the
-    ordered one does."""
+    """The class whose relay holds in each start of a motor at the tolerance of its current, with the reason why it is
+    not ordered (`chainunit.study.relay.protecting_class`), in words; None if it is."""
     starts = StartFindings.found_in(study)
     if starts is None or starts.stuck or study.relay_class > HEAVIEST:
         return None
     holding = class_holding(MORE_CURRENT**2 * starts.relay_seconds, study.relay_class)
-    phrase = f"{'of ' if holding <= HEAVIEST else ''}{class_words(holding)}"
+    phrase, late = f"one {class_words(holding)} holds", ""
+    if holding <= HEAVIEST:
+        phrase, late = f"one of {class_words(holding)} holds", ", but trips too late with the rotor locked"
     more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
-    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; one {phrase} holds"
+    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; {phrase}{late}"
     return None if holding == study.relay_class else said
