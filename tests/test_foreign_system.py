@@ -407,7 +407,7 @@ def test_a_study_with_a_motor_of_somebody_else(folder):
     assert foreign["motor"] == {"kind": "ForeignMotor.fmu", "title": "ForeignMotor.fmu"}
     assert "its reserve of torque is not known" in foreign["verdict"]["motor"]["text"]
     for text in ((folder / "foreign.txt").read_text(), (folder.parent / "foreign/result.md").read_text()):
-        for title in ("motor torque, peak", "motor current, RMS", "reserve of torque"):
+        for title in ("motor air-gap torque, peak", "motor current, RMS", "reserve of torque"):
             (cells,) = (
                 [cell.strip() for cell in re.split(r"[│|]", line)[2:-1]]
                 for line in text.splitlines()

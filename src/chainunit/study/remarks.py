@@ -388,8 +388,10 @@ _HAPPENINGS = {
             "The torque limiter opens after the event: {where}.",
             sizes={"s": "coupling_trip_time", "J": "energy_after_trip energy_behind"},
         ),
-        fault(
-            "not-recovered", "The speed does not return to its steady band within the time followed: {where}."
+        warning(
+            "not-recovered",
+            "The speed does not return to its steady band within the time followed: {where}.",
+            remedy="Follow it for more turns (turns in [[event]]).",
         ),
     )
 }
