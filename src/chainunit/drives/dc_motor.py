@@ -150,7 +150,7 @@ class DcMotorPoint(MotorPoint):
         self.di = (self.v - self.R * i - arm.k * w) / arm.L
         self.heat = self.R * i * i
         self.air_gap = arm.k * i
-        self.turn(p, u, x)
+        self.turn(xp, p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states after the derivatives of the shaft's states."""

@@ -37,7 +37,7 @@ class FreeRotorPoint(MotorPoint):
 
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
         self.air_gap, self.heat = 0.0, 0.0
-        self.turn(p, u, x)
+        self.turn(xp, p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """None beside the states of the shaft."""

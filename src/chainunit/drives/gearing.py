@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from ..core.ports import LoadPort, load_inertia, load_torque
 from ..core.quantities import Value, declaration, quantity
 
-W_REST = 1e-3
+W_REST = 1.0
 """Speed of the motor [rad/s] below which friction in the transmission fades out: at rest it has no direction."""
+_REST_OF_ROTOR = 0.1
+"""Least inertia that a rotor feels that a self-locking gear brakes, over its own."""
 
 START_FACTOR = 2.0
 """Permitted torque of a gear in a start, over its rated torque, where nobody gives it: catalogues of gears commonly
@@ -40,6 +43,11 @@ class Transmission:
         min=1.0,
         max=10.0,
     )
+
+    @property
+    def loss(self) -> float:
+        """Loss by load, as a share of the torque that it passes on."""
+        return float(1.0 / self.efficiency - 1.0)
 
     @property
     def start_limit(self) -> float:
@@ -77,6 +85,37 @@ def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:
     is torque (2 - 1/efficiency)/ratio: the same loss relieves the motor. Below an efficiency of 1/2 this part changes
     its sign, and the transmission is self-locking: the motor must help to turn it. At rest there is no loss.
     """
-    direction = w / xp.maximum(xp.abs(w), W_REST)
-    loss = (1.0 / t.efficiency - 1.0) * xp.abs(torque) * direction
-    return (torque + loss) / t.ratio + t.d * w
+    return (torque + lost_torque(xp, 1.0 / t.efficiency - 1.0, torque, w)) / t.ratio + t.d * w
+
+
+def lost_torque(xp: Any, loss: Any, torque: Any, w: Any) -> Any:
+    """Torque that the teeth or the belt lose [N m], of the `torque` that they pass on [N m] at the speed `w` of the
+    motor [rad/s]; the `loss` is `Transmission.loss`."""
+    return loss * xp.abs(torque) * _direction(xp, w)
+
+
+def _direction(xp: Any, w: Any) -> Any:
+    return w / xp.maximum(xp.abs(w), W_REST)
+
+
+def geared_motion(xp: Any, load: LoadPort, phi: Any, w: Any, J: Any, tau: Any, loss: Any) -> tuple[Any, Any]:
+    """Acceleration [rad/s2] of a rotor with the inertia `J` [kg m2], which the torque `tau` [N m] drives through a
+    gear with that `loss` against the load; and the torque [N m] that the gear passes on, see `lost_torque`:
+
+        J a = tau - torque - loss |torque| sign(w), torque = J_load a + tau_load
+
+    Both signs of the torque give an acceleration. The right one is the lower one of a rotor that turns forward, the
+    higher one of a rotor that turns backward.
+    """
+    torque, inertia = load_torque(load, phi, w), load_inertia(load, phi)
+    part = loss * _direction(xp, w)
+    driving = (tau - (1.0 + part) * torque) / _felt(xp, J, (1.0 + part) * inertia)
+    driven = (tau - (1.0 - part) * torque) / _felt(xp, J, (1.0 - part) * inertia)
+    sense = w / xp.maximum(xp.abs(w), 1e-9)
+    a = 0.5 * (driving + driven - sense * xp.abs(driving - driven))
+    return a, inertia * a + torque
+
+
+def _felt(xp: Any, J: Any, inertia: Any) -> Any:
+    """Inertia of rotor and load; the load of a self-locking gear counts against that of the rotor, in part."""
+    return xp.maximum(J + inertia, _REST_OF_ROTOR * J)

@@ -279,7 +279,7 @@ class InductionMotorPoint(MotorPoint):
             + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
         )
         self.cooling = _cooling(xp, p, x.w)
-        self.turn(p, u, x)
+        self.turn(xp, p, u, x)
         self._flux_rates(p, u, x, main, 6.0 * b * b * p.main.beta * p.main.beta / p.main.L)
 
     def _limit_current(self, xp: Any, p: Any, f: Any) -> None:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.engines import MATH
 from ..core.model import UNSTATED, Model
-from ..core.ports import LoadState, Start, flanges, load_terminal, shaft_motion
+from ..core.ports import LoadState, Start, flanges, load_terminal
 from ..core.quantities import Value, declaration, group, quantity
+from .gearing import geared_motion
 
 if TYPE_CHECKING:
     from .speed_control import Loop, Tuning
@@ -37,10 +38,24 @@ class Rotor:
 
 
 @declaration
+class GearOfMotor:
+    """The gear between the rotor and its load."""
+
+    loss: Value = quantity(
+        "1",
+        "loss by load, as a share of the torque that it passes on: 1/efficiency - 1",
+        default=0.0,
+        min=0.0,
+        max=20.0,
+    )
+
+
+@declaration
 class MotorParameters(Start):
     """Parameters of every motor."""
 
     rotor: Rotor = group(Rotor, "rotor", default=Rotor())
+    gear: GearOfMotor = group(GearOfMotor, "gear", default=GearOfMotor())
     ambient: Ambient = group(Ambient, "surroundings", default=Ambient())
 
 
@@ -57,7 +72,7 @@ class MotorOutputs:
     """The common outputs of motors besides their states."""
 
     a: Value = quantity("rad/s2", "rotor acceleration", nominal=100.0)
-    tau: Value = quantity("N.m", "torque given to the load at the shaft")
+    tau: Value = quantity("N.m", "torque given to the load at the shaft, after the loss of a gear")
     air_gap_tau: Value = quantity("N.m", "electromagnetic torque")
     supply_power: Value = quantity("W", "electric power taken", nominal=100.0)
     heat: Value = quantity("W", "copper losses", nominal=100.0)
@@ -70,10 +85,10 @@ class MotorPoint:
     air_gap: Any
     heat: Any
 
-    def turn(self, p: Any, u: Any, x: Any) -> None:
+    def turn(self, xp: Any, p: Any, u: Any, x: Any) -> None:
         """Compute the acceleration, and the torque given to the load."""
         driving = self.air_gap - p.rotor.d * x.w
-        self.a, self.tau = shaft_motion(u.load, x.phi, x.w, p.rotor.J, driving)
+        self.a, self.tau = geared_motion(xp, u.load, x.phi, x.w, p.rotor.J, driving, p.gear.loss)
 
     def warming(self, p: Any, winding: Any, T: Any, cooling: Any = 1.0) -> Any:
         """Rise of the temperature `T` [K] of a winding with the heat capacity `C` and the resistance `R_th` [K/s];

@@ -203,7 +203,7 @@ class SourcedLoop(DirectedLoop):
 
 def free(drive: Drive) -> Drive:
     """The drive with its motor switched off."""
-    rotor = FreeRotor.Parameters(rotor=drive.fmu_parameters.rotor)
+    rotor = FreeRotor.Parameters(rotor=drive.fmu_parameters.rotor, gear=drive.fmu_parameters.gear)
     return replace(
         drive,
         motor=FreeRotor,
@@ -211,6 +211,7 @@ def free(drive: Drive) -> Drive:
         added_inertia=0.0,
         gear_inertia=0.0,
         gear_friction=0.0,
+        gear_loss=0.0,
         feed_forward=False,
     )
 

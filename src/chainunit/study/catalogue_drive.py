@@ -73,7 +73,7 @@ def catalogue_drive(
     if gear_ratio is None and "gear.ratio" in tables.given:
         gear_ratio = tables.gear.ratio
     ratio = rated_speed / w if gear_ratio is None else gear_ratio
-    speed, drag = rated_speed, tables.gear.d
+    speed = rated_speed
     for _ in range(3):
         shaft = motor_side(numpy_(), gear_with(tables, ratio, offer), crank_torque, speed)
         mean = float(np.mean(shaft))
@@ -81,7 +81,6 @@ def catalogue_drive(
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
         if gear_ratio is None:
             ratio = speed / w
-        drag = (mean - float(np.mean(crank_torque)) / ratio) / speed
     if gear_ratio is None and offer.kind != "belt" and abs(ratio - 1.0) <= _NO_GEAR:
         return catalogue_drive(tables, machine, turn, motor, ambient, 1.0, offer)
     p = with_starter(tables, p, plate)
@@ -94,7 +93,8 @@ def catalogue_drive(
         follows,
         rated_current=plate.rated_current,
         gear_inertia=tables.gear.J,
-        gear_friction=drag,
+        gear_friction=tables.gear.d,
+        gear_loss=gear_with(tables, ratio, offer).loss,
         transmission=transmission_of(tables, ratio, offer),
         star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
     )

@@ -82,8 +82,7 @@ def pull_out(study: StudyRecord) -> float:
 
 def at_motor_shaft(study: StudyRecord, torque: float) -> float:
     """Torque at the motor's shaft [N m] for one at the crank [N m], with the loss of the gear by load."""
-    gear = study.config.drive.gear
-    return torque / study.drive.ratio / (gear.efficiency if study.drive.is_geared else 1.0)
+    return torque / study.drive.ratio * (1.0 + study.drive.gear_loss)
 
 
 LESS_TORQUE = 0.1

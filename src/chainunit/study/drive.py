@@ -65,7 +65,8 @@ class Drive:
 
     gear_inertia: float = 0.0
     gear_friction: float = 0.0
-    """inertia [kg m2] and friction [N m s/rad] of the gear of a catalogue motor, at the motor's shaft"""
+    gear_loss: float = 0.0
+    """inertia [kg m2], drag [N m s/rad] and `Transmission.loss` of the gear of a catalogue motor, at its shaft"""
 
     transmission: str = "gear"
     """its parts in a noun: "gear", "belt", "belt and gear", or "coupling" of a machine that turns with the motor"""
@@ -109,10 +110,10 @@ class Drive:
     def fmu_parameters(self) -> Any:
         """Parameters of the motor's FMU: the parameters of the motor, with gear and added inertia in the rotor."""
         p = self.parameters
-        if not (self.added_inertia or self.gear_inertia or self.gear_friction):
-            return p
-        J = p.rotor.J + self.gear_inertia + self.added_inertia
-        return replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + self.gear_friction))
+        if self.added_inertia or self.gear_inertia or self.gear_friction:
+            J = p.rotor.J + self.gear_inertia + self.added_inertia
+            p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + self.gear_friction))
+        return replace(p, gear=replace(p.gear, loss=self.gear_loss)) if self.gear_loss else p
 
     @property
     def rotor_inertia(self) -> float:

@@ -11,7 +11,7 @@ from ..core.quantities import Value, declaration, quantity
 from ..reading.results import part, result
 from .analysis import Analysis, Findings, Work
 from .drive import Drive
-from .readings import shaft_power
+from .readings import gear_loss, shaft_power
 from .record import StudyRecord
 from .remark import note
 from .verdict import STEADY
@@ -83,7 +83,7 @@ class GearAnalysis(Analysis):
     @staticmethod
     def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the drive has a gear with a loss."""
-        return drive.gear_friction > 0.0
+        return drive.gear_friction > 0.0 or drive.gear_loss > 0.0
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> GearFindings | None:
@@ -91,11 +91,11 @@ class GearAnalysis(Analysis):
         that lasts."""
         if STEADY not in study.answers:
             return None
-        drive, gear = study.drive, study.config.drive.gear
+        gear = study.config.drive.gear
         window = study.window(Phase.STEADY, study.steady)
         squared = window.mean(lambda drive, run: run[drive.motor_speed].values ** 2)
         warm = [findings.gear_loss for findings in study.findings.values() if findings.gear_loss is not None]
-        total, net = warm[0] if warm else drive.gear_friction * squared, study.answers[STEADY].power_mean
+        total, net = warm[0] if warm else window.mean(gear_loss), study.answers[STEADY].power_mean
         if net is None:
             return None
         without_load = min(total, gear.d * squared)

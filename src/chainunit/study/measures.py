@@ -229,9 +229,16 @@ class Answers:
         "N.m", "mean", lambda w: w.mean(crank_torque), of="{driver} torque", minor=True
     )
     motor_torque_peak: Value = measure(
-        "N.m", "peak", lambda w: w.largest("motor.air_gap_tau"), during=_ALL, of="motor air-gap torque", card=True
+        "N.m",
+        "peak",
+        lambda w: w.largest("motor.air_gap_tau"),
+        during=_ALL,
+        of="motor air-gap torque",
+        card=True,
     )
-    motor_torque_rms: Value = measure("N.m", "RMS", lambda w: w.rms("motor.air_gap_tau"), of="motor air-gap torque")
+    motor_torque_rms: Value = measure(
+        "N.m", "RMS", lambda w: w.rms("motor.air_gap_tau"), of="motor air-gap torque"
+    )
     power_peak: Value = measure(
         "W",
         "peak",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..drives.gearing import lost_torque
 from ..reading.text import number
 from ..system import shaft_torque, through
 from .arrays import peak
@@ -55,6 +56,12 @@ def shaft_power(drive: Drive, run: xr.Dataset) -> Any:
         return run[full].values
     torque, speed = motor_shaft(drive, run)
     return torque * speed
+
+
+def gear_loss(drive: Drive, run: xr.Dataset) -> Any:
+    """Power that the gear loses [W], shape (time,)."""
+    torque, w = run["motor.tau"].values, run["motor.w"].values
+    return lost_torque(np, drive.gear_loss, torque, w) * w + drive.gear_friction * w * w
 
 
 def crank_torque(drive: Drive, run: xr.Dataset) -> Any:
@@ -153,7 +160,8 @@ def pull_out_torque(drive: Drive, run: xr.Dataset, T: float) -> float:
     """Largest torque at the crank [N m] that the motor gives while a rising load slows it down from the mean state of
     a run until it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
     drive.needs_own("the pull-out torque")
-    return drive.motor.pull_out(drive.fmu_parameters, T, *_mean_supply(drive, run)) * drive.ratio
+    torque = drive.motor.pull_out(drive.fmu_parameters, T, *_mean_supply(drive, run))
+    return torque / (1.0 + drive.gear_loss) * drive.ratio
 
 
 def breakdown_speed(drive: Drive, run: xr.Dataset) -> float:

@@ -19,7 +19,7 @@ from ...core.messages import unit_behind
 from ...core.quantities import Layout, Value, declaration, quantity
 from ...drives.nameplate import Nameplate
 from ...study.drive import Drive
-from ...study.readings import crank_angle, crank_speed, shaft_power
+from ...study.readings import crank_angle, crank_speed, gear_loss, shaft_power
 from ...study.rig import Rig
 from ...study.start_up import start_up
 from ...study.window import Window
@@ -137,7 +137,7 @@ def _read(w: Window, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
     parts: dict[str, float | None] = dict.fromkeys(PLACES)
     parts["winding"] = w.mean("motor.heat")
     parts["windage"] = float(drive.parameters.rotor.d) * squared
-    parts["gear"] = drive.gear_friction * squared if drive.gear_friction else None
+    parts["gear"] = w.mean(gear_loss) if drive.gear_friction or drive.gear_loss else None
     parts["line"] = sum(w.mean(full) for full in line if full in turns) if drive.line else None
     if inverter is not None:
         parts["inverter"] = w.mean(lambda drive, run: inverter.loss(run))

@@ -126,11 +126,6 @@ def size(
     trials = _with_files(trials, strong[0], folder, progress, backend)
     candidates = _search(trials, strong, progress)
     best = candidates[0]
-    if best.drive.gear_friction:
-        notes.append(
-            f"The losses of the {best.drive.transmission} act as viscous drag on the motor shaft, with the mean "
-            "power that its efficiency costs."
-        )
     ends = _end_of_catalogue(best, motors), _cost_of_wishes(trials, strong, candidates, progress)
     best.reason += "".join(f"; {reason}" for reason in ends if reason)
     notes += [

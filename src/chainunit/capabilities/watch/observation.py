@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.quantities import Layout
+from ...drives.gearing import lost_torque
 from ...drives.terminal_signals import TerminalSignals, terminal_signals
 from ...machines.load_observer import LoadObserver
 from ...machines.machine import Machine
@@ -31,9 +32,11 @@ FORCE_CHANGE, FORCE_FLUCTUATION = 0.01, 0.005
 def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) -> Drive:
     """The drive with a load observer by that `table`, for a machine with this `feed` and `turn` in normal running."""
     p, speed = drive.fmu_parameters, turn.crank_speed * drive.ratio
-    torque = np.asarray(turn.crank_torque) / drive.ratio + p.rotor.d * speed
+    passed = np.asarray(turn.crank_torque) / drive.ratio
+    torque = passed + lost_torque(np, drive.gear_loss, passed, speed) + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
-    values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
+    friction = p.rotor.d + float(np.mean(lost_torque(np, drive.gear_loss, passed, speed))) / speed
+    values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": friction}
     values |= weights(signals) | tuning(table, feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}

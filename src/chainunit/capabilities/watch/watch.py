@@ -326,7 +326,8 @@ def _parameters(
             raise InputError(
                 f"{recording.source}: the load of this motor is watched by {' and '.join(missing)}, too; record it"
             )
-        values |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d} | weights(signals)
+        lost = abs(mean) * drive.gear_loss / (1.0 + drive.gear_loss)
+        values |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d + lost / w} | weights(signals)
         values |= {"signal.zero": signals.per_current * _zero(learned_values, "motor.i")}
         torque = signals.per_current * rms(columns["motor.i"])
         torque += signals.per_power * rms(columns["motor.power"]) if signals.per_power else 0.0

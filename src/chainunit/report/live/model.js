@@ -215,19 +215,6 @@ const liveModel = (data, equations) => {
     return sign === "+" ? x + y : sign === "-" ? x - y : sign === "*" ? x * y : x / y;
   };
 
-  // torque at the motor's shaft through a gear, see chainunit.drives.gearing.motor_side
-  const friction = (values) => {
-    const g = data.runs.gear_loss, at = turn(values), torque = at.columns.crank_torque, ratio = ratioOf(values);
-    const mean = means(torque), sizes = means(torque.map(Math.abs));
-    let speed = g.rated_speed, drag = g.drag;
-    for (let k = 0; k < 3; k++) {
-      const shaft = (mean + (1 / g.efficiency - 1) * sizes * Math.sign(speed)) / ratio + g.drag * speed;
-      speed = g.follows ? g.rated_speed : g.synchronous - ((g.synchronous - g.rated_speed) * shaft) / g.rated_torque;
-      drag = (shaft - mean / ratio) / speed;
-    }
-    return g.friction + drag;
-  };
-
   // runs of which each goes on where the one before ends, as one
   const joined = (runs) => {
     const all = { made: 1 - runs.length, wanted: 1 - runs.length };
@@ -272,7 +259,6 @@ const liveModel = (data, equations) => {
         const own = rotor < 0 ? of.rotor.own : values[rotor];
         k.set(of.rotor.name, own + of.rotor.rest + (added < 0 ? of.rotor.added : values[added]));
       }
-      if (of.gear_loss) k.set(of.gear_loss.parameter, friction(values));
       if (of.derived) {
         prepare(values);
         k.k.set(turnKernel.k);

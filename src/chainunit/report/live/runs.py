@@ -9,7 +9,6 @@ from typing import Any
 
 from ...core.printing.javascript import model_text
 from ...core.quantities import Layout, named_values, variable_of
-from ...drives.catalogue import CatalogueMotor
 from ...reading.text import Units
 from ...study.block_runs import names_read
 from ...study.drive import Drive
@@ -74,11 +73,8 @@ def live_runs(
     operation: OperatingConditions,
     events: Mapping[str, Event],
     units: Units,
-    plate: CatalogueMotor | None = None,
-    gear: Any = None,
 ) -> LiveRuns:
-    """The runs of a drive for which `reason_without_runs` is empty; a motor of the catalogue has its `plate` and its
-    `gear`."""
+    """The runs of a drive for which `reason_without_runs` is empty."""
     rig = Rig(operation, drive, None).plain
     system = CompiledSystem(rig.graph)
     model = system.model
@@ -136,7 +132,6 @@ def live_runs(
             "added": float(drive.added_inertia),
             "rest": float(drive.gear_inertia),
         },
-        "gear_loss": None if plate is None else _gear_loss(plate, gear, drive),
         "events": [_event(rig, event) for event in taken],
         "results": list(_results(drive, units, "machine.rocker.tau" in columns)),
     }
@@ -146,21 +141,6 @@ def live_runs(
 
 def _profile(signal: Profile) -> dict[str, Any]:
     return {"start": float(signal.start), "changes": [list(map(float, change)) for change in signal.changes]}
-
-
-def _gear_loss(plate: CatalogueMotor, gear: Any, drive: Drive) -> dict[str, Any]:
-    """The numbers from which the friction of the shaft follows, see `chainunit.study.catalogue_drive`."""
-    nameplate = plate.nameplate
-    return {
-        "parameter": "motor.rotor.d",
-        "friction": float(drive.parameters.rotor.d),
-        "efficiency": float(gear.efficiency),
-        "drag": float(gear.d),
-        "follows": drive.follows,
-        "synchronous": float(nameplate.synchronous),
-        "rated_speed": float(nameplate.speed),
-        "rated_torque": float(nameplate.torque),
-    }
 
 
 def _event(rig: Rig, event: Event) -> dict[str, Any]:

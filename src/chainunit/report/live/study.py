@@ -55,7 +55,7 @@ def of_study(
     why, runs = reason_without_runs(drive), None
     plate = proposal.motor if proposal is not None else config.plate
     if not why:
-        runs = live_runs(drive, config.operation, config.events, units, plate, tables.gear)
+        runs = live_runs(drive, config.operation, config.events, units)
     model_names = runs.names if runs else set()
     chosen = [*of_machine("feed", config.feed, model_names)]
     if drive.follows or drive.foreign is not None:
