@@ -40,17 +40,22 @@ def need_of(
 
 
 def inverter_need(study: StudyRecord) -> InverterNeed | None:
-    """The inverter of a study, by its runs and those of the choice; None on the line."""
+    """The inverter of a study, by its runs and those of the choice; None on the line. An overload that opens a
+    recommended torque limiter counts until the limiter opens."""
     rated, overload = study.drive.rated_current, study.config.drive.starter.overload
     if rated is None or study.config.drive.start != "inverter":
         return None
     named = (("start_up", study.start), *study.answers.items())
     peaks = {study.title_of(name): a.current_peak for name, a in named if a and a.current_peak is not None}
+    for findings in study.findings.values():
+        for name, current in findings.currents_until_trip(study).items():
+            del peaks[study.title_of(name)]
+            peaks[f"{study.title_of(name)}, with the torque limiter"] = current
     lasting: list[float] = []
-    if findings := StartFindings.found_in(study):
-        worst = max(findings.starts, key=lambda start: start.current)
+    if starts := StartFindings.found_in(study):
+        worst = max(starts.starts, key=lambda start: start.current)
         peaks[f"a start from {number(worst.angle, 'rad')}"] = worst.current
-        lasting = [start.long_current for start in findings.starts]
+        lasting = [start.long_current for start in starts.starts]
     steady = study.answers.get(STEADY)
     need = need_of(rated, None if steady is None else steady.current_rms, lasting, peaks, overload)
     chosen = None if study.proposal is None else study.proposal.inverter_current

@@ -229,6 +229,11 @@ class Findings(ABC):
         makes it; None without such runs."""
         return None
 
+    def currents_until_trip(self, study: StudyRecord) -> Mapping[str, float]:
+        """By overload, the largest current of the motor [A] until a torque limiter opens that these findings
+        recommend."""
+        return {}
+
     @classmethod
     def found_in(cls, study: StudyRecord) -> Self | None:
         """The findings of this kind of a study; None where it has none."""

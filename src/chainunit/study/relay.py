@@ -36,6 +36,7 @@ CLASSES = (
 )
 """The classes in common use, the fastest first. Class 10A trips as surely as class 10, and may trip earlier: no start
 is recommended for it, nor for class 5."""
+_NAMED = {candidate.name: candidate for candidate in CLASSES}
 QUICK, LIGHT, HEAVIEST = 5, 10, 30
 """The class for a motor that may not stand long, the usual class, and the heaviest."""
 HEAVIER = 40
@@ -71,19 +72,21 @@ def protecting_class(
     hardest start heats a relay as `start_seconds` says. Other arguments as of `stall_trip`; the rotor of a warm motor
     may be locked for the `stall_time` [s]."""
 
-    named = {candidate.name: candidate for candidate in CLASSES}
-
-    def protects(number: int) -> bool:
-        trip = stall_trip(named[str(number)], setting, before, stall_current)
-        return trip is not None and trip <= stall_time
+    def protecting(number: int) -> bool:
+        return protects(number, setting, before, stall_current, stall_time)
 
     tolerant = class_holding(MORE_CURRENT**2 * seconds, least)
-    if tolerant <= HEAVIEST and protects(tolerant):
+    if tolerant <= HEAVIEST and protecting(tolerant):
         return tolerant
-    saves = (
-        least == LIGHT and seconds <= named[str(QUICK)].shortest and not protects(LIGHT) and protects(QUICK)
-    )
-    return QUICK if saves else least
+    is_quick = least == LIGHT and seconds <= _NAMED[str(QUICK)].shortest
+    return QUICK if is_quick and not protecting(LIGHT) and protecting(QUICK) else least
+
+
+def protects(number: int, setting: float, before: float, stall_current: float, stall_time: float) -> bool:
+    """Whether the slowest relay of the class of that `number` trips before the locked rotor of a warm motor is too
+    hot, see `protecting_class`."""
+    trip = None if number > HEAVIEST else stall_trip(_NAMED[str(number)], setting, before, stall_current)
+    return trip is not None and trip <= stall_time
 
 
 def stall_trip(trip_class: TripClass, setting: float, before: float, current: float) -> float | None:

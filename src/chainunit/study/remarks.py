@@ -18,10 +18,12 @@ from .coupling import remark_on_coupling, remark_on_rams
 from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
 from .measures import STARTED, Answers
+from .permitted_starts import standard_inertia
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
 from .record import LOAD_CYCLE, StudyRecord
 from .registry import capabilities, parts_of_line
 from .remark import DECLARED, SEVERITIES, RemarkCode, fault, note, warning
+from .start_runs import speed_in_star
 from .starts import StartFindings
 from .verdict import START, STEADY, shown_speed
 from .window import CLOSED, DRIFT, STORED
@@ -65,6 +67,7 @@ def conclude(study: StudyRecord) -> None:
     if STEADY in study.answers:
         _on_start(study)
         _on_star(study)
+        _on_inertia(study)
         _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
         if study.drive.foreign is None:
@@ -348,20 +351,50 @@ _STAR_TOO_SHORT = warning(
     remedy="Take more time in star (starter.star_delta.time), less load, or another start.",
     sizes={"s": "time", ("1", "percent"): "share", "A": "star delta"},
 )
+_STANDING = 0.1
+"""Share of the synchronous speed up to which a motor in star has not broken its load away."""
+_STANDS_IN_STAR = warning(
+    "stands-in-star",
+    "The load holds the motor in star {where}. The change to delta is a start direct on line, with {delta}.",
+    remedy="Let the machine start empty (empty_start = true), or take another start.",
+    sizes={"A": "delta"},
+)
 
 
 def _on_star(study: StudyRecord) -> None:
-    """Warn of a change from star to delta at too low a speed."""
-    drive, time = study.drive, study.drive.time_in_star
-    if not time or study.plate is None:
+    """Warn of a motor that stands in star, and of a change from star to delta at too low a speed."""
+    drive, time, run = study.drive, study.drive.time_in_star, study.runs["start_up"]
+    share = speed_in_star(drive, run)
+    if share is None or study.plate is None:
         return
-    run = study.runs["start_up"]
-    times, speeds = run["time"].values, run["motor.w"].values
+    findings, times = StartFindings.found_in(study), run["time"].values
     current = np.abs(run[f"motor.{drive.motor.current}"].values)
-    share = float(np.interp(time, times, speeds)) / study.plate.nameplate.synchronous
-    if share < _FULL_STAR and times[-1] > drive.switched_until:
+    starts = () if findings is None else findings.starts
+    held = [start for start in starts if start.star_speed is not None and start.star_speed < _STANDING]
+    if held:
+        angles = ", ".join(number(start.angle, "rad") for start in held)
+        delta = max(start.current for start in held)
+        study.say(_STANDS_IN_STAR, START, where=f"from {angles}", delta=delta)
+    elif share < _FULL_STAR and times[-1] > drive.switched_until:
         before, after = np.interp(time, times, current), peak(current[times >= drive.switched_until])
         study.say(_STAR_TOO_SHORT, START, time=time, share=share, star=float(before), delta=after)
+
+
+_HEAVY = warning(
+    "heavy-to-start",
+    "The machine has {inertia} at the motor's shaft. IEC 60034-12 demands no more than {most} of a motor.",
+    remedy="Ask the maker of the motor.",
+    sizes={"kg.m2": "inertia most"},
+)
+
+
+def _on_inertia(study: StudyRecord) -> None:
+    """Warn of an inertia beyond the one that each motor brings up to speed."""
+    if study.plate is None:
+        return
+    limit = standard_inertia(study.drive, study.plate.nameplate, study.steady, study.config.drive.start)
+    if limit is not None and limit[0] > limit[1]:
+        study.say(_HEAVY, START, inertia=limit[0], most=limit[1])
 
 
 _HAPPENINGS = {

@@ -62,6 +62,11 @@ class StartNumbers:
     time_above: Value = quantity("s", "time above the rated current of the motor, as long as it is followed")
     heat: Value = quantity("J", "heat of the winding until shortly after the start")
     followed: Value = quantity("s", "time of that heat")
+    star_speed: Value = quantity(
+        "1",
+        "speed of the motor at the end of its time in star, over the synchronous one; none for another start",
+        kind="percent",
+    )
 
 
 def from_angle(rig: Rig, angle: float) -> Rig:
@@ -156,7 +161,17 @@ def _numbers(
         time_above=0.0 if rated is None else time_above(time, current, rated),
         heat=float(np.trapezoid(run["motor.heat"].values, time)),
         followed=float(time[-1]),
+        star_speed=speed_in_star(drive, run),
     )
+
+
+def speed_in_star(drive: Drive, run: xr.Dataset) -> float | None:
+    """The speed of the motor at the end of its time in star in a run from rest, over the synchronous one; None for
+    another start."""
+    if drive.star_delta is None:
+        return None
+    synchronous = 2.0 * math.pi * drive.parameters.supply.f / drive.parameters.pole_pairs
+    return float(np.interp(drive.time_in_star, run["time"].values, run["motor.w"].values)) / synchronous
 
 
 def exceeded_for(time: np.ndarray, current: np.ndarray, longest: float) -> float:

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
 from ...drives.nameplate import Nameplate
 from ...reading.text import number
-from ...study.permitted_starts import PermittedStarts, permitted_starts, starting_data
-from ...study.readings import load_inertia
+from ...study.permitted_starts import PermittedStarts, permitted_starts, standard_inertia, starting_data
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
 from .row import CheckRow, CheckRule, NotChecked
@@ -70,14 +67,14 @@ def _why_none(study: StudyRecord, table: StartingTable, asked: float) -> str:
 
 
 def _by_standard(study: StudyRecord, plate: Nameplate) -> str:
-    """The inertia at the motor's shaft beside the one that IEC 60034-12 demands of a motor of design N at 50 Hz, in
-    words: 0.04 P^0.9 p^2.5, with P in kW and p pairs of poles. Empty for another start or frequency."""
-    if study.config.drive.start not in ("direct", "star-delta") or plate.frequency != 50.0:
+    """The inertia at the motor's shaft beside the one of the standard, in words, see `standard_inertia`; empty for
+    another start or frequency."""
+    limit = standard_inertia(study.drive, plate, study.steady, study.config.drive.start)
+    if limit is None:
         return ""
-    inertia = np.mean(load_inertia(study.drive, study.steady)) + study.drive.fmu_parameters.rotor.J - plate.J
-    most = 0.04 * (plate.power / 1e3) ** 0.9 * (plate.poles / 2.0) ** 2.5
+    inertia, most = limit
     verdict = "within it" if inertia <= most else "more: ask the maker of the motor"
     return (
         f". IEC 60034-12 demands of a motor of design N that it brings {number(most, 'kg.m2')} beside its rotor up "
-        f"to speed, twice from cold or once from hot; the machine has {number(float(inertia), 'kg.m2')}, {verdict}"
+        f"to speed, twice from cold or once from hot; the machine has {number(inertia, 'kg.m2')}, {verdict}"
     )

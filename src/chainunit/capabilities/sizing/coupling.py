@@ -92,5 +92,6 @@ def effects(
         above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
         in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
         with_coupling = max(at_gear(drive, until), at_gear(drive, last))
-        by_shock[name] = CouplingEffect(without, with_coupling, wanted, in_time)
+        current = peak(until[f"motor.{drive.motor.current}"].values)
+        by_shock[name] = CouplingEffect(without, with_coupling, current, wanted, in_time)
     return by_shock

@@ -94,7 +94,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
             motor=_torque(setting.motor),
             gear=_torque(setting.gear),
             bound=_bound(study, setting),
-        ) + _transient(study, setting)
+        )
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     less = number(LESS_TORQUE, "1", "percent", full=False)
     text = (

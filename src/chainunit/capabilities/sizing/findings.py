@@ -208,6 +208,13 @@ class SizingFindings(Findings):
             parts=self.parts(study, setting),
         )
 
+    def currents_until_trip(self, study: StudyRecord) -> Mapping[str, float]:
+        """Those of the recommended torque limiter, if there is one."""
+        setting = self.coupling(study)
+        if setting is None or setting.torque is None:
+            return {}
+        return {name: effect.current for name, effect in setting.effects.items()}
+
     def remark(self, study: StudyRecord) -> None:
         """Add the notes on the choice, and one on each ram of a linkage at the recommended coupling."""
         for text in self.notes:

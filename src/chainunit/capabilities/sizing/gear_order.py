@@ -36,12 +36,14 @@ class GearLoad:
 @dataclass(frozen=True)
 class GearOrder:
     """The rated output torque to order [N m]; the loads by name ("running" and "service", and "start" and "overload"
-    where there are); the overloads that were `left_out`, as their energy balance is not kept; and the largest torque
-    of a start with the electromagnetic transient [N m], None without starts."""
+    where there are); the overloads that were `left_out`, as their energy balance is not kept; the rated torque
+    `without` the torque limiter [N m]; and the largest torque of a start with the electromagnetic transient [N m],
+    None without starts."""
 
     rated: float
     loads: dict[str, GearLoad]
     left_out: tuple[str, ...]
+    without: float
     transient: float | None = None
 
     @property
@@ -83,9 +85,10 @@ def gear_order(
         title = f"an overload ({study.title_of(name)}{', with the limiter' if with_coupling else ''})"
         rule = f", permitted {factor:g} x rated{free}"
         loads["overload"] = GearLoad(overloads[name], title, factor * kept, rule)
-    least = max(load.rated for load in loads.values())
+    least, bare = max(load.rated for load in loads.values()), _overloads(study, None, peaks)
+    without = max([least, *(bare[name] / (factor * kept) for name in overloads)])
     transient = None if findings is None else findings.transient
-    return GearOrder(ordered_torque(least), loads, left_out, transient)
+    return GearOrder(ordered_torque(least), loads, left_out, ordered_torque(without), transient)
 
 
 def _starts(

@@ -14,8 +14,9 @@ from ...reading.text import aside, number
 from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
-from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words
+from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words, protects
 from ...study.starts import StartFindings, transient_words
+from ...study.verdict import STEADY
 from .candidate import Candidate, TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
 from .gear_order import gear_order
@@ -55,6 +56,8 @@ def ordered_gear(
         return None
     decides = order.decides
     reason = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}, rounded up"
+    if order.without > order.rated:
+        reason += f"; without the torque limiter {number(order.without, 'N.m')}"
     if order.left_out:
         names = ", ".join(map(study.title_of, order.left_out))
         reason += (
@@ -155,7 +158,9 @@ class MotorProtection:
     )
     relay_class: Mapping[str, str] | None = part("trip class of IEC 60947-4-1", unit=GIVEN, optional=True)
     device: str = part("the device")
-    tolerance: str | None = part("the class for a motor with more current", default=None, optional=True)
+    tolerance: str | None = part(
+        "what a relay of this class does not protect, or does not hold", default=None, optional=True
+    )
 
     @property
     def class_words(self) -> str:
@@ -323,7 +328,7 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    title, caveat = class_words(study.relay_class), _tolerance(study)
+    title, caveat = class_words(study.relay_class), _too_slow(study) or _tolerance(study)
     trip_class = {"value": title, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
     if study.drive.star_delta is None:
         return MotorProtection(
@@ -339,6 +344,18 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
         "relay in the phases of the delta",
         caveat,
     )
+
+
+def _too_slow(study: StudyRecord) -> str | None:
+    """The means beside a relay that trips too late with the rotor locked, in words; None beside another one."""
+    before = study.answers[STEADY].current_rms if STEADY in study.answers else None
+    if study.plate is None or before is None:
+        return None
+    plate = study.plate.nameplate
+    stall = plate.rated_current * plate.locked_current_ratio
+    if protects(study.relay_class, plate.rated_current, before, stall, plate.locked_time):
+        return None
+    return "trips too late with the rotor locked: order the motor with PTC thermistors, too"
 
 
 def _tolerance(study: StudyRecord) -> str | None:
