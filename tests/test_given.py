@@ -55,7 +55,8 @@ def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
     assert (drive.parameters.rotor.J, drive.parameters.rotor.d) == (plate.J, plate.d)
     whole = plate.J + 0.003 + study.values["flywheel"].J
     assert drive.fmu_parameters.rotor.J == drive.rotor_inertia == pytest.approx(whole, rel=1e-12)
-    assert drive.fmu_parameters.rotor.d > plate.d
+    assert drive.fmu_parameters.rotor.d == plate.d
+    assert drive.fmu_parameters.gear.loss == pytest.approx(1.0 / study.drive.gear.efficiency - 1.0)
     assert drive.graph.components["motor"].start["rotor.J"] == pytest.approx(whole, rel=1e-12)
 
 

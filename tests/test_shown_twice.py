@@ -94,7 +94,7 @@ QUANTITIES = {
     "rated current": r"motor\.rated_current|checks\.(relay\.setting|starting\.rated_current)"
     r"|sizing\.protection\.relay_current",
     "torque of running at the gear": r"starts\.running|checks\.gear\.running|sizing\.gear\.running",
-    "worst torque of a start at the gear": r"starts\.worst\.gear_torque|sizing\.gear\.start",
+    "worst torque of a start at the gear": r"starts\.worst\.quasi_static|sizing\.gear\.start",
     "permitted starts": r"sizing\.candidates\.0\.checks\.starts\.limit|checks\.starting\.permitted",
     "loss of the gear": r"gear_loss\.whole|energy\.own\.mean\.gear",
     "least reserve": r"verdict\.motor\.least_reserve|LEAST",

@@ -68,7 +68,7 @@ class ServoPoint(MotorPoint):
         self.cut = self.i - reference
         self.heat = p.coil.R * (1.0 + p.coil.alpha * (x.T - T_RATED)) * self.i * self.i
         self.air_gap = p.coil.k * self.i
-        self.turn(p, u, x)
+        self.turn(xp, p, u, x)
 
     def rates(self, xp, p, u, x):
         return [

@@ -99,21 +99,27 @@ def _direction(xp: Any, w: Any) -> Any:
 
 
 def geared_motion(xp: Any, load: LoadPort, phi: Any, w: Any, J: Any, tau: Any, loss: Any) -> tuple[Any, Any]:
-    """Acceleration [rad/s2] of a rotor with the inertia `J` [kg m2], which the torque `tau` [N m] drives through a
-    gear with that `loss` against the load; and the torque [N m] that the gear passes on, see `lost_torque`:
+    """Acceleration [rad/s2] of a rotor that turns a load port through a gear, see `geared_acceleration`; and the
+    torque [N m] that the gear passes on."""
+    torque, inertia = load_torque(load, phi, w), load_inertia(load, phi)
+    a = geared_acceleration(xp, torque, inertia, w, J, tau, loss)
+    return a, inertia * a + torque
 
-        J a = tau - torque - loss |torque| sign(w), torque = J_load a + tau_load
+
+def geared_acceleration(xp: Any, load: Any, inertia: Any, w: Any, J: Any, tau: Any, loss: Any) -> Any:
+    """Acceleration [rad/s2] of a rotor with the inertia `J` [kg m2] at the speed `w` [rad/s], which the torque `tau`
+    [N m] drives through a gear with that `loss` against the `load` [N m] of a machine with that `inertia` [kg m2]:
+
+        J a = tau - torque - loss |torque| sign(w), torque = inertia a + load
 
     Both signs of the torque give an acceleration. The right one is the lower one of a rotor that turns forward, the
     higher one of a rotor that turns backward.
     """
-    torque, inertia = load_torque(load, phi, w), load_inertia(load, phi)
     part = loss * _direction(xp, w)
-    driving = (tau - (1.0 + part) * torque) / _felt(xp, J, (1.0 + part) * inertia)
-    driven = (tau - (1.0 - part) * torque) / _felt(xp, J, (1.0 - part) * inertia)
+    driving = (tau - (1.0 + part) * load) / _felt(xp, J, (1.0 + part) * inertia)
+    driven = (tau - (1.0 - part) * load) / _felt(xp, J, (1.0 - part) * inertia)
     sense = w / xp.maximum(xp.abs(w), 1e-9)
-    a = 0.5 * (driving + driven - sense * xp.abs(driving - driven))
-    return a, inertia * a + torque
+    return 0.5 * (driving + driven - sense * xp.abs(driving - driven))
 
 
 def _felt(xp: Any, J: Any, inertia: Any) -> Any:

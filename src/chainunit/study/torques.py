@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.engines import numpy_
+from ..drives.gearing import geared_acceleration
 from ..drives.induction_steady import steady
 from .arrays import peak
 from .drive import Drive
@@ -57,11 +58,13 @@ def quasi_static_torque(drive: Drive, run: xr.Dataset, before: float = 0.0) -> A
         return gear_torque(drive, run)
     p, ratio = drive.fmu_parameters, drive.ratio
     voltage, frequency = run["motor.v"].values / p.supply.V, run["motor.supply.frequency"].values
-    motor = steady(numpy_(), p, run["motor.w"].values, voltage, frequency, p.ambient.T).tau
+    w = run["motor.w"].values
+    motor = steady(numpy_(), p, w, voltage, frequency, p.ambient.T).tau
     inertia = load_inertia(drive, run)
     load = run["machine.tau_bias"].values * drive.ratio_at_machine / ratio
     motor = np.maximum(motor, np.minimum(load, 0.0))
-    return ratio * (load + (inertia + before) * (motor - load) / (p.rotor.J + inertia))
+    a = geared_acceleration(numpy_(), load, inertia, w, p.rotor.J, motor, drive.gear_loss)
+    return ratio * (load + (inertia + before / (1.0 + drive.gear_loss)) * a)
 
 
 def quasi_static_peak(drive: Drive, run: xr.Dataset, peak_of: PeakOf = at_gear, before: float = 0.0) -> float:

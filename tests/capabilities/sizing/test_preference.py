@@ -631,15 +631,16 @@ def sized(name, tmp_path, monkeypatch, *designations, more="", **demands):
     return config, sized_by(config, tmp_path)
 
 
-def check_order(config, first, name, tmp_path, monkeypatch, *motors, more=""):
+def check_order(config, first, name, tmp_path, monkeypatch, *motors, more="", margin=0.1):
     """A study with the gear that is ordered chooses the same motor, ratio and flywheel, and so it does with a gear
     that the start takes nearly wholly."""
     best = first.chosen_candidate
     start = max(each.quasi_static for each in starts_from_all(Rig(config.operation, best.drive, None), 3.0))
-    order = ordered_torque(max(best.trial.duty.torque / 0.9, start / START_FACTOR))
+    order = ordered_torque(max(best.trial.duty.torque / (1.0 - margin), start / START_FACTOR))
     for factor in (START_FACTOR, start / order / 0.97):
         lines = f"{more}[gear]\ntorque_limit = {order}\nstart_factor = {factor}\n"
-        _, result = sized(name, tmp_path, monkeypatch, *motors, more=lines, candidates=float(len(motors)))
+        demands = {"candidates": float(len(motors)), "margin": margin}
+        _, result = sized(name, tmp_path, monkeypatch, *motors, more=lines, **demands)
         again = result.chosen_candidate
         assert again is not None and again.keeps_margin
         assert (again.motor, again.drive.ratio) == (best.motor, best.drive.ratio)
@@ -679,7 +680,7 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
 def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     """It got 2 poles and a ratio of 369, and again with the gear that was ordered."""
     motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M", "IE3 6-pole 11 kW, 160L"
-    config, result = sized("beam_pump", tmp_path, monkeypatch, *motors, candidates=3.0)
+    config, result = sized("beam_pump", tmp_path, monkeypatch, *motors, candidates=3.0, margin=0.08)
     assert [c.motor.nameplate.poles for c in result.candidates] == [4.0, 6.0, 2.0]
     best, six, two = result.candidates
     assert (best.drive.ratio, best.unit.title) == (185.0, "three-stage helical gear")
@@ -692,7 +693,7 @@ def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     assert best.worst_start and not six.worst_start
     assert best.checks["start"].value == pytest.approx(slowest, rel=0.02)
     assert best.trial.start_class == max(start.start_class for start in starts)
-    check_order(config, result, "beam_pump", tmp_path, monkeypatch, *motors)
+    check_order(config, result, "beam_pump", tmp_path, monkeypatch, *motors, margin=0.08)
 
 
 @pytest.mark.second
@@ -701,7 +702,7 @@ def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monk
     start is the softest, with two gear units; where that fits, a note names the better one."""
     motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M"
     gear = "[gear]\ntorque_limit = 20e3\nstart_factor = {}\n"
-    _, result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(1.42))
+    _, result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(1.39), margin=0.08)
     best = result.best
     assert result.chosen_candidate is None and best.motor.designation == motors[1] and best.breaks_gear
     assert best.violation > result.candidates[1].violation > 1.0
@@ -712,7 +713,7 @@ def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monk
     hardest = max(each.quasi_static for each in starts_from_all(Rig(config.operation, drive, None), 3.0))
     words = f'with start = "soft" it fits, and puts {number(hardest, "N.m")} on the gear in a start'
     assert words in result.answer
-    _, result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(1.55))
+    _, result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(1.45), margin=0.08)
     assert result.chosen_candidate.motor.designation == motors[0]
     (note,) = (each for each in result.notes if "would be preferred" in each)
     assert note.startswith(motors[1]) and words in note
@@ -726,14 +727,14 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     )
     file = EXAMPLES / "beam_pump.toml"
     config = parse(f'start = "inverter"\n{file.read_text("utf-8")}', str(file))
-    config = demanding(config, candidates=2.0)
+    config = demanding(config, candidates=2.0, margin=0.08)
     result = sized_by(config, tmp_path)
     best = result.best
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 11 kW, 160M"
-    assert (best.drive.ratio, best.series) == (185.0, "R80") and best.use <= 0.9
+    assert (best.drive.ratio, best.series) == (185.0, "R80") and best.use <= 0.92
     bare = trials_of(config, duty_by(config, tmp_path)).candidate(best.motor)
     trials_of(config, result.duty).judged(bare)
-    assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.9 < bare.sizes["rms_torque"] < 0.95
+    assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.92 < bare.sizes["rms_torque"] < 0.97
     # the inverter: boost, current, and no class of a relay
     rated = best.motor.nameplate.rated_current
     assert best.trial.start_class is None and best.drive.parameters.inverter.boost == 0.05

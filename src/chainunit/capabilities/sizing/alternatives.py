@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.errors import InterruptedRunError, RunError
-from ...drives.gearing import lost_torque
 from ...drives.induction_motor import SoftStart
 from ...drives.slip_clutch import SlipClutch
 from ...machines.chain_unit import SIDES
@@ -406,11 +405,10 @@ def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
 
 def on_motor_side(drive: Drive, run: xr.Dataset) -> float:
     """Peak torque in a run on a coupling between rotor and added inertia, at the crank [N m]: that behind the
-    inertia, and the torque that accelerates it and the gear."""
-    inertia, w = drive.added_inertia + drive.gear_inertia, run["motor.w"].values
-    torque = run["motor.tau"].values
-    lost = lost_torque(np, drive.gear_loss, torque, w) + drive.gear_friction * w
-    return peak(torque + inertia * run["motor.a"].values + lost) * drive.ratio
+    inertia, and the torque that accelerates it and the gear and overcomes the drag, as the gear passes it on."""
+    inertia = drive.added_inertia + drive.gear_inertia
+    more = inertia * run["motor.a"].values + drive.gear_friction * run["motor.w"].values
+    return peak(run["motor.tau"].values + more / (1.0 + drive.gear_loss)) * drive.ratio
 
 
 def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:

@@ -93,5 +93,5 @@ def effects(
         in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
         with_coupling = max(at_gear(drive, until), at_gear(drive, last))
         current = peak(until[f"motor.{drive.motor.current}"].values)
-        by_shock[name] = CouplingEffect(without, with_coupling, current, wanted, in_time)
+        by_shock[name] = CouplingEffect(without, with_coupling, wanted, in_time, current)
     return by_shock

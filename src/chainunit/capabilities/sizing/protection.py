@@ -42,15 +42,15 @@ _SPARED = 0.05
 @dataclass(frozen=True)
 class CouplingEffect:
     """The effect of a torque limiter in an overload: the largest torque at the output of the gear [N m] without it,
-    and with it until no torque passes it any more; the largest `current` of the motor until then [A]; and the
-    `release` time [s] up to which the gear carries no more than `goal` [N m], 0 where it carries more before the
-    trip."""
+    and with it until no torque passes it any more; the `release` time [s] up to which the gear carries no more than
+    `goal` [N m], 0 where it carries more before the trip; and the largest `current` of the motor until no torque
+    passes the coupling [A]."""
 
     without: float
     with_coupling: float
-    current: float = math.nan
     goal: float = math.inf
     release: float = math.inf
+    current: float = math.nan
 
 
 def goal(without: float, gear: float) -> float:
