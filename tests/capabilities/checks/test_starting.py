@@ -109,7 +109,10 @@ def test_the_inertia_that_a_standard_has_every_motor_start(monkeypatch, inertia,
         config=SimpleNamespace(drive=SimpleNamespace(start=start)),
         steady=None,
     )
-    monkeypatch.setattr(starting, "load_inertia", lambda drive, run: np.full(3, inertia - 0.02 - flywheel))
+    monkeypatch.setattr(
+        "chainunit.study.permitted_starts.load_inertia",
+        lambda drive, run: np.full(3, inertia - 0.02 - flywheel),
+    )
     why = starting._why_none(study, StartingTable(), 2.0)
     assert words in why and ("IEC 60034-12" in why) == bool(words)
 
