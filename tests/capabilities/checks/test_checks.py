@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,8 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit.capabilities.checks import plain, rolling
-from chainunit.capabilities.checks.row import CheckRow
+from chainunit.capabilities.checks import bearings
+from chainunit.capabilities.checks.row import CheckRow, Checks
 from chainunit.capabilities.checks.tables import BearingTable
 from chainunit.core.errors import InputError
 from chainunit.reading.result_entries import ResultEntries
@@ -87,6 +86,13 @@ def triangle(swing, cycles=3, points=200):
     return time, swing * (1.0 - np.abs(2.0 * (time % 1.0) - 1.0))
 
 
+def rows_of_bearing(check, bearing, given, run="jam"):
+    """The rows of a bearing by their titles."""
+    checks = Checks()
+    check(checks, "C", bearing, given, run)
+    return {row.title: row for row in checks.rows}
+
+
 def documented(*numbers):
     """The numbers of an example, as they stand in the documentation."""
     for each in numbers:
@@ -98,20 +104,19 @@ def test_the_example_of_a_rolling_bearing():
     rising = np.concatenate([np.diff(angle) > 0.0, [False]])
     force = np.where(rising, 10e3, 20e3)
     given = table(C=100e3, C0=120e3, elements=18.0, diameter_ratio=0.2, static_safety=3.0)
-    found = rolling.rolling_bearing("roller", given, 2.0 * time, 3.0, force, angle, 40e3, "jam").numbers
+    found = bearings.rolling_bearing("roller", given, 2.0 * time, 3.0, force, angle, 40e3, "jam")
     documented("16.71 kN", "388.9 million turns", "648 200 h", "50.0 deg", "83.3 %")
     # the force changes within a step of the cycle, of which there are 200 in a way
     assert found.load == pytest.approx(16.71e3, rel=0.01)
-    assert rolling.rating_life(100e3, 16.713e3, 10.0 / 3.0, 2.0 * math.pi) == pytest.approx(388.9e6, rel=1e-3)
+    assert bearings.rating_life(100e3, 16.713e3, 10.0 / 3.0, 2.0 * math.pi) == pytest.approx(
+        388.9e6, rel=1e-3
+    )
     assert found.life / 3600.0 == pytest.approx(648_200.0, rel=0.01)
     assert found.speed == pytest.approx(10.0 * 2.0 * math.pi / 60.0, rel=1e-9)
     assert found.amplitude_factor == pytest.approx(3.0, rel=1e-9)  # 180/60, one swing a turn
     assert found.static_safety == pytest.approx(3.0, rel=1e-12)
     assert math.degrees(found.critical_swing) == pytest.approx(50.0, rel=1e-3)
-    rows = {
-        row.title: row
-        for row in rolling.checks("C", rolling.RollingBearing("roller", "jam", found), given, "x", "a jam")
-    }
+    rows = rows_of_bearing(bearings.check_rolling, found, given, "a jam")
     assert rows["swing"].utilisation == pytest.approx(0.833, rel=0.01) and rows["swing"].holds
     assert rows["static safety (a jam)"].utilisation == pytest.approx(1.0, rel=1e-12)
     assert rows["equivalent load"].limit == 50e3
@@ -120,7 +125,7 @@ def test_the_example_of_a_rolling_bearing():
 def test_the_example_of_a_plain_bearing():
     time, angle = triangle(math.radians(20.0))
     given = table(diameter=0.06, width=0.06, pressure=20e6, speed=0.1, pv=0.1e6)
-    found = plain.plain_bearing(given, time, np.full_like(time, 7200.0), angle, 36e3, "jam").numbers
+    found = bearings.plain_bearing(given, time, np.full_like(time, 7200.0), angle, 36e3, "jam")
     documented("10.0 MPa", "0.02094 m/s", "0.0419 MPa m/s")
     assert found.pressure == pytest.approx(10.0e6, rel=0.01)
     assert found.speed == pytest.approx(0.02094, rel=0.01)
@@ -136,15 +141,15 @@ def test_the_example_of_a_rigid_model():
 def test_a_constant_force_is_its_own_equivalent_load_and_round_turning_has_no_swing():
     time = np.linspace(0.0, 4.0, 401)
     for kind in ("ball", "roller"):
-        found = rolling.rolling_bearing(
+        found = bearings.rolling_bearing(
             kind, table(C=50e3), time, 2.0, np.full_like(time, 5e3), math.pi * time, 5e3, "steady"
-        ).numbers
+        )
         assert found.load == pytest.approx(5e3, rel=1e-12) and found.swing is None
         assert found.amplitude_factor == pytest.approx(1.0, rel=1e-12)
         assert found.life == pytest.approx(
-            10.0 ** rolling.EXPONENT[kind] * 2e6, rel=1e-9
+            10.0 ** bearings.EXPONENT[kind] * 2e6, rel=1e-9
         )  # half a turn a second
-        assert rolling.rating_life(found.needed, 5e3, found.p, found.speed) == pytest.approx(7.2e7, rel=1e-9)
+        assert bearings.rating_life(found.needed, 5e3, found.p, found.speed) == pytest.approx(7.2e7, rel=1e-9)
 
 
 def used(kind, force=8e3, swing=0.8, speed=1.0, largest=20e3, **values):
@@ -156,12 +161,12 @@ def used(kind, force=8e3, swing=0.8, speed=1.0, largest=20e3, **values):
     time, angle = triangle(swing)
     cycle = force * (1.0 + 0.3 * np.sin(2.0 * np.pi * time))
     if kind == "plain":
-        found = plain.plain_bearing(given, time / speed, cycle, angle, largest, "jam")
-        rows = plain.checks("C", found, given, "x", "jam")
+        found = bearings.plain_bearing(given, time / speed, cycle, angle, largest, "jam")
+        rows = rows_of_bearing(bearings.check_plain, found, given)
     else:
-        found = rolling.rolling_bearing(kind, given, time / speed, 3.0, cycle, angle, largest, "jam")
-        rows = rolling.checks("C", found, given, "x", "jam")
-    return {row.title: row.utilisation for row in rows if isinstance(row, CheckRow)}
+        found = bearings.rolling_bearing(kind, given, time / speed, 3.0, cycle, angle, largest, "jam")
+        rows = rows_of_bearing(bearings.check_rolling, found, given)
+    return {title: row.utilisation for title, row in rows.items()}
 
 
 ROLLING = {
@@ -224,11 +229,9 @@ def test_the_used_share_moves_in_the_right_direction(kind, title, name, sign):
             if name == "speed_limit":
                 given = table(diameter=0.06, width=0.05, speed=0.1 * factor)
                 time, angle = triangle(0.8)
-                found = plain.plain_bearing(given, time, np.full_like(time, 8e3), angle, 2e4, "jam")
-                rows = [
-                    row for row in plain.checks("C", found, given, "x", "jam") if isinstance(row, CheckRow)
-                ]
-                shares.append(rows[0].utilisation)
+                found = bearings.plain_bearing(given, time, np.full_like(time, 8e3), angle, 2e4, "jam")
+                (row,) = rows_of_bearing(bearings.check_plain, found, given).values()
+                shares.append(row.utilisation)
                 continue
             shares.append(used(kind, **limits)[title])
         else:
@@ -243,10 +246,11 @@ def test_the_used_share_moves_in_the_right_direction(kind, title, name, sign):
 def test_a_pin_that_carries_or_turns_nothing_lasts():
     time = np.linspace(0.0, 1.0, 50)
     for force, angle in ((np.zeros(50), time), (np.ones(50), np.zeros(50))):
-        of = rolling.rolling_bearing("ball", table(C=1e3), time, 1.0, force, angle, float(force[0]), "steady")
-        rows = [row for row in rolling.checks("C", of, table(C=1e3), "x", "y") if isinstance(row, CheckRow)]
-        assert of.numbers.life is None and all(row.holds for row in rows)
-        assert rows[0].utilisation == 0.0
+        given = table(C=1e3)
+        of = bearings.rolling_bearing("ball", given, time, 1.0, force, angle, float(force[0]), "steady")
+        rows = rows_of_bearing(bearings.check_rolling, of, given)
+        assert of.life is None and all(row.holds for row in rows.values())
+        assert rows["rating life"].utilisation == 0.0
 
 
 # -- a study
@@ -348,10 +352,12 @@ REFUSALS = [
     ('[bearing."C rocker pivo"]\nkind = "ball"\nC = 1e5', "is no turning pin", 'was "C rocker pivot" meant?'),
     ("[bearing.C]\nC = 1e5", "bearing.C.kind: must be given", "one of ball, roller, plain"),
     ('[bearing.C]\nkind = "bal"\nC = 1e5', "bearing.C.kind", 'was "ball" meant?'),
-    ('[bearing.C]\nkind = "ball"', "bearing.C.C: must be given", "of the kind ball"),
-    ('[bearing.C]\nkind = "plain"\ndiameter = 0.1', "bearing.C.width: must be given", "of the kind plain"),
-    ('[bearing.C]\nkind = "plain"\ndiameter = 0.1\nwidth = 0.1\nC = 1', "bearing.C.C: is of", "leave it out"),
-    ('[bearing.C]\nkind = "ball"\nC = 1\npv = 1', "bearing.C.pv: is of a plain bearing", "leave it out"),
+    ('[bearing.C]\nkind = "ball"', "bearing.C.C: must be given", "for the kind ball"),
+    ('[bearing.C]\nkind = "plain"\ndiameter = 0.1', "bearing.C.width: must be given", "for the kind plain"),
+    ('[bearing.C]\nkind = "plain"\ndiameter = 0.1\nwidth = 0.1\nC = 1', "bearing.C.C: is of the kind ball or roller",
+     "and the kind is plain; leave it out"),
+    ('[bearing.C]\nkind = "ball"\nC = 1\npv = 1', "bearing.C.pv: is of the kind plain",
+     "and the kind is ball; leave it out"),
     ('[bearing.C]\nkind = "ball"\nC = "5 m"', "bearing.C.C", 'such as "2 N"'),
     ('[bearing.C]\nkind = "ball"\nC = -1', "bearing.C.C = -1", "must be > 0 N"),
     ('[bearing.C]\nkind = "ball"\nC = 1\nC1 = 3', "bearing.C.C1: unknown key", "known here: C, C0, life"),
@@ -378,7 +384,6 @@ def test_a_knife_drive_has_its_own_pins():
     assert {each.table.static_safety for each in plan.bearings.values()} == {1.5}
     rollers = parse('[bearing.C]\nkind = "roller"\nC = 1e4').plans["checks"].bearings["C rocker pivot"]
     assert rollers.table.static_safety == 3.0
-    assert replace(rollers, kind="ball") != rollers
 
 
 def test_a_machine_of_somebody_else_has_no_known_pins(tmp_path):

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit.capabilities.checks.coupling_choice import CHOSEN, FITS, NEAREST, REJECTED, tried, with_row
+from chainunit.capabilities.checks.coupling import CHOSEN, FITS, NEAREST, REJECTED, tried, with_row
 from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import FlexibleCouplingTable
 from chainunit.core.errors import InputError

@@ -15,15 +15,14 @@ from command import chainunit
 
 from chainunit.capabilities.checks.coupling import (
     CouplingDuty,
-    CouplingFactors,
     amplification,
+    check_coupling,
     coupling_check,
-    coupling_rows,
     natural_frequency,
     start_factor,
     swinging,
 )
-from chainunit.capabilities.checks.row import CheckRow
+from chainunit.capabilities.checks.row import Checks
 from chainunit.capabilities.checks.tables import FlexibleCouplingTable
 from chainunit.core.errors import InputError
 from chainunit.reading.result_entries import ResultEntries
@@ -48,15 +47,21 @@ def found(table=TABLE, **values):
     duty = CouplingDuty(
         mean=v["mean"], rms=rms, largest=v["largest"], drive_inertia=v["drive"], load_inertia=v["load"]
     )
-    natural = natural_frequency(v["stiffness"], v["drive"], v["load"])
-    factors = CouplingFactors(
-        temperature=v["temperature"],
-        start=v["start"],
-        surge=v["surge"],
-        resonance=abs(complex(amplification(1.0, 1.0, v["damping"]))),
+    table = replace(
+        table,
+        stiffness=v["stiffness"],
+        damping=v["damping"],
+        temperature_factor=v["temperature"],
+        surge_factor=v["surge"],
     )
-    of = coupling_check(duty, factors, swinging(time, torque, natural, v["damping"]), "motor", "jam")
-    return of, {row.title: row for row in coupling_rows(of, table, {"jam": "a jam"})}
+    of = coupling_check(table, duty, time, torque, v["start"], "motor", "jam")
+    return of, {row.title: row for row in checked(of, table).rows}
+
+
+def checked(of, table=TABLE):
+    checks = Checks()
+    check_coupling(checks, of, table, "a jam")
+    return checks
 
 
 def test_the_example():
@@ -166,14 +171,12 @@ def test_each_rating_lessens_its_share_alone():
 def test_start_factors_and_missing_data():
     assert [start_factor(x) for x in (0.0, 120.0, 121.0, 240.0, 241.0)] == [1.0, 1.0, 1.3, 1.3, None]
     of, _ = found()
-    missing = [
-        each
-        for each in coupling_rows(replace(of, alternating=None, passage=None), TABLE, {})
-        if not isinstance(each, CheckRow)
-    ]
-    assert [each.why for each in missing] == [
-        "add [flexible_coupling] with stiffness and damping, by its maker"
-    ] * 2
+    missing = checked(replace(of, alternating=None, passage=None)).missing
+    elastic, speed = (
+        f"add [flexible_coupling] with {what}, by its maker"
+        for what in ("stiffness and damping", "largest_speed")
+    )
+    assert [each.why for each in missing] == [elastic, elastic, speed]
 
 
 # -- a study

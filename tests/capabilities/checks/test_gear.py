@@ -14,17 +14,17 @@ import xarray as xr
 from command import chainunit
 
 from chainunit.capabilities.checks.gear import (
+    _PULLEY,
     GearDuty,
     ShaftLoad,
+    check_gear,
     equivalent_torque,
     gear_check,
-    gear_rows,
     peak_factor_of,
     pulley_force,
     rating_of,
-    shaft_row,
 )
-from chainunit.capabilities.checks.row import CheckRow
+from chainunit.capabilities.checks.row import Checks
 from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
@@ -50,10 +50,14 @@ LOAD = GearDuty(
 )  # fmt: skip
 
 
-def used(load=LOAD, rating=RATING, peak_factor=2.0, permitted_peak=12e3):
-    found = gear_check(load, rating, peak_factor, "start_up")
-    rows = gear_rows(found, rating, permitted_peak, {"start_up": "start-up"})
-    return {row.title: row.utilisation for row in rows if isinstance(row, CheckRow)}
+def checked(load=LOAD, rating=RATING, peak_factor=2.0, permitted_peak=12e3):
+    checks = Checks()
+    check_gear(checks, gear_check(load, rating, peak_factor, "start_up"), rating, permitted_peak, "start-up")
+    return checks
+
+
+def used(*given, **more):
+    return {row.title: row.utilisation for row in checked(*given, **more).rows}
 
 
 def test_the_example():
@@ -73,7 +77,8 @@ def test_the_example():
     assert shares["overhung load"] == pytest.approx(0.667, rel=0.01)
     radial = pulley_force(20.0, 0.16, 1.75)
     assert radial == pytest.approx(437.5, rel=0.01)
-    assert shaft_row(ShaftLoad(20.0, radial), 700.0, "", {}).utilisation == pytest.approx(0.625, rel=0.01)
+    shaft = _PULLEY.row("motor", "checks.motor_shaft", ShaftLoad(20.0, radial), 700.0)
+    assert shaft.utilisation == pytest.approx(0.625, rel=0.01)
 
 
 def test_the_torque_of_equal_damage_lies_between_mean_and_largest_and_grows_with_the_exponent():
@@ -116,17 +121,14 @@ def test_the_used_share_rises_with_its_load_and_falls_with_its_rating(title):
 
 def test_what_nobody_gives_is_named():
     nothing = GearRating()
-    rows = list(gear_rows(gear_check(LOAD, nothing, 2.0), nothing, 0.0, {}))
-    assert [row.why.rpartition(" ")[2] for row in rows] == [
+    checks = checked(rating=nothing, permitted_peak=0.0)
+    assert not checks.rows and [each.why.rpartition(" ")[2] for each in checks.missing] == [
         "rated_torque", "thermal_power", "overhung_load", "largest_speed",
     ]  # fmt: skip
-    rows = list(gear_rows(gear_check(LOAD, RATING, 2.0), RATING, 0.0, {}))
-    assert rows[-1].why.endswith("add [gear_rating] with peak_overhung_load")
+    assert checked(permitted_peak=0.0).missing[-1].why.endswith("add [gear_rating] with peak_overhung_load")
     without = replace(LOAD, radial=None, largest_radial=None)
-    rows = list(gear_rows(gear_check(without, RATING, 2.0), RATING, 0.0, {}))
-    assert [row.why for row in rows if not isinstance(row, CheckRow)] == [
-        "no pin of the machine turns with the output shaft"
-    ]
+    missing = checked(without, permitted_peak=0.0).missing
+    assert [each.why for each in missing] == ["no pin of the machine turns with the output shaft"]
 
 
 def test_a_crank_with_bearings_of_its_own_puts_no_load_on_the_gear():
@@ -137,7 +139,7 @@ def test_a_crank_with_bearings_of_its_own_puts_no_load_on_the_gear():
 def test_the_application_factor_is_over_the_mean_torque_and_stands_beside_the_torque_of_running():
     for load, symbols in ((LOAD, ["TN", "p", "KA"]), (replace(LOAD, exponent=None), ["TN", "KA"])):
         found = gear_check(load, RATING, 2.0)
-        row = next(gear_rows(found, RATING, 0.0, {}))
+        row = checked(load, permitted_peak=0.0).rows[0]
         assert list(row.numbers) == symbols and all(each in row.formula for each in symbols)
         assert found.application_factor == pytest.approx(721.4 / 600.0)
         assert (row.value, row.limit, row.unit) == (721.4, 1250.0, "N.m")

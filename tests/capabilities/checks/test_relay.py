@@ -13,7 +13,8 @@ import xarray as xr
 from command import chainunit
 from event_tables import event_line
 
-from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows, stall_heat
+from chainunit.capabilities.checks.relay import RelaySetting, check_relay, relay_findings, stall_heat
+from chainunit.capabilities.checks.row import Checks
 from chainunit.core.errors import InputError
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.report.blocks import at
@@ -35,9 +36,15 @@ BASE = {"setting": 20.0, "before": 16.0, "start_seconds": 1.890, "stall_current"
 JAM = np.linspace(0.0, 10.0, 10_001), np.full(10_001, 120.0), 16.0
 
 
+def checked(relay):
+    checks = Checks()
+    check_relay(checks, relay, {"jam": "a jam"})
+    return checks
+
+
 def used(trip_class="10", jam=JAM, **values):
     found = relay_findings(trip_class, RelaySetting(**BASE | values), {"jam": jam})
-    return {row.title: row for row in relay_rows(found, {"jam": "a jam"})}
+    return {row.title: row for row in checked(found).rows}
 
 
 def test_the_example():
@@ -113,14 +120,14 @@ def test_the_classes_that_let_the_start_through_and_protect():
     assert suitable(stall_time=4.0).suitable == ()
     heaviest = suitable(least=40, start_seconds=10.0)
     assert heaviest.trip_class == "30" and not heaviest.suitable
-    assert not {row.title: row.holds for row in relay_rows(heaviest, {})}["start"]
+    assert not {row.title: row.holds for row in checked(heaviest).rows}["start"]
 
 
 def test_a_relay_that_running_trips_passes_no_check():
     """A motor of jaw crushers that never came to its speed: the relay trips at once, and no heat is counted."""
     found = relay_findings("20", RelaySetting(**BASE | {"before": 24.0}), {"jam": (*JAM[:2], 24.0)})
     assert not found.suitable and not found.events
-    start, running, missing = relay_rows(found, {"jam": "a jam"})
+    (start, running), (missing,) = checked(found).rows, checked(found).missing
     assert (running.title, running.holds, running.limit) == ("running", False, 21.0) and start.holds
     assert missing.why == "running alone trips it"
     assert used(before=20.9)["running"].holds and not used(before=21.1)["running"].holds
@@ -215,7 +222,7 @@ def test_a_relay_in_the_phases_of_a_delta_carries_the_whole_current_of_star():
     assert in_phases == pytest.approx(3.0 * in_line)
     late = np.where(time > 7.0, 5.0, 0.0)
     assert np.array_equal(drive.relay_current(time, late), late)
-    assert parse('[relay]\nplace = "line"').plans["checks"].relay.is_in_phases is False
+    assert parse('[relay]\nplace = "line"').plans["checks"].relay_in_phases is False
 
 
 def test_the_clock_of_an_event_in_running_says_nothing_of_star():

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,7 +15,8 @@ import xarray as xr
 from command import chainunit
 
 from chainunit.capabilities.checks import starting
-from chainunit.capabilities.checks.starting import starting_rows
+from chainunit.capabilities.checks.row import Checks
+from chainunit.capabilities.checks.starting import check_starts
 from chainunit.capabilities.checks.tables import StartingTable
 from chainunit.drives.catalogue import catalogue
 from chainunit.reading.result_entries import ResultEntries
@@ -28,8 +30,10 @@ BASE = {
 }  # fmt: skip
 
 
-def row(**values):
-    (only,) = starting_rows(permitted_starts(StartingData(**BASE | values)))
+def row(most=math.inf, is_chosen=False, **values):
+    checks = Checks()
+    check_starts(checks, permitted_starts(StartingData(**BASE | values), most), is_chosen)
+    (only,) = checks.rows
     return only
 
 
@@ -75,8 +79,8 @@ def test_another_rule_may_permit_fewer_starts():
     of = StartingData(**BASE)
     assert permitted_starts(of, 164.0).permitted == 164.0
     assert permitted_starts(of, 390.0).permitted == permitted_starts(of).permitted
-    (row,) = starting_rows(permitted_starts(of, 164.0), is_chosen=True)
-    assert row.limit == 164.0 and row.formula.endswith("by the heat of its winding")
+    chosen = row(164.0, is_chosen=True)
+    assert chosen.limit == 164.0 and chosen.formula.endswith("by the heat of its winding")
 
 
 def test_a_motor_at_its_rated_current_may_not_start_again():
@@ -113,7 +117,7 @@ def test_the_inertia_that_a_standard_has_every_motor_start(monkeypatch, inertia,
         "chainunit.study.permitted_starts.load_inertia",
         lambda drive, run: np.full(3, inertia - 0.02 - flywheel),
     )
-    why = starting._why_none(study, StartingTable(), 2.0)
+    why = starting._why_none(study, SimpleNamespace(starting=StartingTable(), starts_per_hour=2.0))
     assert words in why and ("IEC 60034-12" in why) == bool(words)
 
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from ...core.errors import InputError
 from ...machines.machine import Machine
 from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
-from ...study.config import Config
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection, of_named
 from ...study.record import StudyRecord
@@ -18,6 +16,7 @@ from .plan import CheckPlan, read_plan
 from .tables import (
     BEARINGS,
     COUPLING_KEYS,
+    OF_ROW,
     RELAY_KEYS,
     SECTIONS,
     FlexibleCouplingTable,
@@ -87,19 +86,8 @@ class CheckCapability(Capability):
         """The plan, also of a file without these tables: it says what is not checked."""
         return read_plan(reading)
 
-    def faults(self, config: Config) -> Iterable[InputError]:
-        """Refuse a flexible coupling that no catalogue has, and values beside those of a catalogue."""
-        plan: CheckPlan = config.plans[self.name]
-        if plan.coupling is None:
-            return
-        from .coupling_choice import coupling_faults
-
-        yield from coupling_faults(plan.couplings, plan.coupling_name, config.file.given)
-
     def unused_values(self, machine: Machine, plan: CheckPlan) -> Iterable[str]:
         """Values of a flexible coupling in whose place those of a catalogue stand."""
-        from .coupling_choice import OF_ROW
-
         return [f"flexible_coupling.{name}" for name in OF_ROW] if plan.couplings else ()
 
     def analyses(self) -> Iterable[type[Analysis]]:

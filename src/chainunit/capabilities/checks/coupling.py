@@ -3,39 +3,67 @@
 The torque is that of the runs at the place of the coupling, where the shaft is rigid or as stiff as [driveline] says.
 The coupling amplifies each part of it that swings: of a torque at one side of two inertias, the coupling carries the
 share of the rigid shaft times V = (1 + j psi/2pi)/(1 - (f/fe)^2 + j psi/2pi).
+
+Each coupling of a catalogue is tried in the study's own cycle, with its own stiffness, damping and inertia, and the
+cheapest that carries it is chosen.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.catalogue_flexible import CatalogueFlexible
-from ...reading.results import part, result
+from ...reading.results import OWN, derived, part, result
+from ...reading.text import number
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
 from ...study.remark import note, warning
 from ...study.torques import gear_torque
 from ...study.window import mean
-from .coupling_choice import CHOSEN, CouplingCandidate, tried, with_row
-from .row import CheckRow, CheckRule, NotChecked
+from .plan import CheckPlan
+from .row import CheckRow, CheckRule, Checks
 from .runs import largest
-from .tables import FlexibleCouplingTable
+from .tables import OF_ROW, FlexibleCouplingTable
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_CLAUSE = "DIN 740-2:1986"
 _TURN = 2.0 * math.pi
 FREQUENCY = 10.0
 """Frequency [Hz] up to which the permitted alternating torque holds; above it the heat of the elastic part counts."""
 START_FACTORS = ((120.0, 1.0), (240.0, 1.3))
 """Up to so many starts an hour, the start factor; beyond them the maker says it."""
+CHOSEN, FITS, REJECTED, NEAREST = "chosen", "fits", "rejected", "nearest"
+"""The verdicts on a coupling of a catalogue."""
+_CLAUSE, _IMPACT = "DIN 740-2:1986", "TL = mean; SZ = factors.start; St = factors.temperature"
+_RULES = (
+    ("rated_torque", CheckRule(
+        "rated torque", "rated", _CLAUSE, "TKN >= T St, T: RMS of steady running", "T = rms; St = factors.temperature"
+    )),
+    ("peak_torque", CheckRule(
+        "peak torque ({run})", "peak", _CLAUSE, "TKmax >= (TL + (T - TL) SA SZ) St",
+        f"T = largest; SA = factors.surge; {_IMPACT}",
+    )),
+    ("alternating_torque", CheckRule(
+        "alternating torque", "alternating", _CLAUSE, "TKW >= half range of sum V(f) Sf(f) T(f), times St",
+        "rigid = swinging.rigid; elastic = swinging.elastic; fe = swinging.natural_frequency; "
+        "St = factors.temperature",
+    )),
+    ("peak_torque", CheckRule(
+        "passage through resonance", "passage", _CLAUSE, "TKmax >= (TL + Ti VR SZ) St",
+        f"Ti = swinging.passed; VR = factors.resonance; {_IMPACT}",
+    )),
+    ("largest_speed", CheckRule(
+        "speed", "speed", "Limit of the maker of the coupling", "largest |w| of all runs <= permitted"
+    )),
+)  # fmt: skip
+"""Each with the key of its limit."""
 
 
 @declaration
@@ -78,12 +106,54 @@ class Swinging:
 
 
 @result
-class CouplingCheck:
+class CandidateCheck:
+    """A check of a coupling that was tried."""
+
+    title: str = part("the checked quantity")
+    value: float = part("its value", unit=OWN)
+    limit: float = part("its limit", unit=OWN)
+    unit: str = "1"
+    kind: str = ""
+
+    @derived("1", "used")
+    def utilisation(self) -> float:
+        """value/limit."""
+        return self.value / self.limit
+
+
+@result
+class CouplingCandidate:
+    """A flexible coupling of a catalogue, tried in the cycle of the study."""
+
+    designation: str = part("its designation")
+    order_number: str = part("its order number; empty where the catalogue gives none")
+    price: float | None = quantity("1", "its price; none where the catalogue gives none")
+    source: str = part("the source of its values")
+    rated_torque: float = quantity("N.m", "its rated torque TKN")
+    stiffness: float = quantity("N.m/rad", "its dynamic torsional stiffness CTdyn")
+    damping: float = quantity("1", "its relative damping psi")
+    J: float = quantity("kg.m2", "its inertia; 0: unknown")
+    checks: tuple[CandidateCheck, ...] = part("its checks")
+    verdict: str = part(f"{CHOSEN}, {FITS}, {REJECTED}, or {NEAREST} where none fits", default="")
+    reason: str = part("the reason of the verdict", default="")
+
+    @property
+    def hardest(self) -> CandidateCheck:
+        """The check of whose limit it uses the largest share."""
+        return max(self.checks, key=lambda check: check.utilisation)
+
+    @property
+    def fits(self) -> bool:
+        """Whether it keeps each limit."""
+        return self.hardest.utilisation <= 1.0
+
+
+@result
+class CouplingCheck(CouplingDuty):
     """A flexible coupling, and the torques that it has to carry, factors included."""
 
     place: str = part("shaft that it is on")
     run: str = part("the run with the largest torque")
-    duty: CouplingDuty = part(inline=True)
     factors: CouplingFactors = part("factors")
     swinging: Swinging | None = part("the swinging torque; none without stiffness or damping", optional=True)
     rated: float = quantity("N.m", "rated torque that it needs")
@@ -124,111 +194,82 @@ def swinging(time: Any, torque: Any, natural: float, damping: float) -> Swinging
     elastic = parts * amplification(frequency, natural, damping)
     heating = np.sqrt(np.maximum(1.0, frequency / (_TURN * FREQUENCY)))
     above = np.abs(parts[frequency > natural])
+
+    def half_range(spectrum: Any) -> float:
+        return 0.5 * float(np.ptp(np.fft.irfft(spectrum, count)))
+
     return Swinging(
         natural_frequency=natural,
-        **{
-            name: 0.5 * float(np.ptp(np.fft.irfft(spectrum, count)))
-            for name, spectrum in (("rigid", parts), ("elastic", elastic), ("weighted", elastic * heating))
-        },
+        rigid=half_range(parts),
+        elastic=half_range(elastic),
+        weighted=half_range(elastic * heating),
         passed=2.0 / count * float(np.max(above)) if len(above) else 0.0,
     )
 
 
 def coupling_check(
-    duty: CouplingDuty, factors: CouplingFactors, swing: Swinging | None, place: str = "motor", run: str = ""
+    table: FlexibleCouplingTable,
+    duty: CouplingDuty,
+    time: Any,
+    torque: Any,
+    start: float,
+    place: str = "motor",
+    run: str = "",
 ) -> CouplingCheck:
-    """The torques that a coupling needs."""
-    steady, temperature = abs(duty.mean), factors.temperature
-    surge = max(0.0, duty.largest - steady) * factors.surge
+    """The coupling of that `table`, half of whose inertia turns with either side, with the start factor `start`.
+    `time` [s] and `torque` [N m] are those of steady running, of shape (n,); `run` has the largest torque."""
+    swing, St = None, table.temperature_factor
+    if table.stiffness and table.damping and duty.load_inertia > 0.0:
+        inertias = (J + 0.5 * table.J for J in (duty.drive_inertia, duty.load_inertia))
+        swing = swinging(time, torque, natural_frequency(table.stiffness, *inertias), table.damping)
+    resonance = abs(complex(amplification(1.0, 1.0, table.damping))) if table.damping else 0.0
+    steady = abs(duty.mean)
+    surge = max(0.0, duty.largest - steady) * table.surge_factor
     return CouplingCheck(
+        **vars(duty),
         place=place,
         run=run,
-        duty=duty,
-        factors=factors,
+        factors=CouplingFactors(
+            temperature=St, start=start, surge=table.surge_factor, resonance=resonance or None
+        ),
         swinging=swing,
-        rated=duty.rms * temperature,
-        peak=(steady + surge * factors.start) * temperature,
-        alternating=None if swing is None else swing.weighted * temperature,
-        passage=None
-        if swing is None
-        else (steady + swing.passed * factors.resonance * factors.start) * temperature,
+        rated=duty.rms * St,
+        peak=(steady + surge * start) * St,
+        alternating=swing.weighted * St if swing else None,
+        passage=(steady + swing.passed * resonance * start) * St if swing else None,
     )
 
 
-_IMPACT = "TL = mean; SZ = factors.start; St = factors.temperature"
-_RULES = {
-    "rated_torque": CheckRule(
-        "rated", "rated torque", _CLAUSE, "TKN >= T St, T: RMS of steady running", "T = rms; St = factors.temperature"
-    ),
-    "peak_torque": CheckRule(
-        "peak", "peak torque ({run})", _CLAUSE, "TKmax >= (TL + (T - TL) SA SZ) St",
-        f"T = largest; SA = factors.surge; {_IMPACT}",
-    ),
-    "alternating_torque": CheckRule(
-        "alternating", "alternating torque", _CLAUSE, "TKW >= half range of sum V(f) Sf(f) T(f), times St",
-        "rigid = swinging.rigid; elastic = swinging.elastic; fe = swinging.natural_frequency; "
-        "St = factors.temperature",
-    ),
-}  # fmt: skip
-"""By the key of the limit."""
-_PASSAGE = CheckRule(
-    "passage", "passage through resonance", _CLAUSE, "TKmax >= (TL + Ti VR SZ) St",
-    f"Ti = swinging.passed; VR = factors.resonance; {_IMPACT}",
-)  # fmt: skip
+def check_coupling(checks: Checks, coupling: CouplingCheck, table: FlexibleCouplingTable, run: str) -> None:
+    """Check a coupling; `run` is the title of the run with the largest torque."""
+    for key, rule in _RULES:
+        limit, lacking = getattr(table, key), key
+        if limit and getattr(coupling, rule.value) is None:
+            limit, lacking = None, "stiffness and damping"
+        why = f"add [flexible_coupling] with {lacking}, by its maker"
+        checks.check(rule, "coupling", "checks.flexible_coupling", coupling, limit, why, run=run)
 
 
-def coupling_rows(
-    check: CouplingCheck, table: FlexibleCouplingTable, titles: Mapping[str, str]
-) -> Iterator[CheckRow | NotChecked]:
-    """The rows of a coupling; `titles` are those of runs."""
-    run = titles.get(check.run, check.run)
-    for key, rule in (*_RULES.items(), ("peak_torque", _PASSAGE)):
-        lacking = key if not (limit := getattr(table, key)) else "stiffness and damping"
-        if not limit or getattr(check, rule.value) is None:
-            why = f"add [flexible_coupling] with {lacking}, by its maker"
-            yield NotChecked(f"coupling, {rule.title.format(run=run)}", why)
-        else:
-            yield rule.row("coupling", "checks.flexible_coupling", check, limit, run)
-
-
-@dataclass(frozen=True)
-class _Cycle:
-    """The torque [N m] of steady running over time [s], both of shape (n,), at the place of a coupling; its `duty`
-    with the run of the largest torque, and the start factor."""
-
-    time: Any
-    torque: Any
-    duty: CouplingDuty
-    place: str
-    run: str
-    start: float
-
-    def check(self, table: FlexibleCouplingTable) -> CouplingCheck:
-        """The coupling of that table in this cycle. Half of its inertia turns with either side."""
-        swing, duty = None, self.duty
-        if table.stiffness and table.damping and duty.load_inertia > 0.0:
-            inertias = (x + 0.5 * table.J for x in (duty.drive_inertia, duty.load_inertia))
-            natural = natural_frequency(table.stiffness, *inertias)
-            swing = swinging(self.time, self.torque, natural, table.damping)
-        factors = CouplingFactors(
-            temperature=table.temperature_factor,
-            start=self.start,
-            surge=table.surge_factor,
-            resonance=abs(complex(amplification(1.0, 1.0, table.damping))) if table.damping else None,
-        )
-        return coupling_check(duty, factors, swing, self.place, self.run)
-
-
-def _cycle(study: StudyRecord, place: str, start: float) -> _Cycle:
-    """The cycle of a study at that place, with that start factor."""
-    drive, turns = study.drive, study.steady
+def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> CouplingCheck | None:
+    """The coupling of a study, and its `checks`. Of those of a catalogue it is the one that the file names, or the
+    cheapest that carries the torque."""
+    drive, turns, table, starts = study.drive, study.steady, plan.coupling, plan.starts_per_hour
+    what, key = "flexible coupling", "flexible_coupling"
+    if table is None:
+        checks.lack(what, f"the file does not have one; add [{key}]", key)
+        return None
+    factor = table.start_factor or start_factor(starts)
+    if factor is None:
+        more = f"{starts:g} starts an hour are more than the 240 of the standard"
+        checks.lack(what, f"{more}; add start_factor, by its maker")
+        return None
+    is_on_crank = plan.coupling_place == "crank"
+    ratio = drive.ratio if is_on_crank else 1.0
 
     def torque_of(run: xr.Dataset) -> Any:
-        return gear_torque(drive, run) if place == "crank" else run[drive.motor_torque].values
+        return gear_torque(drive, run) if is_on_crank else run[drive.motor_torque].values
 
-    most, run = largest(study, torque_of)
-    ratio = drive.ratio if place == "crank" else 1.0
-    torque = torque_of(turns)
+    torque, (most, run) = torque_of(turns), largest(study, torque_of)
     duty = CouplingDuty(
         mean=mean(turns, torque),
         rms=math.sqrt(mean(turns, torque**2)),
@@ -237,18 +278,93 @@ def _cycle(study: StudyRecord, place: str, start: float) -> _Cycle:
         load_inertia=float(np.mean(load_inertia(drive, turns))) * ratio**2,
         speed=largest(study, lambda run: run[drive.motor_speed].values)[0] / ratio,
     )
-    return _Cycle(turns["time"].values, torque, duty, place, run, start)
+
+    def trial(table: FlexibleCouplingTable, checks: Checks) -> CouplingCheck:
+        args = (turns["time"].values, torque, factor, plan.coupling_place, run)
+        coupling = coupling_check(table, duty, *args)
+        check_coupling(checks, coupling, table, study.title_of(run))
+        return coupling
+
+    def rows_of(table: FlexibleCouplingTable) -> Sequence[CheckRow]:
+        trial(table, trial_checks := Checks())
+        return trial_checks.rows
+
+    candidates = tried(plan.couplings, table, rows_of, plan.coupling_name)
+    for sold in plan.couplings:
+        if sold.designation == candidates[0].designation:
+            table = with_row(table, sold)
+    return replace(trial(table, checks), candidates=tuple(candidates))
 
 
-def remark_on_coupling(study: StudyRecord, check: CouplingCheck) -> None:
+def with_row(table: FlexibleCouplingTable, sold: CatalogueFlexible) -> FlexibleCouplingTable:
+    """The `table` of a study file with the values of a row of a catalogue."""
+    return replace(table, **{name: getattr(sold.data, name) for name in OF_ROW})
+
+
+def tried(
+    couplings: Sequence[CatalogueFlexible],
+    table: FlexibleCouplingTable,
+    rows_of: Callable[[FlexibleCouplingTable], Iterable[CheckRow]],
+    name: str = "",
+) -> list[CouplingCandidate]:
+    """The `couplings` of a catalogue, the one to take first.
+
+    Parameters
+    ----------
+    table : the table of the study file; each coupling is tried with its factors
+    rows_of : the checks of a coupling with that table
+    name : designation of the coupling that the file names; empty where it leaves the choice
+    """
+    candidates = []
+    for sold in couplings:
+        rows = rows_of(with_row(table, sold))
+        checks = [CandidateCheck(x.title, x.value or 0.0, x.limit, x.unit, x.kind) for x in rows]
+        names = ("rated_torque", "stiffness", "damping", "J")
+        data: dict[str, Any] = {name: float(getattr(sold.data, name)) for name in names}
+        item = (sold.designation, sold.order_number, sold.price, sold.source)
+        candidates.append(CouplingCandidate(*item, **data, checks=tuple(checks)))
+    candidates.sort(key=lambda candidate: (candidate.designation != name, *_order(candidate)))
+    return [_judged(candidate, candidates[0], name) for candidate in candidates]
+
+
+def _order(candidate: CouplingCandidate) -> tuple[bool, float, float, str]:
+    """The cheapest that fits comes first, one without a price behind those with one; where none fits, the one that
+    uses the smallest share of its limits."""
+    cost = candidate.price or math.inf if candidate.fits else candidate.hardest.utilisation
+    return not candidate.fits, cost, candidate.rated_torque, candidate.designation
+
+
+def _judged(candidate: CouplingCandidate, best: CouplingCandidate, name: str) -> CouplingCandidate:
+    hardest, price = candidate.hardest, candidate.price
+    value, limit = (number(x, hardest.unit, hardest.kind) for x in (hardest.value, hardest.limit))
+    share = f"{hardest.title} {value}, {number(hardest.utilisation, '1', 'used')} of the permitted {limit}"
+    if candidate is best and name:
+        verdict, reason = CHOSEN if candidate.fits else REJECTED, f"named by the study file; {share}"
+    elif candidate is best and not candidate.fits:
+        verdict, reason = NEAREST, f"no coupling fits; {share}"
+    elif candidate is best:
+        least = "cheapest that fits" if price is not None else "smallest that fits, without a price"
+        verdict, reason = CHOSEN, f"the {least}; {share}"
+    elif not candidate.fits:
+        verdict, reason = REJECTED, share
+    elif name:
+        verdict, reason = FITS, "the study file names another one"
+    elif price is None:
+        verdict, reason = FITS, "has no price"
+    else:
+        dearer, equal = f"dearer: {price:.10g}", "larger, at the same price"
+        verdict, reason = FITS, equal if price == best.price else dearer
+    return replace(candidate, verdict=verdict, reason=reason)
+
+
+def remark_on_coupling(study: StudyRecord, coupling: CouplingCheck) -> None:
     """Warn where no coupling of the catalogues keeps each limit, or the named one does not; note how it was
     checked."""
-    if not check.candidates:
-        return
-    best = check.candidates[0]
-    if best.verdict != CHOSEN:
-        study.say(_TOO_WEAK, name=best.designation, reason=best.reason)
-    study.say(_CHECKED)
+    if coupling.candidates:
+        best = coupling.candidates[0]
+        if best.verdict != CHOSEN:
+            study.say(_TOO_WEAK, name=best.designation, reason=best.reason)
+        study.say(_CHECKED)
 
 
 _TOO_WEAK = warning(
@@ -260,54 +376,3 @@ _CHECKED = note(
     "The flexible coupling is checked by the torque of a shaft without it, part by part of the frequencies with its "
     "own amplification (DIN 740-2). Its inertia counts in its natural frequency. It is not in the runs.",
 )
-
-
-def speed_row(check: CouplingCheck, table: FlexibleCouplingTable) -> CheckRow | NotChecked:
-    """The check of the speed of a coupling."""
-    if not table.largest_speed:
-        return NotChecked("coupling, speed", "add [flexible_coupling] with largest_speed, by its maker")
-    formula = "largest |w| of all runs <= permitted"
-    rule = CheckRule("speed", "speed", "Limit of the maker of the coupling", formula)
-    return rule.row("coupling", "checks.flexible_coupling", check.duty, table.largest_speed)
-
-
-def find(
-    study: StudyRecord,
-    table: FlexibleCouplingTable | None,
-    place: str,
-    name: str,
-    starts: float,
-    couplings: Sequence[CatalogueFlexible] = (),
-) -> tuple[CouplingCheck | None, list[CheckRow | NotChecked]]:
-    """The coupling of a study, which makes so many `starts` an hour, and its checks, or the reason against them.
-    Beside `couplings` of a catalogue it is the one with that `name`, or the cheapest that carries the torque."""
-    if table is None:
-        return None, [
-            NotChecked(
-                "flexible coupling",
-                "the file does not have one; add [flexible_coupling]",
-                "flexible_coupling",
-            )
-        ]
-    factor = table.start_factor or start_factor(starts)
-    if factor is None:
-        why = (
-            f"{starts:g} starts an hour are more than the 240 of the standard; add start_factor, by its maker"
-        )
-        return None, [NotChecked("flexible coupling", why)]
-    cycle = _cycle(study, place, factor)
-
-    def all_rows(trial: FlexibleCouplingTable) -> list[CheckRow | NotChecked]:
-        check = cycle.check(trial)
-        return [*coupling_rows(check, trial, study.titles), speed_row(check, trial)]
-
-    candidates: list[CouplingCandidate] = []
-    if couplings:
-
-        def rows_of(trial: FlexibleCouplingTable) -> Iterator[CheckRow]:
-            return (row for row in all_rows(trial) if isinstance(row, CheckRow))
-
-        candidates = tried(couplings, table, rows_of, name)
-        (sold,) = (coupling for coupling in couplings if coupling.designation == candidates[0].designation)
-        table = with_row(table, sold)
-    return replace(cycle.check(table), candidates=tuple(candidates)), all_rows(table)

@@ -10,8 +10,7 @@ an exponent Teq is the largest torque of running.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,38 +27,38 @@ from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_torque
 from ...study.verdict import START
 from ...study.window import mean
-from .row import CheckRow, CheckRule, NotChecked
+from .plan import CheckPlan
+from .row import CheckRule, Checks
 from .runs import largest
-from .tables import GearRatingTable, MotorShaftTable
-
-if TYPE_CHECKING:
-    import xarray as xr
+from .tables import GearRatingTable
 
 _MAKER = "Rating of the maker of the gear"
 _TEQ = {True: "Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p)", False: "Teq: largest |T| of running"}
-_RUNNING = {
-    has_exponent: CheckRule(
-        "running", "torque of running", "ISO 6336-6:2019, annex on KA from a load spectrum",
-        f"Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T|, both of steady "
-        "running", "TN = rated_torque; p = exponent; KA = application_factor",
-    )
-    for has_exponent, teq in _TEQ.items()
-}  # fmt: skip
+"""By whether there is an exponent."""
+_RUNNING = CheckRule(
+    "torque of running", "running", "ISO 6336-6:2019, annex on KA from a load spectrum",
+    "Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T|, both of steady running",
+    "TN = rated_torque; p = exponent; KA = application_factor",
+)  # fmt: skip
 _LARGEST = CheckRule(
-    "largest", "largest torque of the output ({run})", _MAKER, "T <= peak factor x TN",
+    "largest torque of the output ({run})", "largest", _MAKER, "T <= peak factor x TN",
     "TN = rated_torque; permitted = torque_limit",
 )  # fmt: skip
+_RADIAL = "largest |F| of the bearing <= permitted"
 _RATINGS = {
-    "thermal_power": CheckRule("power", "mean power", _MAKER, "mean of |P| <= thermal rating"),
-    "overhung_load": CheckRule("radial", "overhung load", _MAKER, "largest |F| of the bearing <= permitted"),
-    "largest_speed": CheckRule("speed", "speed of the input shaft", _MAKER, "largest |w| of all runs"),
+    "thermal_power": CheckRule("mean power", "power", _MAKER, "mean of |P| <= thermal rating"),
+    "overhung_load": CheckRule("overhung load", "radial", _MAKER, _RADIAL),
+    "largest_speed": CheckRule("speed of the input shaft", "speed", _MAKER, "largest |w| of all runs"),
 }
 """By the key of the rating."""
-_EVENTS = CheckRule(
-    "largest_radial", "overhung load of all runs", _MAKER, "largest |F| of the bearing <= permitted in events"
-)
+_EVENTS = CheckRule("overhung load of all runs", "largest_radial", _MAKER, f"{_RADIAL} in events")
 _UNTURNED = "no pin of the machine turns with the output shaft"
-_SEPARATE = "the crank has bearings of its own (sizing.separate_bearing)"
+_SHAFT = ("overhung load of the shaft", "radial", "Permitted radial force of the maker of the motor")
+_PULLEY = CheckRule(
+    *_SHAFT, "F = 2 T f/d, T: largest torque at the motor's shaft in steady running",
+    "T = torque; f = /motor_shaft.tension_factor; d = /motor_shaft.pulley_diameter",
+)  # fmt: skip
+_CRANK = CheckRule(*_SHAFT, "largest reaction of {pin} in steady running")
 
 
 @declaration
@@ -83,12 +82,11 @@ class GearDuty:
 
 
 @result
-class GearCheck:
+class GearCheck(GearDuty):
     """The gear. Its application factor is the torque of equal damage over the mean one."""
 
     run: str = part("the run with the largest torque")
     bearing: str = part("pin whose reaction the output shaft carries; empty where it carries none")
-    load: GearDuty = part(inline=True)
     rated_torque: float | None = quantity("N.m", "rated torque of the output TN")
     application_factor: float | None = quantity(
         "1", "application factor of the cycle, Teq over the mean torque"
@@ -113,102 +111,10 @@ def equivalent_torque(torque: Any, angle: Any, exponent: float) -> float:
     return mean_load(np.abs(torque), angle, exponent) if exponent else peak(torque)
 
 
-def gear_check(
-    load: GearDuty, rating: GearRating, peak_factor: float, run: str = "", bearing: str = ""
-) -> GearCheck:
-    """The gear under its load."""
-    rated = rating.rated_torque or None
-    return GearCheck(
-        run=run,
-        bearing=bearing,
-        load=load,
-        rated_torque=rated,
-        application_factor=load.equivalent / load.mean if load.mean else None,
-        running_limit=rated * rating.application_factor if rated else None,
-        torque_limit=rated * peak_factor if rated else None,
-    )
-
-
-def gear_rows(
-    check: GearCheck,
-    rating: GearRating,
-    permitted_peak: float,
-    titles: Mapping[str, str],
-    unloaded: str = _UNTURNED,
-) -> Iterator[CheckRow | NotChecked]:
-    """The rows of a gear; `permitted_peak` is the permitted radial force in events [N], 0 where it is unknown, and
-    `titles` are those of runs. `unloaded` says why the output shaft carries no reaction, where it carries none."""
-    load, path = check.load, "checks.gear"
-    if check.running_limit is not None and check.torque_limit is not None:
-        yield _RUNNING[bool(load.exponent)].row("gear", path, load, check.running_limit)
-        yield _LARGEST.row("gear", path, load, check.torque_limit, titles.get(check.run, check.run))
-    else:
-        yield _lacks("torque of running and largest torque", "rated_torque")
-    for key, rule in _RATINGS.items():
-        if getattr(load, rule.value) is None:
-            yield NotChecked(f"gear, {rule.title}", unloaded)
-        elif not (limit := getattr(rating, key)):
-            yield _lacks(rule.title, key)
-        else:
-            yield rule.row("gear", path, load, limit)
-    if load.largest_radial is not None and rating.overhung_load:
-        if permitted_peak:
-            yield _EVENTS.row("gear", path, load, permitted_peak)
-        else:
-            yield _lacks(_EVENTS.title, "peak_overhung_load")
-
-
-def _lacks(title: str, key: str) -> NotChecked:
-    return NotChecked(f"gear, {title}", f"its limit is not known; add [gear_rating] with {key}")
-
-
-def bearing_force(study: StudyRecord, turns: xr.Dataset) -> tuple[str, float | None, float | None]:
-    """The bearing of the crank by its title, its largest force over whole `turns`, and that of all runs [N]; an empty
-    title, and None, where the machine has none."""
-    title = driver_bearing(study.drive)
-    if not title:
-        return "", None, None
-    return title, peak(pin_force(study.drive, turns, title)), largest_load(study.pins, title)[0]
-
-
-def find(
-    study: StudyRecord, table: GearRatingTable, separate: bool = False
-) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:
-    """The gear of a study and its checks; none for a drive without a gear. `separate` tells whether the crank has
-    bearings of its own."""
-    drive, tables = study.drive, study.config.drive
-    if drive.ratio == 1.0:
-        return None, []
-    transmission = tables.gear if "gear.torque_limit" in tables.given else None
-    rating = rating_of(table, drive.gear_rating, transmission.torque_limit if transmission else 0.0)
-    if not any((rating.rated_torque, rating.thermal_power, rating.overhung_load, rating.largest_speed)):
-        why = "the file gives no rating of the gear; add [gear_rating]"
-        return None, [NotChecked("gear", why, "gear_rating")]
-    if drive.foreign is not None:
-        return None, [NotChecked("gear", "the motor is an FMU, whose torque is not known")]
-    turns = study.steady
-    torque = gear_torque(drive, turns)
-    most, run = max((torque, name) for name, torque in gear_peaks(study).items())
-    starts = StartFindings.found_in(study)
-    if starts is not None and starts.worst.quasi_static > most:
-        most, run = starts.worst.quasi_static, START
-    title, radial, largest_radial = ("", None, None) if separate else bearing_force(study, turns)
-    equivalent = equivalent_torque(torque, crank_angle(drive, turns), table.exponent)
-    load = GearDuty(
-        ratio=drive.ratio,
-        exponent=table.exponent or None,
-        equivalent=equivalent,
-        running=equivalent if table.exponent else running_peak(study, at_gear).torque,
-        mean=mean(turns, np.abs(torque)),
-        largest=most,
-        power=mean(turns, np.abs(shaft_power(drive, turns))),
-        radial=radial,
-        largest_radial=largest_radial,
-        speed=largest(study, lambda run: run[drive.motor_speed].values)[0],
-    )
-    check = gear_check(load, rating, peak_factor_of(table, drive.gear_rating, tables.gear), run, title)
-    why = _SEPARATE if separate else _UNTURNED
-    return check, list(gear_rows(check, rating, table.peak_overhung_load, study.titles, why))
+def pulley_force(torque: float, diameter: float, factor: float) -> float:
+    """Radial force [N] of a belt on a pulley of that `diameter` [m] with the `torque` [N m]; the `factor` is the
+    force over that of the torque at the rim, as the tension of the belt adds to it."""
+    return 2.0 * torque * factor / diameter
 
 
 def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: float) -> GearRating:
@@ -221,9 +127,7 @@ def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: flo
     return GearRating(
         rated_torque=torque.rated_torque,
         application_factor=torque.application_factor,
-        thermal_power=table.thermal_power or sold.thermal_power,
-        overhung_load=table.overhung_load or sold.overhung_load,
-        largest_speed=table.largest_speed or sold.largest_speed,
+        **{key: getattr(table, key) or getattr(sold, key) for key in _RATINGS},
     )
 
 
@@ -234,48 +138,106 @@ def peak_factor_of(table: GearRatingTable, sold: GearRating | None, gear: Transm
     return float(table.peak_factor or gear.start_factor * over_rated)
 
 
-def motor_shaft(
-    study: StudyRecord, table: MotorShaftTable
-) -> tuple[ShaftLoad | None, list[CheckRow | NotChecked]]:
-    """The radial force on the motor's shaft and its check, or the reason against it."""
-    what = "overhung load of the motor's shaft"
-    direct = study.drive.ratio == 1.0
+def gear_check(
+    load: GearDuty, rating: GearRating, peak_factor: float, run: str = "", bearing: str = ""
+) -> GearCheck:
+    """The gear under its load."""
+    rated = rating.rated_torque or None
+    return GearCheck(
+        **vars(load),
+        run=run,
+        bearing=bearing,
+        rated_torque=rated,
+        application_factor=load.equivalent / load.mean if load.mean else None,
+        running_limit=rated * rating.application_factor if rated else None,
+        torque_limit=rated * peak_factor if rated else None,
+    )
+
+
+def check_gear(
+    checks: Checks, gear: GearCheck, rating: GearRating, peak_load: float, run: str, unloaded: str = _UNTURNED
+) -> None:
+    """Check a gear; `peak_load` is the permitted radial force in events [N], 0 if it is unknown, and `run` the title
+    of the run with the largest torque. `unloaded` says why the output shaft has no reaction, if it has none."""
+    place, lacking = ("gear", "checks.gear", gear), "its limit is not known; add [gear_rating] with "
+    if gear.rated_torque:
+        checks.check(_RUNNING, *place, gear.running_limit, teq=_TEQ[bool(gear.exponent)])
+        checks.check(_LARGEST, *place, gear.torque_limit, run=run)
+    else:
+        checks.lack("gear, torque of running and largest torque", f"{lacking}rated_torque")
+    for key, rule in _RATINGS.items():
+        if getattr(gear, rule.value) is None:
+            checks.lack(f"gear, {rule.title}", unloaded)
+        else:
+            checks.check(rule, *place, getattr(rating, key), f"{lacking}{key}")
+    if gear.largest_radial is not None and rating.overhung_load:
+        checks.check(_EVENTS, *place, peak_load, f"{lacking}peak_overhung_load")
+
+
+def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | None:
+    """The gear of a study, and its `checks`; none for a drive without a gear."""
+    drive, tables, table, sold = study.drive, study.config.drive, plan.gear, study.drive.gear_rating
+    if drive.ratio == 1.0:
+        return None
+    limit = tables.gear.torque_limit if "gear.torque_limit" in tables.given else 0.0
+    rating = rating_of(table, sold, limit)
+    if not any((rating.rated_torque, *(getattr(rating, key) for key in _RATINGS))):
+        checks.lack("gear", "the file gives no rating of the gear; add [gear_rating]", "gear_rating")
+        return None
+    if drive.foreign is not None:
+        checks.lack("gear", "the motor is an FMU, whose torque is not known")
+        return None
+    turns = study.steady
+    torque = gear_torque(drive, turns)
+    most, run = max((torque, name) for name, torque in gear_peaks(study).items())
+    starts = StartFindings.found_in(study)
+    if starts is not None and starts.worst.quasi_static > most:
+        most, run = starts.worst.quasi_static, START
+    bearing = "" if plan.separate_bearing else driver_bearing(drive)
+    equivalent = equivalent_torque(torque, crank_angle(drive, turns), table.exponent)
+    load = GearDuty(
+        ratio=drive.ratio,
+        exponent=table.exponent or None,
+        equivalent=equivalent,
+        running=equivalent if table.exponent else running_peak(study, at_gear).torque,
+        mean=mean(turns, np.abs(torque)),
+        largest=most,
+        power=mean(turns, np.abs(shaft_power(drive, turns))),
+        radial=peak(pin_force(drive, turns, bearing)) if bearing else None,
+        largest_radial=largest_load(study.pins, bearing)[0] if bearing else None,
+        speed=largest(study, lambda run: run[drive.motor_speed].values)[0],
+    )
+    gear = gear_check(load, rating, peak_factor_of(table, sold, tables.gear), run, bearing)
+    separate = "the crank has bearings of its own (sizing.separate_bearing)"
+    unloaded = separate if plan.separate_bearing else _UNTURNED
+    check_gear(checks, gear, rating, table.peak_overhung_load, study.title_of(run), unloaded)
+    return gear
+
+
+def motor_shaft(study: StudyRecord, plan: CheckPlan, checks: Checks) -> ShaftLoad | None:
+    """The radial force on the motor's shaft, and its `checks`."""
+    what, table, drive, turns = (
+        "overhung load of the motor's shaft",
+        plan.motor_shaft,
+        study.drive,
+        study.steady,
+    )
+    direct = drive.ratio == 1.0
     if not table.overhung_load:
         why = "the file gives no permitted load; add [motor_shaft] with overhung_load"
         belt = "" if direct else ", and for a belt on it with pulley_diameter and tension_factor"
-        return None, [NotChecked(what, why + belt, "motor_shaft")]
-    turns, torque = study.steady, None
+        checks.lack(what, why + belt, "motor_shaft")
+        return None
+    bearing = driver_bearing(drive)
     if table.pulley_diameter and table.tension_factor:
-        torque = peak(turns[study.drive.motor_torque].values)
-        radial = pulley_force(torque, table.pulley_diameter, table.tension_factor)
-        formula = "F = 2 T f/d, T: largest torque at the motor's shaft in steady running"
-        numbers = {
-            "T": "checks.motor_shaft.torque",
-            "f": "motor_shaft.tension_factor",
-            "d": "motor_shaft.pulley_diameter",
-        }
-    elif direct:
-        title, force, _ = bearing_force(study, turns)
-        if force is None:
-            return None, [NotChecked(what, "no pin of the machine turns with the shaft")]
-        radial, formula, numbers = force, f"largest reaction of {title} in steady running", {}
+        torque = peak(turns[drive.motor_torque].values)
+        load = ShaftLoad(torque, pulley_force(torque, table.pulley_diameter, table.tension_factor))
+        rule = _PULLEY
+    elif direct and bearing:
+        load, rule = ShaftLoad(None, peak(pin_force(drive, turns, bearing))), _CRANK
     else:
-        return None, [
-            NotChecked(what, "a belt or wheel on it is not known; add pulley_diameter and tension_factor")
-        ]
-    load = ShaftLoad(torque, radial)
-    return load, [shaft_row(load, table.overhung_load, formula, numbers)]
-
-
-def pulley_force(torque: float, diameter: float, factor: float) -> float:
-    """Radial force [N] of a belt on a pulley of that `diameter` [m] with the `torque` [N m]; the `factor` is the
-    force over that of the torque at the rim, as the tension of the belt adds to it."""
-    return 2.0 * torque * factor / diameter
-
-
-def shaft_row(load: ShaftLoad, limit: float, formula: str, numbers: Mapping[str, str]) -> CheckRow:
-    """The row of the motor's shaft."""
-    source, place = "Permitted radial force of the maker of the motor", "checks.motor_shaft.radial"
-    return CheckRow(
-        "motor", "overhung load of the shaft", source, formula, load.radial, limit, place, numbers, "N"
-    )
+        belt = "a belt or wheel on it is not known; add pulley_diameter and tension_factor"
+        checks.lack(what, "no pin of the machine turns with the shaft" if direct else belt)
+        return None
+    checks.check(rule, "motor", "checks.motor_shaft", load, table.overhung_load, pin=bearing)
+    return load

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
-from ...core.errors import Faults
+from ...core.errors import Faults, near_name
 from ...drives.catalogue import offer
 from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.lists import Entry
@@ -14,27 +14,36 @@ from ...reading.tables import instance
 from ...study.file_reading import FileReading
 from ...study.parts import catalogues_of
 from .pins import no_pin, pins_named, turning_pins
-from .section_plan import SectionPlan, read_sections
 from .tables import (
+    BEARING_KEYS,
     BEARINGS,
     IN_PHASES,
     KINDS,
     NEEDED,
-    OF_PLAIN,
-    OF_ROLLING,
+    NOTCH_KEYS,
+    NOTCHES,
+    OF_ROW,
+    PARTS,
     PLAIN,
+    RATIO,
+    SECTION_NEEDS,
+    SECTIONS,
+    SHOULDER,
     STATIC_SAFETY,
     BearingTable,
     FlexibleCouplingTable,
     GearRatingTable,
     MotorShaftTable,
     RelayTable,
+    SectionTable,
     StartingTable,
 )
 
+_LEAST_STEP, _LEAST_FILLET = 0.98, 0.03
+"""Largest diameter over the outer one of a shoulder, and least radius over its depth, for which DIN 743-2 holds."""
 
-@dataclass(frozen=True)
-class BearingPlan:
+
+class BearingPlan(NamedTuple):
     """The `kind` of a bearing, one of `KINDS`, and the values of its table; None for those that it does not give."""
 
     kind: str
@@ -42,35 +51,43 @@ class BearingPlan:
 
 
 @dataclass(frozen=True)
-class RelayPlan:
-    """The values of the table [relay], the name of the trip class, empty where the file gives none, and whether the
-    relay of a star-delta starter is in the phases of the delta."""
+class SectionPlan:
+    """A section with the other keys of its table, see `SECTIONS`; `pin` is the title of its pin, empty for the
+    bearing of the crank."""
 
-    table: RelayTable = field(default_factory=RelayTable)
-    trip_class: str = ""
-    is_in_phases: bool = True
+    table: SectionTable
+    pin: str = ""
+    on: str = PARTS[0]
+    notch: str = "none"
+    steel: str = ""
+    hard_surface: bool = False
+    mean_stress: str = RATIO
 
 
 @dataclass(frozen=True)
 class CheckPlan:
-    """The bearings by the title of their pin, and the tables of the other checks."""
+    """The tables of the checks: bearings by the title of their pin, sections by their name."""
 
-    bearings: Mapping[str, BearingPlan] = field(default_factory=dict)
-    relay: RelayPlan = field(default_factory=RelayPlan)
-    starting: StartingTable = field(default_factory=StartingTable)
-    starts_per_hour: float = 0.0
+    bearings: Mapping[str, BearingPlan]
+    sections: Mapping[str, SectionPlan]
+    relay: RelayTable
+    trip_class: str
+    """name of the trip class of the relay; empty where the file gives none"""
+    relay_in_phases: bool
+    """whether the relay of a star-delta starter is in the phases of the delta"""
+    starting: StartingTable
+    starts_per_hour: float
     """the starts an hour that the file asks for; 0 where it does not say"""
-    gear: GearRatingTable = field(default_factory=GearRatingTable)
-    motor_shaft: MotorShaftTable = field(default_factory=MotorShaftTable)
-    coupling: FlexibleCouplingTable | None = None
-    coupling_place: str = "motor"
-    coupling_name: str = ""
-    """the designation of the coupling of a catalogue; empty where the file does not name one"""
-    couplings: tuple[CatalogueFlexible, ...] = ()
-    """the flexible couplings of the catalogues among which it is"""
-    sections: Mapping[str, SectionPlan] = field(default_factory=dict)
-    separate_bearing: bool = False
+    gear: GearRatingTable
+    separate_bearing: bool
     """whether the file says that the crank has bearings of its own, so that the gear does not carry its reaction"""
+    motor_shaft: MotorShaftTable
+    coupling: FlexibleCouplingTable | None
+    coupling_place: str
+    coupling_name: str
+    """the designation of the coupling of a catalogue; empty where the file does not name one"""
+    couplings: tuple[CatalogueFlexible, ...]
+    """the flexible couplings of the catalogues among which it is"""
 
 
 def read_plan(reading: FileReading) -> CheckPlan:
@@ -79,51 +96,69 @@ def read_plan(reading: FileReading) -> CheckPlan:
     Raises
     ------
     InputError
-        with a line for each fault: an unknown pin, a missing key, a key of another kind of bearing.
+        with a line for each fault: an unknown pin, a missing key, a key of another kind of bearing or notch, a
+        flexible coupling that no catalogue has, a value beside that of a catalogue.
     """
-    faults = Faults()
-    bearings, sections = {}, dict[str, SectionPlan]()
+    faults, data, form, values = Faults(), reading.data, reading.form, reading.values
+    bearings, sections = dict[str, BearingPlan](), dict[str, SectionPlan]()
     if reading.machine is not None:
         titles = turning_pins(reading.machine.model)
-        bearings = _bearings(reading.data.get("bearing", {}), titles, faults)
-        sections = read_sections(reading.data.get("section", {}), titles, faults)
+        bearings = _bearings(data.get("bearing", {}), titles, faults)
+        sections = _sections(data.get("section", {}), titles, faults)
+    coupling = data.get("flexible_coupling")
+    couplings = () if coupling is None else offer(*catalogues_of(form.catalogue, reading.source)).flexible
+    with faults.collected():
+        _check_coupling(Entry("flexible_coupling", coupling or {}), tuple(x.designation for x in couplings))
     faults.refuse()
-    starting = reading.values.get("starting") or StartingTable()
+    starting = values.get("starting") or StartingTable()
     # the table of another capability, if the program has it
-    demands = reading.values.get("sizing") if "sizing" in reading.data else None
-    form = getattr(reading.form, "sizing", None)
-    asked = starting.per_hour or getattr(demands, "starts_per_hour", 0.0)
+    sizing = values.get("sizing") if "sizing" in data else None
     return CheckPlan(
         bearings,
-        _relay(reading),
-        starting,
-        float(asked),
-        reading.values.get("gear_rating") or GearRatingTable(),
-        reading.values.get("motor_shaft") or MotorShaftTable(),
-        *_coupling(reading),
         sections,
-        getattr(form, "separate_bearing", False),
+        relay=values.get("relay") or RelayTable(),
+        trip_class=form.relay.trip_class or "",
+        relay_in_phases=form.relay.place == IN_PHASES,
+        starting=starting,
+        starts_per_hour=float(starting.per_hour or getattr(sizing, "starts_per_hour", 0.0)),
+        gear=values.get("gear_rating") or GearRatingTable(),
+        separate_bearing=getattr(getattr(form, "sizing", None), "separate_bearing", False),
+        motor_shaft=values.get("motor_shaft") or MotorShaftTable(),
+        coupling=None if coupling is None else values["flexible_coupling"],
+        coupling_place=form.flexible_coupling.place,
+        coupling_name=form.flexible_coupling.designation,
+        couplings=tuple(couplings),
     )
 
 
-def _relay(reading: FileReading) -> RelayPlan:
-    if "relay" not in reading.data:
-        return RelayPlan()
-    form = reading.form.relay
-    return RelayPlan(reading.values["relay"], form.trip_class or "", form.place == IN_PHASES)
+def _check_coupling(entry: Entry, designations: Collection[str]) -> None:
+    """Refuse a designation that is not one of these of the catalogues, and beside them the values of a row."""
+    name = entry.given.get("designation", "")
+    if name and name not in designations:
+        some = f"must be one of {', '.join([*designations][:5])}{near_name(name, designations)}"
+        entry.wrong(
+            "designation",
+            name,
+            f"not in the catalogue; {some if designations else 'no catalogue has flexible couplings'}",
+        )
+    for key in OF_ROW if designations else ():
+        if key in entry.given:
+            entry.fault(key, "each flexible coupling of the catalogue has its own; leave it out")
+    entry.refuse()
 
 
-def _coupling(
-    reading: FileReading,
-) -> tuple[FlexibleCouplingTable | None, str, str, tuple[CatalogueFlexible, ...]]:
-    """The flexible coupling, if the file has one, its place, its designation in a catalogue, and those of the
-    catalogues."""
-    name = "flexible_coupling"
-    if name not in reading.data:
-        return None, "motor", "", ()
-    form = reading.form.flexible_coupling
-    couplings = offer(*catalogues_of(reading.form.catalogue, reading.source)).flexible
-    return reading.values[name], form.place, form.designation, tuple(couplings)
+def _check_keys(
+    entry: Entry, key: str, kind: str, needed: Collection[str], keys: Mapping[str, Collection[str]]
+) -> None:
+    """Refuse an entry that lacks `needed` keys of its `kind`, which it names by `key`, or has `keys` of other kinds
+    alone."""
+    for name in needed:
+        if name not in entry.raw:
+            entry.fault(name, f"must be given for the {key} {kind}")
+    for kinds, names in keys.items():
+        for name in names:
+            if name in entry.raw and kind not in kinds.split(" or "):
+                entry.fault(name, f"is of the {key} {kinds}, and the {key} is {kind}; leave it out")
 
 
 def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, BearingPlan]:
@@ -137,13 +172,7 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
         if kind is None:
             entry.fault("kind", f"must be given, one of {', '.join(KINDS)}")
             entry.refuse()
-        for key in NEEDED[kind]:
-            if key not in entry.raw:
-                entry.fault(key, f"must be given for a bearing of the kind {kind}")
-        for key in OF_ROLLING if kind == PLAIN else OF_PLAIN:
-            if key in entry.raw:
-                other = "a rolling bearing" if kind == PLAIN else "a plain bearing"
-                entry.fault(key, f"is of {other}, and the kind is {kind}; leave it out")
+        _check_keys(entry, "kind", kind, NEEDED[kind], BEARING_KEYS)
         for pin in pins:
             if pin in taken:
                 entry.fault(
@@ -158,3 +187,35 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
     entries = BEARINGS.read_named(tables, faults, read)
     plans = {pin: plan for pins, plan in entries.values() for pin in pins}
     return {title: plans[title] for title in titles if title in plans}
+
+
+def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, SectionPlan]:
+    def read(entry: Entry, name: str) -> SectionPlan:
+        for key in SECTION_NEEDS:
+            if key not in entry.raw:
+                choice = f", one of {', '.join(NOTCHES)}" if key == "notch" else ""
+                entry.fault(key, f"must be given{choice}")
+        keys = {key: entry.raw.pop(key) for key in SECTIONS.keys if key in entry.raw}
+        if pin := keys.get("pin"):
+            pins = pins_named(pin, titles)
+            if len(pins) > 1:
+                entry.fault("pin", f"stands for {', '.join(pins)}; give the whole title of one")
+            elif not pins:
+                entry.fault("pin", no_pin(pin, titles))
+            else:
+                (keys["pin"],) = pins
+        notch = keys.get("notch", "none")
+        _check_keys(entry, "notch", notch, NOTCH_KEYS[SHOULDER] if notch == SHOULDER else (), NOTCH_KEYS)
+        entry.refuse()
+        table = instance(SectionTable, entry.raw)
+        if table.bore >= table.diameter:
+            entry.fault("bore", "must be less than the diameter")
+        if notch == SHOULDER:
+            depth = 0.5 * (table.outer_diameter - table.diameter)
+            if table.diameter > _LEAST_STEP * table.outer_diameter:
+                entry.fault("outer_diameter", f"must be at least the diameter over {_LEAST_STEP:g}")
+            elif table.radius < _LEAST_FILLET * depth:
+                entry.fault("radius", f"must be at least {_LEAST_FILLET:g} of the depth of the shoulder")
+        return SectionPlan(table, **keys)
+
+    return SECTIONS.read_named(tables, faults, read)

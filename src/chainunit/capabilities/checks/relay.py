@@ -8,7 +8,7 @@ must not trip it, and as slow as the other, where it must still save the motor.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,17 +31,31 @@ from ...study.relay import (
 )
 from ...study.starts import StartFindings
 from ...study.verdict import STEADY
-from .plan import RelayPlan
-from .row import CheckRow, CheckRule, NotChecked
+from .plan import CheckPlan
+from .row import CheckRule, Checks
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
 _STALL = f"{_CLAUSE}; locked-rotor time of the maker of the motor"
+_START = CheckRule(
+    "start", "start_seconds", _CLAUSE,
+    f"t = sum (I/({MULTIPLE:g} Ir))^2 dt <= least trip time of the class at {MULTIPLE:g} Ir, cold",
+    "Ir = setting; limit = classes.{name}.shortest",
+)  # fmt: skip
 _RUNNING = CheckRule(
-    "before", "running", "IEC 60947-4-1, limits of operation",
+    "running", "before", "IEC 60947-4-1, limits of operation",
     f"RMS current of steady running <= {HOLDS_AT:g} Ir, at which the relay must not trip", "Ir = setting",
+)  # fmt: skip
+_LOCKED = CheckRule(
+    "trip with the rotor locked", "classes.{name}.stall_trip", _STALL,
+    f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the class",
+    "Ir = setting; IA = stall_current; I0 = before; largest = classes.{name}.longest",
+)  # fmt: skip
+_HEAT = CheckRule(
+    "heat of the motor until the trip ({title})", "events.{name}.seconds", _STALL,
+    "t = sum (I/IA)^2 dt until the slowest relay trips", "IA = stall_current; trip = events.{name}.trip_time",
 )  # fmt: skip
 _WHAT = "thermal overload relay"
 
@@ -78,11 +92,10 @@ class StallHeat:
 
 
 @result
-class RelayFindings:
+class RelayFindings(RelaySetting):
     """The relay: its class is that of the file, or else the one of the study, see `StudyRecord.relay_class`."""
 
     trip_class: str = part("name of the class")
-    numbers: RelaySetting = part(inline=True)
     holds_up_to: float = quantity("A", "current at which no relay of this setting trips")
     classes: Mapping[str, RelayOfClass] = part("relays by their class")
     suitable: tuple[str, ...] = part(
@@ -127,49 +140,78 @@ def relay_findings(
         one that flows after it if it passes [A]
     least : the least class that all starts need, by `chainunit.study.relay.start_class`
     """
-    classes: dict[str, RelayOfClass] = {}
-    starting = []
-    for relay_class in CLASSES:
-        trip = stall_trip(relay_class, numbers.setting, numbers.before, numbers.stall_current)
-        classes[relay_class.name] = RelayOfClass(
-            shortest=relay_class.shortest, longest=relay_class.longest, stall_trip=trip
+    n, named = numbers, {relay_class.name: relay_class for relay_class in CLASSES}
+    classes = {
+        name: RelayOfClass(
+            shortest=x.shortest,
+            longest=x.longest,
+            stall_trip=stall_trip(x, n.setting, n.before, n.stall_current),
         )
-        enough = least <= LIGHT or relay_class.longest >= least
-        if numbers.start_seconds <= relay_class.shortest and enough:
-            starting.append(relay_class)
-    named = {relay_class.name: relay_class for relay_class in CLASSES}
-    chosen_class = named[trip_class] if trip_class else named.get(str(least), CLASSES[-1])
-    trips = {name: classes[name].stall_trip for name in (relay_class.name for relay_class in starting)}
-    suitable = [name for name, trip in trips.items() if trip is not None and trip <= numbers.stall_time]
+        for name, x in named.items()
+    }
+    chosen = named[trip_class] if trip_class else named.get(str(least), CLASSES[-1])
     heats = {
-        name: stall_heat(chosen_class, time, current, numbers.setting, before, numbers.stall_current, *after)
+        name: stall_heat(chosen, time, current, n.setting, before, n.stall_current, *after)
         for name, (time, current, before, *after) in runs.items()
     }
-    events = {name: heat for name, heat in heats.items() if heat is not None}
-    holds = HOLDS_AT * numbers.setting
-    return RelayFindings(chosen_class.name, numbers, holds, classes, tuple(suitable), events)
+    return RelayFindings(
+        **vars(numbers),
+        trip_class=chosen.name,
+        holds_up_to=HOLDS_AT * n.setting,
+        classes=classes,
+        suitable=tuple(
+            name
+            for name, x in classes.items()
+            if n.start_seconds <= x.shortest
+            and (least <= LIGHT or x.longest >= least)
+            and x.stall_trip is not None
+            and x.stall_trip <= n.stall_time
+        ),
+        events={name: heat for name, heat in heats.items() if heat is not None},
+    )
 
 
-def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, list[CheckRow | NotChecked]]:
-    """The relay of a study and its checks, or the reason against them."""
-    if study.drive.follows and study.drive.foreign is None:
-        what = f"{_WHAT}, starts per hour"
-        return None, [NotChecked(what, "the motor is controlled; its converter limits and protects it")]
-    if why := _why_none(study):
-        return None, [NotChecked(_WHAT, why)]
-    plate, drive = None if study.plate is None else study.plate.nameplate, study.drive
+def check_relay(checks: Checks, relay: RelayFindings, titles: Mapping[str, str]) -> None:
+    """Check a relay; `titles` are those of its events."""
+    name = relay.trip_class
+    title, own_class = f"thermal relay of class {name}", relay.classes[name]
+    place = (title, "checks.relay", relay)
+    checks.check(_START, *place, own_class.shortest, name=name)
+    checks.check(_RUNNING, *place, relay.holds_up_to)
+    if relay.before >= TRIPS_AT * relay.setting:
+        checks.lack(f"{title}, stall and events", "running alone trips it")
+        return
+    checks.check(_LOCKED, *place, relay.stall_time, name=name)
+    for event in relay.events:
+        checks.check(_HEAT, *place, relay.stall_time, name=event, title=titles[event])
+
+
+def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings | None:
+    """The relay of a study, and its `checks`."""
+    drive, table = study.drive, plan.relay
+    if drive.foreign is not None:
+        checks.lack(_WHAT, "the motor is an FMU, whose current is not known")
+        return None
+    if drive.follows:
+        why = "the motor is controlled; its converter limits and protects it"
+        checks.lack(f"{_WHAT}, starts per hour", why)
+        return None
+    if study.start is None or study.start.start_time is None:
+        checks.lack(_WHAT, "the motor does not come to its speed")
+        return None
+    plate = None if study.plate is None else study.plate.nameplate
     # a relay in the phases of a delta carries the current of a winding
-    in_phases = drive.star_delta is not None and plan.is_in_phases
+    in_phases = drive.star_delta is not None and plan.relay_in_phases
     share = 1.0 / math.sqrt(3.0) if in_phases else 1.0
+    locked = share * plate.rated_current * plate.locked_current_ratio if plate else 0.0
     settings = {
-        "setting": plan.table.setting or share * (drive.rated_current or 0.0),
-        "stall_time": plan.table.stall_time or (plate.locked_time if plate else 0.0),
-        "stall_current": plan.table.stall_current
-        or (share * plate.rated_current * plate.locked_current_ratio if plate else 0.0),
+        "setting": table.setting or share * (drive.rated_current or 0.0),
+        "stall_time": table.stall_time or (plate.locked_time if plate else 0.0),
+        "stall_current": table.stall_current or locked,
     }
     if missing := [name for name, value in settings.items() if not value]:
-        return None, [NotChecked(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")]
-    assert study.start is not None
+        checks.lack(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")
+        return None
     before = share * study.answers[STEADY].current_rms
 
     def current_of(run: xr.Dataset) -> Any:
@@ -179,69 +221,21 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
     rise = study.runs["start_up"].sel(time=slice(None, study.start_end))
     seconds = start_seconds(rise["time"].values, current_of(rise), settings["setting"])
     starts = StartFindings.found_in(study)
-    if (
-        starts is not None
-        and drive.rated_current
-        and not starts.stuck
-        and in_phases == (drive.star_delta is not None)
-    ):
+    is_usual = in_phases == (drive.star_delta is not None)
+    if starts is not None and drive.rated_current and not starts.stuck and is_usual:
         # the hardest of the starts from all crank angles, which are for a relay at the rated current
-        seconds = max(
-            seconds, starts.relay_seconds * (share * drive.rated_current / settings["setting"]) ** 2
-        )
+        times = share * drive.rated_current / settings["setting"]
+        seconds = max(seconds, starts.relay_seconds * times**2)
     runs: dict[str, tuple[Any, Any, float, float | None]] = {}
-    for event in study.overloads:
+    for name in study.overloads:
+        event, answer = study.config.events[name], study.answers[name]
         # behind a coupling that opens no load is left that could trip the relay
-        if study.answers[event].coupling_trip_time is None:
-            run = from_event_on(study, event)
-            from_rest = study.config.events[event].from_rest
-            time = run["time"].values - study.event[event]
-            passes = study.config.events[event].passes and study.answers[event].stall_time is None
-            runs[event] = time, current_of(run), 0.0 if from_rest else before, before if passes else None
+        if answer.coupling_trip_time is None:
+            run = from_event_on(study, name)
+            after = before if event.passes and answer.stall_time is None else None
+            time = run["time"].values - study.event[name]
+            runs[name] = time, current_of(run), 0.0 if event.from_rest else before, after
     numbers = RelaySetting(before=before, start_seconds=seconds, **settings)
-    findings = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
-    return findings, list(relay_rows(findings, {event: study.title_of(event) for event in findings.events}))
-
-
-def _why_none(study: StudyRecord) -> str:
-    """The reason why no relay is checked; empty where one is."""
-    if study.drive.foreign is not None:
-        return "the motor is an FMU, whose current is not known"
-    if study.start is None or study.start.start_time is None:
-        return "the motor does not come to its speed"
-    return ""
-
-
-def relay_rows(findings: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow | NotChecked]:
-    """The rows of a relay; `titles` are those of its events."""
-    numbers, chosen_class, root = findings.numbers, findings.classes[findings.trip_class], "checks.relay"
-    here, name = f"{root}.classes.{findings.trip_class}", f"thermal relay of class {findings.trip_class}"
-    places = {
-        "Ir": f"{root}.setting",
-        "IA": f"{root}.stall_current",
-        "I0": f"{root}.before",
-        "largest": f"{here}.longest",
-    }
-    yield CheckRow(
-        name, "start", _CLAUSE,
-        f"t = sum (I/({MULTIPLE:g} Ir))^2 dt <= least trip time of the class at {MULTIPLE:g} Ir, cold",
-        numbers.start_seconds, chosen_class.shortest, f"{root}.start_seconds",
-        {"Ir": places["Ir"], "limit": f"{here}.shortest"}, "s",
-    )  # fmt: skip
-    yield _RUNNING.row(name, root, numbers, findings.holds_up_to)
-    if numbers.before >= TRIPS_AT * numbers.setting:
-        yield NotChecked(f"{name}, stall and events", "running alone trips it")
-        return
-    yield CheckRow(
-        name, "trip with the rotor locked", _STALL,
-        f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the class",
-        math.inf if chosen_class.stall_trip is None else chosen_class.stall_trip, numbers.stall_time,
-        f"{here}.stall_trip", places, "s",
-    )  # fmt: skip
-    for event, heat in findings.events.items():
-        path = f"{root}.events.{event}"
-        yield CheckRow(
-            name, f"heat of the motor until the trip ({titles[event]})", _STALL,
-            "t = sum (I/IA)^2 dt until the slowest relay trips", heat.seconds, numbers.stall_time, f"{path}.seconds",
-            {"IA": places["IA"], "trip": f"{path}.trip_time"}, "s",
-        )  # fmt: skip
+    relay = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
+    check_relay(checks, relay, study.titles)
+    return relay

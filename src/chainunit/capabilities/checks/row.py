@@ -1,13 +1,13 @@
-"""A check as a declared result: its clause and formula, the value beside its limit, and the numbers behind both."""
+"""Checks as data: the rule of each, and its row, the value beside its limit with the numbers behind both."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
-from ...reading.results import OWN, derived, part, result
+from ...reading.results import OWN, derived, part, parts, result
 
 
 @result
@@ -18,7 +18,7 @@ class CheckRow:
     title: str = part("the checked quantity")
     clause: str = part("standard and clause, or other source")
     formula: str = part("the formula in symbols")
-    value: float | None = part("its value; none where the part carries no load", unit=OWN)
+    value: float | None = part("its value; none: never", unit=OWN)
     limit: float = part("its limit", unit=OWN)
     number: str = part("place of the value in this result")
     numbers: Mapping[str, str] = part("by symbol of the formula, the place of its number in this result")
@@ -29,12 +29,10 @@ class CheckRow:
     )
 
     @derived("1", "used")
-    def utilisation(self) -> float | None:
+    def utilisation(self) -> float:
         """value/limit, or limit/value where the value must reach the limit."""
-        if self.value is None:
-            # a bearing without load or motion lasts for ever
-            return 0.0 if self.at_least else None
-        above, below = (self.limit, self.value) if self.at_least else (self.value, self.limit)
+        value = math.inf if self.value is None else self.value
+        above, below = (self.limit, value) if self.at_least else (value, self.limit)
         if below > 0.0:
             return above / below
         return math.inf if above > 0.0 else 0.0
@@ -42,7 +40,7 @@ class CheckRow:
     @derived()
     def holds(self) -> bool:
         """Whether the value keeps the limit."""
-        return self.utilisation is None or self.utilisation <= 1.0
+        return self.utilisation <= 1.0
 
 
 @result
@@ -55,27 +53,78 @@ class NotChecked:
     """the table that the file does not have, where that is the reason"""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class CheckRule:
-    """A check as data. `value` is the name of its number among those of a part; `letters` have by symbol of the
-    `formula` the place of its number, from the place of the part on: "F = largest_force; d = diameter". Those of
-    numbers that the part does not have are left out."""
+    """A check as data; its texts may have slots such as {run}. `value` is the place of its number in the result of a
+    part; `letters` have by symbol of the `formula` the place of its number there: "F = largest_force; d = diameter",
+    or in the whole result: "f = /motor_shaft.tension_factor". Those of numbers that the part does not have are left
+    out."""
 
-    value: str
     title: str
+    value: str
     clause: str
     formula: str
     letters: str = ""
     at_least: bool = False
 
-    def row(self, part: str, path: str, numbers: Any, limit: float, run: str = "") -> CheckRow:
-        """The row of a part: its `numbers` declare the value with its unit, and stand at `path` of the result; `run`
-        is the title of the run in the rule's title."""
-        letters = dict(pair.split(" = ") for pair in self.letters.split("; ") if pair)
-        quantity = type(numbers).__dataclass_fields__[self.value].metadata["quantity"]
+    def row(self, part: str, path: str, numbers: Any, limit: float, **slots: str) -> CheckRow:
+        """The row of a part: its `numbers` are a result that stands at `path` of the whole one."""
+        holder, name = _holder(numbers, self.value, slots)
+        kind: Any = type(holder)
+        declared = next(member for member in parts(kind) if member.name == name)
+        letters = {}
+        for letter, place in (pair.split(" = ") for pair in self.letters.split("; ") if pair):
+            if place.startswith("/"):
+                letters[letter] = place[1:]
+            elif getattr(*_holder(numbers, place, slots)) is not None:
+                letters[letter] = f"{path}.{place.format(**slots)}"
         return CheckRow(
-            part, self.title.format(run=run), self.clause, self.formula,
-            getattr(numbers, self.value), limit, f"{path}.{self.value}",
-            {x: f"{path}.{name}" for x, name in letters.items() if getattr(numbers, name, self) is not None},
-            quantity.unit, quantity.kind, self.at_least,
-        )  # fmt: skip
+            of=part,
+            title=self.title.format(**slots),
+            clause=self.clause.format(**slots),
+            formula=self.formula.format(**slots),
+            value=getattr(holder, name),
+            limit=limit,
+            number=f"{path}.{self.value.format(**slots)}",
+            numbers=letters,
+            unit=declared.unit,
+            kind=declared.kind,
+            at_least=self.at_least,
+        )
+
+
+def _holder(numbers: Any, place: str, slots: Mapping[str, str]) -> tuple[Any, str]:
+    """The result in `numbers` that has the number at that `place`, and its name there."""
+    *steps, name = place.split(".")
+    for step in steps:
+        key = step.format(**slots)
+        numbers = numbers[key] if isinstance(numbers, Mapping) else getattr(numbers, key)
+    return numbers, name
+
+
+@dataclass(frozen=True)
+class Checks:
+    """The checks of a study so far, and what was not checked."""
+
+    rows: list[CheckRow] = field(default_factory=list)
+    missing: list[NotChecked] = field(default_factory=list)
+
+    def lack(self, what: str, why: str, table: str = "") -> None:
+        """Add something that is not checked."""
+        self.missing.append(NotChecked(what, why, table))
+
+    def check(
+        self,
+        rule: CheckRule,
+        part: str,
+        path: str,
+        numbers: Any,
+        limit: float | None,
+        why: str = "",
+        **slots: str,
+    ) -> None:
+        """Add the row of a part, see `CheckRule.row`; without a value or a limit, the reason `why` it has none."""
+        if why and not limit:
+            self.lack(f"{part}, {rule.title.format(**slots)}", why)
+        else:
+            self.rows.append(rule.row(part, path, numbers, limit or 0.0, **slots))

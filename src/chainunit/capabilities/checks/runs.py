@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ...study.arrays import peak
@@ -13,14 +13,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def _runs_from_events(study: StudyRecord) -> Iterator[tuple[str, xr.Dataset]]:
-    """The start-up, and each other run from its event on, with their names."""
-    yield "start_up", study.runs["start_up"]
-    for name in study.event:
-        if name in study.runs:
-            yield name, from_event_on(study, name)
-
-
 def largest(study: StudyRecord, quantity: Callable[[xr.Dataset], Any]) -> tuple[float, str]:
-    """The largest size of a `quantity` in all runs, and the run in which it is."""
-    return max((peak(quantity(run)), name) for name, run in _runs_from_events(study))
+    """The largest size of a `quantity` in the start-up and in each other run from its event on, and that run."""
+    runs = {"start_up": study.runs["start_up"]}
+    runs |= {name: from_event_on(study, name) for name in study.event if name in study.runs}
+    return max((peak(quantity(run)), name) for name, run in runs.items())

@@ -3,62 +3,60 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from ...drives.nameplate import Nameplate
 from ...reading.text import number
 from ...study.permitted_starts import PermittedStarts, permitted_starts, standard_inertia, starting_data
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
-from .row import CheckRow, CheckRule, NotChecked
-from .tables import StartingTable
+from .plan import CheckPlan
+from .row import CheckRule, Checks
 
-_WHAT = "starts per hour by the rule of makers of motors"
+_STARTS = CheckRule(
+    "starts per hour", "per_hour",
+    "Rule of makers of motors, Z = Z0 KJ KM KP (SEW-Eurodrive, Project planning for AC motors)",
+    "Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM{choice}",
+    "Z0 = bare; ML = counter_torque; MH = motor_torque; I = current; IN = rated_current; FI = inertia_factor",
+)  # fmt: skip
 
 
-def find(
-    study: StudyRecord, table: StartingTable, asked: float
-) -> tuple[PermittedStarts | None, list[CheckRow | NotChecked]]:
-    """The starts of a study and their check, or the reason against it; the file asks for so many starts an hour, 0
-    where it does not say."""
+def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> PermittedStarts | None:
+    """The starts of a study, and their `checks`."""
     if study.drive.follows and study.drive.foreign is None:
         # the line on the relay names the starts, too
-        return None, []
-    if why := _why_none(study, table, asked):
-        return None, [NotChecked(_WHAT, why)]
+        return None
+    if why := _why_none(study, plan):
+        checks.lack("starts per hour by the rule of makers of motors", why)
+        return None
     assert study.plate is not None
     assert study.start is not None
     plate = study.plate.nameplate
     rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
-    current, bare = study.answers[STEADY].current_rms, table.permitted or plate.starts
-    starts = permitted_starts(
-        starting_data(study.drive, plate, rise, study.steady, per_hour=asked, bare=bare, current=current),
-        math.inf if study.proposal is None else study.proposal.permitted_starts,
-    )
-    return starts, list(starting_rows(starts, is_chosen=study.proposal is not None))
+    current, bare = study.answers[STEADY].current_rms, plan.starting.permitted or plate.starts
+    asked = plan.starts_per_hour
+    data = starting_data(study.drive, plate, rise, study.steady, per_hour=asked, bare=bare, current=current)
+    starts = permitted_starts(data, study.proposal.permitted_starts if study.proposal else math.inf)
+    check_starts(checks, starts, is_chosen=study.proposal is not None)
+    return starts
 
 
-def starting_rows(starts: PermittedStarts, is_chosen: bool = False) -> Iterator[CheckRow]:
-    """The row of the starts; those of a motor that `is_chosen` are limited by the criteria of the choice, too."""
+def check_starts(checks: Checks, starts: PermittedStarts, is_chosen: bool = False) -> None:
+    """Check the starts; those of a motor that `is_chosen` are limited by the criteria of the choice, too."""
     choice = "; at most as many as the choice of the motor permits, by the heat of its winding"
-    rule = CheckRule(
-        "per_hour", "starts per hour",
-        "CheckRule of makers of motors, Z = Z0 KJ KM KP (SEW-Eurodrive, Project planning for AC motors)",
-        f"Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM{choice if is_chosen else ''}",
-        "Z0 = bare; ML = counter_torque; MH = motor_torque; I = current; IN = rated_current; FI = inertia_factor",
-    )  # fmt: skip
-    yield rule.row("motor", "checks.starting", starts, starts.permitted)
+    checks.check(
+        _STARTS, "motor", "checks.starting", starts, starts.permitted, choice=choice if is_chosen else ""
+    )
 
 
-def _why_none(study: StudyRecord, table: StartingTable, asked: float) -> str:
+def _why_none(study: StudyRecord, plan: CheckPlan) -> str:
     """The reason why the starts are not checked; empty where they are."""
     if study.drive.foreign is not None:
         return "the motor is an FMU, whose starts are not known"
     if study.plate is None:
         return "the motor has no nameplate; take one of a catalogue (system.motor)"
-    if not asked:
+    if not plan.starts_per_hour:
         return "the file does not say how many; add [starting] with per_hour"
-    if not table.permitted and not study.plate.nameplate.starts:
+    if not plan.starting.permitted and not study.plate.nameplate.starts:
         why = "the catalogue gives no permitted starts of the bare rotor; add [starting] with permitted"
         return why + _by_standard(study, study.plate.nameplate)
     if study.start is None or study.start.start_time is None:

@@ -6,7 +6,8 @@ from typing import Literal
 
 from pydantic import Field, StrictBool
 
-from ...core.quantities import Value, declaration, quantity
+from ...core.quantities import Value, declaration, quantity, variables
+from ...drives.catalogue_flexible import FlexibleCouplingValues
 from ...drives.gear_rating import GearRating
 from ...reading.lists import TableList
 from ...study.relay import CLASSES
@@ -54,8 +55,11 @@ class BearingTable:
     )
 
 
-OF_ROLLING = ("C", "C0", "life", "life_factor", "static_safety", "elements", "diameter_ratio")
-OF_PLAIN = ("diameter", "width", "pressure", "speed", "pv")
+BEARING_KEYS = {
+    " or ".join(ROLLING): ("C", "C0", "life", "life_factor", "static_safety", "elements", "diameter_ratio"),
+    PLAIN: ("diameter", "width", "pressure", "speed", "pv"),
+}
+"""By kinds, the keys that they alone have."""
 NEEDED = {"ball": ("C",), "roller": ("C",), PLAIN: ("diameter", "width")}
 """By kind, the keys that a bearing must have."""
 
@@ -78,7 +82,7 @@ BEARINGS = TableList(
                     "not": {"anyOf": [{"required": [key]} for key in others]},
                 },
             }
-            for kinds, others in ((ROLLING, OF_PLAIN), ((PLAIN,), OF_ROLLING))
+            for kinds, others in zip((ROLLING, (PLAIN,)), reversed(BEARING_KEYS.values()), strict=True)
         ],
     },
     follows={"static_safety": "1.5 for balls, 3 for rollers"},
@@ -169,6 +173,8 @@ class GearRatingTable(GearRating):
     )
 
 
+OF_ROW = tuple(variable.name for variable in variables(FlexibleCouplingValues))
+"""The values of [flexible_coupling] that each coupling of a catalogue has."""
 PLACES = ("motor", "crank")
 """The places of a flexible coupling: on the motor's shaft, or on the crank's shaft behind the gear."""
 
