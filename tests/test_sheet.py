@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from chainunit import InputError
-from chainunit.capabilities.checks.pins import turning_pins
+from chainunit.capabilities.checks.plan import turning_pins
 from chainunit.report import blocks as b
 from chainunit.report import pdf, print_figures
 from chainunit.report import study as study_report

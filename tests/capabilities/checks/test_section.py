@@ -16,7 +16,6 @@ from command import chainunit
 from chainunit.capabilities.checks.plan import SectionPlan
 from chainunit.capabilities.checks.row import Checks
 from chainunit.capabilities.checks.section import (
-    Stresses,
     check_section,
     fibre_fatigue,
     fibres,
@@ -104,8 +103,8 @@ def test_published_numbers_of_an_exam_problem():
     )  # fmt: skip
     of = section_strength(SectionPlan(table, notch="keyway", steel="quenched", hard_surface=True))
     W = math.pi / 32.0 * 0.06**3
-    cycle = Stresses(np.array([1402.294 / W]), np.zeros(1), 0.0, 0.0, 1336.902 / (2.0 * W))
-    _, used = fibre_fatigue(of, cycle)
+    cycle = {"bending": np.array([1402.294 / W]), "tension": 0.0, "torsion": 0.0}
+    _, used = fibre_fatigue(of, cycle, math.sqrt(3.0) * 1336.902 / (2.0 * W))
     assert safety(np.max(used)) == pytest.approx(1.472, abs=5e-4)
     share = yield_share(of, 1.8 * 1402.294 / W, 0.0, 1.8 * 1336.902 / (2.0 * W))
     assert safety(share) == pytest.approx(2.568, abs=5e-4)

@@ -9,22 +9,10 @@ from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.file_reading import FileReading
-from ...study.file_section import FileSection, of_named
 from ...study.record import StudyRecord
 from ...study.rules import MACHINE_FMU, MOTOR_FMU, Rule
 from .plan import CheckPlan, read_plan
-from .tables import (
-    BEARINGS,
-    COUPLING_KEYS,
-    OF_ROW,
-    RELAY_KEYS,
-    SECTIONS,
-    FlexibleCouplingTable,
-    GearRatingTable,
-    MotorShaftTable,
-    RelayTable,
-    StartingTable,
-)
+from .tables import OF_ROW, TABLES
 
 
 class CheckCapability(Capability):
@@ -32,48 +20,7 @@ class CheckCapability(Capability):
 
     name = "checks"
     order = 100
-    tables = {  # noqa: RUF012
-        "bearing": of_named(BEARINGS),
-        "section": of_named(SECTIONS),
-        "relay": FileSection(
-            RelayTable,
-            optional=True,
-            keys=RELAY_KEYS,
-            title="Thermal overload relay",
-            follows={
-                "trip_class": "10, a heavier one if the start needs it, or 5 if 10 trips too late in a stall",
-                "setting": "the rated current of the motor, in the phases of a delta 1/sqrt(3) of it",
-                "stall_time": "that of the nameplate",
-                "stall_current": "that of the nameplate",
-            },
-        ),
-        "starting": FileSection(
-            StartingTable,
-            optional=True,
-            title="Starts per hour",
-            follows={
-                "per_hour": "sizing.starts_per_hour, if the file has [sizing]",
-                "permitted": "those of the catalogue, if it has them",
-            },
-        ),
-        "gear_rating": FileSection(
-            GearRatingTable,
-            optional=True,
-            title="Ratings of the gear",
-            follows={
-                "rated_torque": "gear.torque_limit over the application factor, if the file gives it",
-                "peak_factor": "gear.start_factor",
-            },
-        ),
-        "flexible_coupling": FileSection(
-            FlexibleCouplingTable,
-            optional=True,
-            keys=COUPLING_KEYS,
-            title="Flexible coupling",
-            follows={"start_factor": "by the starts an hour"},
-        ),
-        "motor_shaft": FileSection(MotorShaftTable, optional=True, title="Shaft of the motor"),
-    }
+    tables = TABLES
 
     def rules(self) -> Iterable[Rule]:
         """Bearings are those of a machine whose pins are known, a relay sees the current of a motor that is known."""
@@ -118,10 +65,9 @@ class CheckCapability(Capability):
         if findings is None:
             yield "bearings, shaft sections, gear and couplings: the study ended before"
             return
-        absent = [omission for omission in findings.not_checked if omission.table]
-        if absent:
-            parts = (f"{omission.what} ([{omission.table}])" for omission in absent)
-            yield f"parts without data in the file: {'; '.join(parts)}"
+        without_data = [f"{x.what} ([{x.table}])" for x in findings.not_checked if x.table]
+        if without_data:
+            yield f"parts without data in the file: {'; '.join(without_data)}"
         reasons: dict[str, list[str]] = {}
         for omission in findings.not_checked:
             if not omission.table:

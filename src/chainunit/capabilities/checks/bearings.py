@@ -24,8 +24,7 @@ from ...reading.text import number
 from ...study.bearings import EXPONENT, largest_load, mean_load, pin_force
 from ...study.readings import machine_series, turns_made
 from ...study.record import StudyRecord
-from .pins import first_word, turning_pins
-from .plan import BearingPlan
+from .plan import BearingPlan, first_word, turning_pins
 from .row import CheckRule, Checks
 from .tables import PLAIN, BearingTable
 

@@ -279,21 +279,21 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> CouplingCheck |
         speed=largest(study, lambda run: run[drive.motor_speed].values)[0] / ratio,
     )
 
-    def trial(table: FlexibleCouplingTable, checks: Checks) -> CouplingCheck:
-        args = (turns["time"].values, torque, factor, plan.coupling_place, run)
-        coupling = coupling_check(table, duty, *args)
+    def check(table: FlexibleCouplingTable, checks: Checks) -> CouplingCheck:
+        series = (turns["time"].values, torque)
+        coupling = coupling_check(table, duty, *series, factor, plan.coupling_place, run)
         check_coupling(checks, coupling, table, study.title_of(run))
         return coupling
 
     def rows_of(table: FlexibleCouplingTable) -> Sequence[CheckRow]:
-        trial(table, trial_checks := Checks())
-        return trial_checks.rows
+        check(table, trial := Checks())
+        return trial.rows
 
     candidates = tried(plan.couplings, table, rows_of, plan.coupling_name)
     for sold in plan.couplings:
         if sold.designation == candidates[0].designation:
             table = with_row(table, sold)
-    return replace(trial(table, checks), candidates=tuple(candidates))
+    return replace(check(table, checks), candidates=tuple(candidates))
 
 
 def with_row(table: FlexibleCouplingTable, sold: CatalogueFlexible) -> FlexibleCouplingTable:

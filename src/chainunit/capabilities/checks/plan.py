@@ -6,38 +6,14 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from ...core.errors import Faults, near_name
+from ...core.errors import Faults, meant, near_name
 from ...drives.catalogue import offer
 from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.lists import Entry
 from ...reading.tables import instance
 from ...study.file_reading import FileReading
 from ...study.parts import catalogues_of
-from .pins import no_pin, pins_named, turning_pins
-from .tables import (
-    BEARING_KEYS,
-    BEARINGS,
-    IN_PHASES,
-    KINDS,
-    NEEDED,
-    NOTCH_KEYS,
-    NOTCHES,
-    OF_ROW,
-    PARTS,
-    PLAIN,
-    RATIO,
-    SECTION_NEEDS,
-    SECTIONS,
-    SHOULDER,
-    STATIC_SAFETY,
-    BearingTable,
-    FlexibleCouplingTable,
-    GearRatingTable,
-    MotorShaftTable,
-    RelayTable,
-    SectionTable,
-    StartingTable,
-)
+from . import tables as t
 
 _LEAST_STEP, _LEAST_FILLET = 0.98, 0.03
 """Largest diameter over the outer one of a shoulder, and least radius over its depth, for which DIN 743-2 holds."""
@@ -47,7 +23,7 @@ class BearingPlan(NamedTuple):
     """The `kind` of a bearing, one of `KINDS`, and the values of its table; None for those that it does not give."""
 
     kind: str
-    table: BearingTable
+    table: t.BearingTable
 
 
 @dataclass(frozen=True)
@@ -55,13 +31,13 @@ class SectionPlan:
     """A section with the other keys of its table, see `SECTIONS`; `pin` is the title of its pin, empty for the
     bearing of the crank."""
 
-    table: SectionTable
+    table: t.SectionTable
     pin: str = ""
-    on: str = PARTS[0]
+    on: str = t.PARTS[0]
     notch: str = "none"
     steel: str = ""
     hard_surface: bool = False
-    mean_stress: str = RATIO
+    mean_stress: str = t.RATIO
 
 
 @dataclass(frozen=True)
@@ -70,19 +46,19 @@ class CheckPlan:
 
     bearings: Mapping[str, BearingPlan]
     sections: Mapping[str, SectionPlan]
-    relay: RelayTable
+    relay: t.RelayTable
     trip_class: str
     """name of the trip class of the relay; empty where the file gives none"""
     relay_in_phases: bool
     """whether the relay of a star-delta starter is in the phases of the delta"""
-    starting: StartingTable
+    starting: t.StartingTable
     starts_per_hour: float
     """the starts an hour that the file asks for; 0 where it does not say"""
-    gear: GearRatingTable
+    gear: t.GearRatingTable
     separate_bearing: bool
     """whether the file says that the crank has bearings of its own, so that the gear does not carry its reaction"""
-    motor_shaft: MotorShaftTable
-    coupling: FlexibleCouplingTable | None
+    motor_shaft: t.MotorShaftTable
+    coupling: t.FlexibleCouplingTable | None
     coupling_place: str
     coupling_name: str
     """the designation of the coupling of a catalogue; empty where the file does not name one"""
@@ -110,25 +86,47 @@ def read_plan(reading: FileReading) -> CheckPlan:
     with faults.collected():
         _check_coupling(Entry("flexible_coupling", coupling or {}), tuple(x.designation for x in couplings))
     faults.refuse()
-    starting = values.get("starting") or StartingTable()
+    starting = values.get("starting") or t.StartingTable()
     # the table of another capability, if the program has it
     sizing = values.get("sizing") if "sizing" in data else None
     return CheckPlan(
         bearings,
         sections,
-        relay=values.get("relay") or RelayTable(),
+        relay=values.get("relay") or t.RelayTable(),
         trip_class=form.relay.trip_class or "",
-        relay_in_phases=form.relay.place == IN_PHASES,
+        relay_in_phases=form.relay.place == t.IN_PHASES,
         starting=starting,
         starts_per_hour=float(starting.per_hour or getattr(sizing, "starts_per_hour", 0.0)),
-        gear=values.get("gear_rating") or GearRatingTable(),
+        gear=values.get("gear_rating") or t.GearRatingTable(),
         separate_bearing=getattr(getattr(form, "sizing", None), "separate_bearing", False),
-        motor_shaft=values.get("motor_shaft") or MotorShaftTable(),
+        motor_shaft=values.get("motor_shaft") or t.MotorShaftTable(),
         coupling=None if coupling is None else values["flexible_coupling"],
         coupling_place=form.flexible_coupling.place,
         coupling_name=form.flexible_coupling.designation,
         couplings=tuple(couplings),
     )
+
+
+def turning_pins(model: Any) -> list[str]:
+    """The titles of the pins of a machine that turn."""
+    return [title for title, output in model.pins.items() if output in model.joints]
+
+
+def first_word(title: str) -> str:
+    """The short name of a pin."""
+    return title.partition(" ")[0]
+
+
+def _pins_named(name: str, titles: list[str]) -> list[str]:
+    """The pins of these `titles` with a name: a whole title, or its first words. A name that several pins begin with
+    stands for each of them."""
+    return [title for title in titles if title == name or title.startswith(f"{name} ")]
+
+
+def _no_pin(name: str, titles: list[str]) -> str:
+    """The words on a name that no pin has."""
+    names = [*dict.fromkeys(spelling for title in titles for spelling in (first_word(title), title))]
+    return f"is no turning pin{meant(name, names)} there are {', '.join(titles) or 'none'}"
 
 
 def _check_coupling(entry: Entry, designations: Collection[str]) -> None:
@@ -141,7 +139,7 @@ def _check_coupling(entry: Entry, designations: Collection[str]) -> None:
             name,
             f"not in the catalogue; {some if designations else 'no catalogue has flexible couplings'}",
         )
-    for key in OF_ROW if designations else ():
+    for key in t.OF_ROW if designations else ():
         if key in entry.given:
             entry.fault(key, "each flexible coupling of the catalogue has its own; leave it out")
     entry.refuse()
@@ -165,52 +163,54 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
     taken: dict[str, str] = {}
 
     def read(entry: Entry, name: str) -> tuple[list[str], BearingPlan]:
-        pins = pins_named(name, titles)
+        pins = _pins_named(name, titles)
         if not pins:
-            entry.fault("", no_pin(name, titles))
+            entry.fault("", _no_pin(name, titles))
         kind = entry.raw.pop("kind", None)
         if kind is None:
-            entry.fault("kind", f"must be given, one of {', '.join(KINDS)}")
+            entry.fault("kind", f"must be given, one of {', '.join(t.KINDS)}")
             entry.refuse()
-        _check_keys(entry, "kind", kind, NEEDED[kind], BEARING_KEYS)
+        _check_keys(entry, "kind", kind, t.NEEDED[kind], t.BEARING_KEYS)
         for pin in pins:
             if pin in taken:
                 entry.fault(
                     "", f"the pin {pin} has its bearing in bearing.{taken[pin]}; leave out one of the two"
                 )
             taken[pin] = name
-        table = instance(BearingTable, entry.raw)
-        if table.static_safety is None and kind != PLAIN:
-            table = replace(table, static_safety=STATIC_SAFETY[kind])
+        table = instance(t.BearingTable, entry.raw)
+        if table.static_safety is None and kind != t.PLAIN:
+            table = replace(table, static_safety=t.STATIC_SAFETY[kind])
         return pins, BearingPlan(kind, table)
 
-    entries = BEARINGS.read_named(tables, faults, read)
+    entries = t.BEARINGS.read_named(tables, faults, read)
     plans = {pin: plan for pins, plan in entries.values() for pin in pins}
     return {title: plans[title] for title in titles if title in plans}
 
 
 def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, SectionPlan]:
     def read(entry: Entry, name: str) -> SectionPlan:
-        for key in SECTION_NEEDS:
+        for key in t.SECTION_NEEDS:
             if key not in entry.raw:
-                choice = f", one of {', '.join(NOTCHES)}" if key == "notch" else ""
+                choice = f", one of {', '.join(t.NOTCHES)}" if key == "notch" else ""
                 entry.fault(key, f"must be given{choice}")
-        keys = {key: entry.raw.pop(key) for key in SECTIONS.keys if key in entry.raw}
+        keys = {key: entry.raw.pop(key) for key in t.SECTIONS.keys if key in entry.raw}
         if pin := keys.get("pin"):
-            pins = pins_named(pin, titles)
+            pins = _pins_named(pin, titles)
             if len(pins) > 1:
                 entry.fault("pin", f"stands for {', '.join(pins)}; give the whole title of one")
             elif not pins:
-                entry.fault("pin", no_pin(pin, titles))
+                entry.fault("pin", _no_pin(pin, titles))
             else:
                 (keys["pin"],) = pins
         notch = keys.get("notch", "none")
-        _check_keys(entry, "notch", notch, NOTCH_KEYS[SHOULDER] if notch == SHOULDER else (), NOTCH_KEYS)
+        _check_keys(
+            entry, "notch", notch, t.NOTCH_KEYS[t.SHOULDER] if notch == t.SHOULDER else (), t.NOTCH_KEYS
+        )
         entry.refuse()
-        table = instance(SectionTable, entry.raw)
+        table = instance(t.SectionTable, entry.raw)
         if table.bore >= table.diameter:
             entry.fault("bore", "must be less than the diameter")
-        if notch == SHOULDER:
+        if notch == t.SHOULDER:
             depth = 0.5 * (table.outer_diameter - table.diameter)
             if table.diameter > _LEAST_STEP * table.outer_diameter:
                 entry.fault("outer_diameter", f"must be at least the diameter over {_LEAST_STEP:g}")
@@ -218,4 +218,4 @@ def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
                 entry.fault("radius", f"must be at least {_LEAST_FILLET:g} of the depth of the shoulder")
         return SectionPlan(table, **keys)
 
-    return SECTIONS.read_named(tables, faults, read)
+    return t.SECTIONS.read_named(tables, faults, read)

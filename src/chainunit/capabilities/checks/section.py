@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -108,18 +107,6 @@ class ShaftSection:
     fatigue_safety: float = quantity("1", "safety against fatigue")
     yield_safety: float = quantity("1", "safety against yield")
     strength: SectionStrength = part("its strength")
-
-
-@dataclass(frozen=True)
-class Stresses:
-    """Stresses of a cycle [N/m2]: bending of the fibres around the section, amplitude and mean of shape (n,);
-    amplitude of tension; amplitude and mean of torsion."""
-
-    bending: Any
-    bending_mean: Any
-    tension: float
-    torsion: float
-    torsion_mean: float
 
 
 def size_factor(steel: str, diameter: float, is_yield: bool) -> float:
@@ -242,18 +229,27 @@ def permitted_amplitude(
 
 
 def fibre_fatigue(
-    section: SectionStrength, stress: Stresses, case: str = RATIO
+    section: SectionStrength, amplitudes: Mapping[str, Any], mean: Any, case: str = RATIO
 ) -> tuple[dict[str, Any], Any]:
-    """The fibres around a section under their stresses, each of shape (n,): permitted amplitudes by load [N/m2], and
-    the used share of the strength, one over the safety; for the `case` see `permitted_amplitude`."""
-    mean = np.sqrt(np.square(stress.bending_mean) + 3.0 * stress.torsion_mean**2)
+    """The fibres around a section, each of shape (n,): permitted amplitudes by load [N/m2], and the used share of the
+    strength, one over the safety.
+
+    Parameters
+    ----------
+    amplitudes : by load, the amplitude of stress [N/m2], that of bending of shape (n,)
+    mean : equivalent mean stress sqrt(sm^2 + 3 tm^2) of the fibres [N/m2], shape (n,)
+    case : see `permitted_amplitude`
+    """
     limits, shares = {}, {}
-    for load in FATIGUE:
-        strength, yields, amplitude = (
-            getattr(x, name) for x, name in ((section, load), (section, f"yield_{load}"), (stress, load))
+    for load, amplitude in amplitudes.items():
+        limits[load] = permitted_amplitude(
+            getattr(section, load),
+            getattr(section, f"yield_{load}"),
+            section.tensile,
+            amplitude,
+            mean / math.sqrt(3.0) if load == "torsion" else mean,
+            case,
         )
-        middle = mean / math.sqrt(3.0) if load == "torsion" else mean
-        limits[load] = permitted_amplitude(strength, yields, section.tensile, amplitude, middle, case)
         with np.errstate(divide="ignore", invalid="ignore"):
             shares[load] = np.where(np.asarray(amplitude) > 0.0, amplitude / limits[load], 0.0)
     return limits, np.hypot(shares["bending"] + shares["tension"], shares["torsion"])
@@ -311,32 +307,29 @@ def shaft_section(
     area, modulus = 0.25 * math.pi * (d**2 - bore**2), math.pi / 32.0 * (d**4 - bore**4) / d
     lever, twist = table.arm / modulus, table.torsion_share / (2.0 * modulus)
     pull = table.axial_share / area
-    stress = Stresses(
-        bending=lever * np.asarray(amplitude),
-        bending_mean=lever * np.asarray(mean),
-        # the force on a link changes its sign with an angle that is not known here
-        tension=pull * force,
-        torsion=twist * 0.5 * float(np.ptp(torque)),
-        torsion_mean=twist * 0.5 * abs(float(np.max(torque) + np.min(torque))),
-    )
+    bending, bending_mean = (lever * np.asarray(force) for force in (amplitude, mean))
+    # the force on a link changes its sign with an angle that is not known here
+    tension = pull * force
+    torsion = twist * 0.5 * float(np.ptp(torque))
+    torsion_mean = twist * 0.5 * abs(float(np.max(torque) + np.min(torque)))
     strength = section_strength(plan)
-    permitted, used = fibre_fatigue(strength, stress, plan.mean_stress)
+    swings = {"bending": bending, "tension": tension, "torsion": torsion}
+    equivalent = np.sqrt(bending_mean**2 + 3.0 * torsion_mean**2)
+    permitted, used = fibre_fatigue(strength, swings, equivalent, plan.mean_stress)
     worst = int(np.argmax(used))
-    swings: dict[str, Any] = {
-        "bending": float(stress.bending[worst]),
-        "tension": stress.tension,
-        "torsion": stress.torsion,
-    }
+    swings["bending"] = float(bending[worst])
     limits: dict[str, Any] = {
-        f"permitted_{x}": float(permitted[x][worst]) if swings[x] > 0.0 else None for x in FATIGUE
+        f"permitted_{load}": float(permitted[load][worst]) if x > 0.0 else None for load, x in swings.items()
     }
     most = (lever * largest, pull * largest, twist * largest_torque)
     return ShaftSection(
         pin=pin,
         run=run,
-        **swings,
-        bending_mean=float(stress.bending_mean[worst]),
-        torsion_mean=stress.torsion_mean,
+        bending=swings["bending"],
+        bending_mean=float(bending_mean[worst]),
+        tension=tension,
+        torsion=torsion,
+        torsion_mean=torsion_mean,
         **limits,
         largest_bending=most[0],
         largest_tension=most[1],

@@ -10,6 +10,7 @@ from ...core.quantities import Value, declaration, quantity, variables
 from ...drives.catalogue_flexible import FlexibleCouplingValues
 from ...drives.gear_rating import GearRating
 from ...reading.lists import TableList
+from ...study.file_section import FileSection, of_named
 from ...study.relay import CLASSES
 
 ROLLING, PLAIN = ("ball", "roller"), "plain"
@@ -115,22 +116,6 @@ IN_PHASES = "phases"
 RELAY_PLACES = (IN_PHASES, "line")
 """The places of the relay of a star-delta starter."""
 
-RELAY_KEYS = {
-    "trip_class": (
-        Literal[tuple(relay_class.name for relay_class in CLASSES)],
-        Field(None, description="trip class of IEC 60947-4-1"),
-    ),
-    "place": (
-        Literal[RELAY_PLACES],
-        Field(
-            IN_PHASES,
-            description="place of the relay of a star-delta starter: in the phases of the delta, set to 1/sqrt(3) of "
-            "the rated current, or in the supply line",
-        ),
-    ),
-}
-"""Keys of [relay] that are no quantities, as pydantic fields."""
-
 
 @declaration
 class StartingTable:
@@ -216,16 +201,6 @@ class FlexibleCouplingTable:
         min=1.0,
         max=10.0,
     )
-
-
-COUPLING_KEYS = {
-    "designation": (
-        str,
-        Field("", description="designation of a flexible coupling of the catalogues that the file names"),
-    ),
-    "place": (Literal[PLACES], Field("motor", description="shaft that it is on")),
-}
-"""Keys of [flexible_coupling] that are no quantities, as pydantic fields."""
 
 
 @declaration
@@ -337,3 +312,68 @@ SECTIONS = TableList(
         "beta_torsion": "1",
     },
 )
+
+TABLES = {
+    "bearing": of_named(BEARINGS),
+    "section": of_named(SECTIONS),
+    "relay": FileSection(
+        RelayTable,
+        optional=True,
+        keys={
+            "trip_class": (
+                Literal[tuple(relay_class.name for relay_class in CLASSES)],
+                Field(None, description="trip class of IEC 60947-4-1"),
+            ),
+            "place": (
+                Literal[RELAY_PLACES],
+                Field(
+                    IN_PHASES,
+                    description="place of the relay of a star-delta starter: in the phases of the delta, set to "
+                    "1/sqrt(3) of the rated current, or in the supply line",
+                ),
+            ),
+        },
+        title="Thermal overload relay",
+        follows={
+            "trip_class": "10, a heavier one if the start needs it, or 5 if 10 trips too late in a stall",
+            "setting": "the rated current of the motor, in the phases of a delta 1/sqrt(3) of it",
+            "stall_time": "that of the nameplate",
+            "stall_current": "that of the nameplate",
+        },
+    ),
+    "starting": FileSection(
+        StartingTable,
+        optional=True,
+        title="Starts per hour",
+        follows={
+            "per_hour": "sizing.starts_per_hour, if the file has [sizing]",
+            "permitted": "those of the catalogue, if it has them",
+        },
+    ),
+    "gear_rating": FileSection(
+        GearRatingTable,
+        optional=True,
+        title="Ratings of the gear",
+        follows={
+            "rated_torque": "gear.torque_limit over the application factor, if the file gives it",
+            "peak_factor": "gear.start_factor",
+        },
+    ),
+    "flexible_coupling": FileSection(
+        FlexibleCouplingTable,
+        optional=True,
+        keys={
+            "designation": (
+                str,
+                Field(
+                    "", description="designation of a flexible coupling of the catalogues that the file names"
+                ),
+            ),
+            "place": (Literal[PLACES], Field("motor", description="shaft that it is on")),
+        },
+        title="Flexible coupling",
+        follows={"start_factor": "by the starts an hour"},
+    ),
+    "motor_shaft": FileSection(MotorShaftTable, optional=True, title="Shaft of the motor"),
+}
+"""By its name, each table of a study file."""
