@@ -58,6 +58,12 @@ def shaft_power(drive: Drive, run: xr.Dataset) -> Any:
     return torque * speed
 
 
+def torque_before_gear(drive: Drive, run: xr.Dataset) -> Any:
+    """Torque on the motor's shaft [N m], shape (time,), with the one that the gear loses."""
+    torque = run[drive.motor_torque].values
+    return torque + lost_torque(np, drive.gear_loss, torque, run[drive.motor_speed].values)
+
+
 def gear_loss(drive: Drive, run: xr.Dataset) -> Any:
     """Power that the gear loses [W], shape (time,)."""
     torque, w = run["motor.tau"].values, run["motor.w"].values

@@ -21,7 +21,7 @@ from ...core.quantities import Value, declaration, quantity
 from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.results import OWN, derived, part, result
 from ...reading.text import number
-from ...study.readings import load_inertia
+from ...study.readings import load_inertia, torque_before_gear
 from ...study.record import StudyRecord
 from ...study.remark import note, warning
 from ...study.torques import gear_torque
@@ -267,7 +267,7 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> CouplingCheck |
     ratio = drive.ratio if is_on_crank else 1.0
 
     def torque_of(run: xr.Dataset) -> Any:
-        return gear_torque(drive, run) if is_on_crank else run[drive.motor_torque].values
+        return gear_torque(drive, run) if is_on_crank else torque_before_gear(drive, run)
 
     torque, (most, run) = torque_of(turns), largest(study, torque_of)
     duty = CouplingDuty(

@@ -21,7 +21,7 @@ from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
 from ...study.event_torques import gear_peaks, running_peak
-from ...study.readings import crank_angle, shaft_power
+from ...study.readings import crank_angle, shaft_power, torque_before_gear
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_torque
@@ -230,7 +230,7 @@ def motor_shaft(study: StudyRecord, plan: CheckPlan, checks: Checks) -> ShaftLoa
         return None
     bearing = driver_bearing(drive)
     if table.pulley_diameter and table.tension_factor:
-        torque = peak(turns[drive.motor_torque].values)
+        torque = peak(torque_before_gear(drive, turns))
         load = ShaftLoad(torque, pulley_force(torque, table.pulley_diameter, table.tension_factor))
         rule = _PULLEY
     elif direct and bearing:
