@@ -54,8 +54,10 @@ def model_named(name: str, direct: bool = False, rods: int | None = None) -> Mod
         machine = read_linkage(Path(name))
         return machine.direct() if direct else machine
     if name not in MODELS:
-        there = f"there are {', '.join(MODELS)}, and linkage files (.toml)"
-        raise InputError(f"{name}: no such model{near_name(name, MODELS) or ';'} {there}")
+        there = f"there are {', '.join(MODELS)}, and study and linkage files (.toml)"
+        file = Path(name).with_suffix(".toml")
+        near = f'; was "{file}" meant?' if file.exists() else near_name(name, MODELS)
+        raise InputError(f"{name}: no such model{near or ';'} {there}")
     if direct:
         raise InputError(
             "direct: is of linkage files; the direct model of a machine has a name, as ChainUnit"

@@ -73,7 +73,7 @@ def to_number(variable: Variable, entry: Any) -> float:
     return variable.quantity.within_bounds(value)
 
 
-_SENSE = '; the sense of a linkage is that of its driver: positive = "clockwise" in [driver] of its file'
+_SENSE = '; a linkage turns the other way by positive = "clockwise" in [driver] of its file'
 
 
 def option_value(name: str, text: str, unit: str, description: str, most: float = math.inf) -> float:

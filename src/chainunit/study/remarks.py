@@ -471,7 +471,12 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         if answers.energy_behind is not None:
             stays = f"{behind} stay behind it"
         yield "trip", f"after {time}; {energy} pass it while it opens, {stays}", sizes
-    elif name in config.events and answers.recovery_time is None and study.returns:
+    elif (
+        name in config.events
+        and answers.recovery_time is None
+        and answers.stall_time is None
+        and study.returns
+    ):
         yield "not-recovered", "", {}
 
 
