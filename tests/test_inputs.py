@@ -18,7 +18,7 @@ import pytest
 from command import chainunit as command_line
 
 import chainunit
-from chainunit.capabilities.handover.cycle import load_cycle, read_cycle
+from chainunit.capabilities.handover.studied import load_cycle
 from chainunit.capabilities.vouching import archive
 from chainunit.capabilities.vouching.certify import members_of
 from chainunit.capabilities.vouching.keys import private_key, public_key
@@ -32,6 +32,7 @@ from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.load_entries import MOST_POINTS
 from chainunit.reading import toml_lines
 from chainunit.recordings.recording import read_recording
+from chainunit.report.series import LOAD_CYCLE_HEADS
 from chainunit.study import config
 from chainunit.study.stored_result import read_result
 from chainunit.system.foreign import fmu_component
@@ -45,7 +46,7 @@ def _table(file):
 
 READERS = {
     "tables.file": _table, "catalogue": offer, "recording": read_recording, "compare": read_result,
-    "handover": read_cycle, "result.nc": lambda file: inputs.dataset(file, "start_up"), "study": config.load,
+    "handover": load_cycle, "result.nc": lambda file: inputs.dataset(file, "start_up"), "study": config.load,
     "linkage": read_linkage, "fmu": Fmu, "verify": lambda file: verify(file, None), "certify": members_of,
     "key": private_key, "public key": public_key, "identification": watch._read_errors,
 }  # fmt: skip
@@ -220,9 +221,11 @@ def test_a_series_that_would_fill_the_memory_or_is_damaged_is_refused(tmp_path, 
         assert "cannot be read" in refusal(READERS["result.nc"], file)
 
 
-def test_a_load_cycle_that_is_none_is_not_cited():
-    with pytest.raises(ValueError, match="a row is not four numbers"):
-        load_cycle(b"head\n1,2,3,secret\n1,2,3,4\n")
+def test_a_load_cycle_that_is_none_is_not_cited(tmp_path):
+    file = tmp_path / "load_cycle.csv"
+    file.write_text(f"{','.join(LOAD_CYCLE_HEADS)}\n1,2,3,secret\n1,2,3,4\n")
+    words = refusal(load_cycle, file)
+    assert "a row of the load cycle is not four numbers" in words and "secret" not in words
 
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>

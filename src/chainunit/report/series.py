@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SERIES = "result.nc"
+LOAD_CYCLE_HEADS = ("time [s]", "speed [rad/s]", "torque [N.m]", "inertia [kg.m2]")
+"""The heads of the load cycle."""
 STEADY_BEGIN = "steady_begin"
 """Attribute of the start-up: the time at which the turns of the load cycle begin [s]."""
 
@@ -39,7 +41,7 @@ def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
     columns = time - time[0], speed, torque, load_inertia(drive, turns)
     with atomic_file(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
-        writer.writerow(("time [s]", "speed [rad/s]", "torque [N.m]", "inertia [kg.m2]"))
+        writer.writerow(LOAD_CYCLE_HEADS)
         writer.writerows([f"{x:.9g}" for x in row] for row in zip(*columns, strict=True))
     return file
 

@@ -16,8 +16,7 @@ from command import chainunit
 from event_tables import HEAVY_TABLES
 from sizings import sized_by
 
-from chainunit.capabilities.handover.candidates import candidates_csv
-from chainunit.capabilities.handover.checks import checks_csv
+from chainunit.capabilities.handover.tables import candidates_csv, checks_csv
 from chainunit.capabilities.sizing import findings
 from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
 from chainunit.capabilities.sizing.gear_order import GearLoad, GearOrder

@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core.files import write_file
+from ...core.inputs import file_bytes
 from ...report import blocks as b
 from ...report.lines import Name
 from ...report.task import Task, Writer
 from ...study.record import LOAD_CYCLE
-from ...work.progress import TaskProgress
-from .candidates import CANDIDATES, candidates_csv
-from .checks import CHECKS, checks_csv
-from .cycle import as_csv
 from .sizing import CYCLE, RUN, STUDY, sizing_of, values_of
 from .studied import read_study
+from .tables import CANDIDATES, CHECKS, candidates_csv, checks_csv, cycle_csv
 
 
-@dataclass(frozen=True)
-class Handover:
-    """The files for other programs, ready to be written."""
+class Handover(NamedTuple):
+    """The files for other programs, ready to be written: the content of sizing.json, and those beside it by name."""
 
     sizing: Mapping[str, Any]
-    """the content of sizing.json"""
     files: Mapping[str, bytes]
-    """the files beside it, by name"""
 
 
 def hand_over(results: Path) -> Handover:
@@ -40,12 +34,17 @@ def hand_over(results: Path) -> Handover:
         see `chainunit.capabilities.handover.studied.read_study`.
     """
     study = read_study(results)
-    texts = {CYCLE: as_csv(study.steady), RUN: as_csv(study.run)}
-    if study.candidates:
-        texts[CANDIDATES] = candidates_csv(study.candidates)
-    if study.checks:
-        texts[CHECKS] = checks_csv(study.checks)
-    files = {STUDY: study.files[study.result.file.name], LOAD_CYCLE: study.files[LOAD_CYCLE]}
+    files = {
+        STUDY: file_bytes(study.result.file),
+        LOAD_CYCLE: file_bytes(study.result.file.parent / LOAD_CYCLE),
+    }
+    texts = {CYCLE: cycle_csv(study.steady), RUN: cycle_csv(study.run)}
+    for name, path, table in (
+        (CANDIDATES, "sizing/candidates", candidates_csv),
+        (CHECKS, "checks/rows", checks_csv),
+    ):
+        if rows := study.rows(path):
+            texts[name] = table(rows)
     return Handover(sizing_of(study), files | {name: text.encode() for name, text in texts.items()})
 
 
@@ -91,14 +90,9 @@ def _writers(handover: Handover, report: b.Report, folder: Path, of_report: list
     return [*(partial(write_file, folder / name, content) for name, content in files), *of_report]
 
 
-def _compute(results: Path, folder: Path | None, progress: TaskProgress) -> Handover:
-    progress("reading the study", 0.0, 1.0)
-    return hand_over(results)
-
-
 TASK: Task[Path, Handover] = Task(
     "handover",
-    _compute,
+    lambda results, folder, progress: hand_over(results),
     handover_report,
     files=(CYCLE, RUN, LOAD_CYCLE, STUDY, CANDIDATES, CHECKS),
     writers=_writers,
