@@ -8,9 +8,9 @@ CasADi's symbols (`chainunit.core.symbolic_trace`), from which the C code of FMU
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..core.engines import MATH
 from ..core.errors import InputError, near_name, shown
 from ..core.model import Model
 from ..core.quantities import Variable, quotient
-from ..core.symbolic_trace import trace
+from ..core.symbolic_trace import outputs_of, trace
 from ..reading.results import GIVEN, OWN, InUnit, derived, part, result
 from .poles import Pole, poles_of
 
@@ -238,18 +238,30 @@ def linearize(
     p = model.check(parameters)
     u = model.input_layout.from_names(dict(inputs or {}))
     x = _states(model, p, u, states or {})
-    equations = _derivatives(model)
-    point = equations.point(p, x, u)
-    values, slopes = equations.at(point)
-    n = len(x)
-    if not np.isfinite(values).all():
-        first = equations.row_names[int(np.flatnonzero(~np.isfinite(values))[0])]
-        raise InputError(f"{model.name}: {first} is not a finite number at this point; take another point")
+    if model.derived_count and not hasattr(p, "derived"):
+        p = model.with_derived(MATH, p)
+    equations, n = _equations(model), len(x)
+    of_inputs = np.array(model.input_layout.values(u), float)
+    z = np.array([*x, *of_inputs[equations.inputs]], float)
+    fixed = np.delete(of_inputs, equations.inputs), layout.values(p), p.derived if model.derived_count else []
+
+    def at_columns(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values, slopes = equations.function(z, *fixed)
+        return np.array(values, float).ravel(), np.array(slopes, float).reshape(-1, len(z))
+
+    values, slopes = at_columns(z)
+    for k in np.flatnonzero(~np.isfinite(values))[:1]:
+        raise InputError(
+            f"{model.name}: {equations.row_names[k]} is not a finite number at this point; take another point"
+        )
     rows = [
         LinearSignal(v.name, v.unit, v.description, float(y))
         for v, y in zip(equations.rows, values, strict=True)
     ]
-    columns = [LinearSignal(v.name, v.unit, v.description, v0) for v, v0 in equations.columns_at(point)]
+    columns = [
+        LinearSignal(v.name, v.unit, v.description, float(y))
+        for v, y in zip(equations.columns, z, strict=True)
+    ]
     return LinearModel(
         title or model.name,
         model.name,
@@ -265,7 +277,7 @@ def linearize(
         slopes[:n, n:],
         slopes[n:, :n],
         slopes[n:, n:],
-        tuple(equations.bends(point, values, slopes)),
+        tuple(_bends(equations, z, values, slopes, lambda z: at_columns(z)[1])),
     )
 
 
@@ -281,111 +293,85 @@ def _states(model: Model, p: Any, u: Any, states: Mapping[str, float]) -> list[f
     return [float(x) for x in layout.values(layout.from_names(dict(states), model.begin(p, u)))]
 
 
-class _Derivatives:
-    """The equations of a model with their derivatives, as functions of CasADi. Rows are the derivatives of the
-    states, the states and the outputs; columns are the states and the inputs."""
+class _Equations(NamedTuple):
+    """The equations of a model with their derivatives. Rows are the derivatives of the states, the states and the
+    outputs; columns are the states and the inputs."""
 
-    def __init__(self, model: Model) -> None:
-        import casadi
+    rows: tuple[Variable, ...]
+    row_names: list[str]
+    columns: tuple[Variable, ...]
+    inputs: list[int]
+    """places of the inputs that are columns: a count or a switch has no slope"""
+    function: Any
+    """casadi function of columns, other inputs, parameters and derived values: values and slopes of the rows"""
 
-        traced = trace(model)
-        self._model = model
-        self._states = model.state_layout.variables if model.state_layout else ()
-        inputs = model.input_layout.variables
-        outputs = [v for model_part in model.parts for v in model_part.layout.variables]
-        kept = [k for k, v in enumerate(outputs) if v.type == "Real"]
-        self.rows = (*self._states, *self._states, *(outputs[k] for k in kept))
-        names = [v.name for v in self.rows]
-        n = len(self._states)
-        self.row_names = [*(f"der({name})" for name in names[:n]), *names[n:]]
-        # an input that is a count or a switch has no slope
-        chosen = [k for k, v in enumerate(inputs) if v.type == "Real"]
-        self._columns = [(0, k) for k in range(n)] + [(1, k) for k in chosen]
-        self.columns = [*self._states, *(inputs[k] for k in chosen)]
-        x = casadi.vertsplit(traced.symbols[2]) if n else []
-        u = casadi.vertsplit(traced.symbols[1])
-        values = [*traced.derivatives, *x, *(traced.outputs[k] for k in kept)]
-        rows = casadi.vertcat(*map(casadi.SX, values))
-        by = casadi.vertcat(*x, *(u[k] for k in chosen))
-        slopes = casadi.jacobian(rows, by)
-        self._all, self._slopes = (
-            casadi.Function(
-                name, traced.symbols, [casadi.densify(matrix) for matrix in matrices], {"cse": True}
-            )
-            for name, matrices in (("values", (rows, slopes)), ("slopes", (slopes,)))
-        )
 
-    def point(self, p: Any, x: Sequence[float], u: Any) -> tuple[Any, ...]:
-        """The point as the functions take it: states and inputs, and before and behind them parameters and derived
-        values."""
-        layout, input_layout = self._model.parameter_layout, self._model.input_layout
-        if self._model.derived_count and not hasattr(p, "derived"):
-            p = self._model.with_derived(MATH, p)
-        fixed = layout.values(p), (p.derived if self._model.derived_count else [])
-        return (
-            np.array(fixed[0], float),
-            [np.array(x, float), np.array(input_layout.values(u), float)],
-            fixed[1],
-        )
+@lru_cache(maxsize=8)
+def _equations(model: Model) -> _Equations:
+    import casadi
 
-    def columns_at(self, point: tuple[Any, ...]) -> list[tuple[Variable, float]]:
-        """Each column with its value."""
-        places = zip(self.columns, self._columns, strict=True)
-        return [(v, float(point[1][kind][k])) for v, (kind, k) in places]
+    traced = trace(model)
+    p, u, x, derived_values = traced.symbols
+    states = model.state_layout.variables if model.state_layout else ()
+    of_states, of_inputs = (casadi.vertsplit(vector) if vector.numel() else [] for vector in (x, u))
+    outputs, inputs = outputs_of(model), model.input_layout.variables
+    kept = [k for k, v in enumerate(outputs) if v.type == "Real"]
+    rows = (*states, *states, *(outputs[k] for k in kept))
+    chosen = [k for k, v in enumerate(inputs) if v.type == "Real"]
+    values = [*traced.derivatives, *of_states, *(traced.outputs[k] for k in kept)]
+    values = casadi.vertcat(*map(casadi.SX, values))
+    columns = casadi.vertcat(*of_states, *(of_inputs[k] for k in chosen))
+    others = casadi.vertcat(*(symbol for k, symbol in enumerate(of_inputs) if k not in chosen))
+    results = [casadi.densify(values), casadi.densify(casadi.jacobian(values, columns))]
+    return _Equations(
+        rows,
+        [f"der({v.name})" if k < len(states) else v.name for k, v in enumerate(rows)],
+        (*states, *(inputs[k] for k in chosen)),
+        chosen,
+        casadi.Function("rows", [columns, others, p, derived_values], results, {"cse": True}),
+    )
 
-    def at(self, point: tuple[Any, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """The values of the rows, shape (rows,), and their slopes, shape (rows, columns)."""
-        p, (x, u), derived_values = point
-        values, slopes = self._all(p, u, x, derived_values)
-        return np.array(values, float).ravel(), self._shaped(slopes)
 
-    def _shaped(self, slopes: Any) -> np.ndarray:
-        return np.array(slopes, float).reshape(len(self.rows), len(self.columns))
+def _bends(
+    equations: _Equations,
+    z: np.ndarray,
+    values: np.ndarray,
+    slopes: np.ndarray,
+    slopes_at: Callable[[np.ndarray], np.ndarray],
+) -> Iterator[Bend]:
+    """The places near the columns `z` where slopes change faster than those of smooth powers. A slope that is not
+    defined there does not count."""
+    columns, rows = equations.columns, equations.rows
+    sizes = np.array([_size(v, value) for v, value in zip(columns, z, strict=True)])
+    least = _SLIGHT * (np.array([[v.quantity.nominal or 1.0] for v in rows]) + np.abs(values)[:, None])
+    defined = np.isfinite(slopes)
 
-    def _moved(self, point: tuple[Any, ...], column: int, by: float) -> np.ndarray:
-        """The slopes with one column moved."""
-        p, moving, derived_values = point
-        moved = [array.copy() for array in moving]
-        kind, k = self._columns[column]
-        moved[kind][k] += by
-        return self._shaped(self._slopes(p, moved[1], moved[0], derived_values))
-
-    def bends(self, point: tuple[Any, ...], values: np.ndarray, slopes: np.ndarray) -> list[Bend]:
-        """The places near the point where slopes change faster than those of smooth powers."""
-        sizes = np.array([_size(v, value) for v, value in self.columns_at(point)])
-        least = _SLIGHT * (
-            np.array([[v.quantity.nominal or 1.0] for v in self.rows]) + np.abs(values)[:, None]
-        )
-        undefined = ~np.isfinite(slopes)
-        bends = []
-        for column, v in enumerate(self.columns):
-            for share in (AT, NEAR):
-                distance = float(share * sizes[column])
-                with np.errstate(all="ignore"):
-                    jump, most = self._jump(point, column, distance, sizes, slopes)
-                    nearer, _ = self._jump(point, column, 0.1 * distance, sizes, slopes)
-                    bent = ~(jump <= CHANGE * most + least) & ~(nearer <= _SHARP * jump)
-                of_rows = bent.any(axis=1) | undefined[:, column]
-                if of_rows.any():
-                    changes = [float(x) for x in (jump[bent] / most[bent]) if np.isfinite(x)]
-                    names = [name for name, is_bent in zip(self.row_names, of_rows, strict=True) if is_bent]
-                    within = InUnit(distance, v.unit)
-                    bends.append(Bend(v.name, share == AT, within, tuple(names), max(changes, default=1.0)))
-                    break
-        return bends
-
-    def _jump(
-        self, point: tuple[Any, ...], column: int, distance: float, sizes: np.ndarray, slopes: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def jump(column: int, distance: float) -> tuple[np.ndarray, np.ndarray]:
         """The largest change of each slope between the point and both sides, and the largest of the three, shape
-        (rows, columns), both by the `sizes` of the columns. A slope that is not defined at the point does not
-        count."""
+        (rows, columns), both by the sizes of the columns."""
+        step = distance * (np.arange(len(z)) == column)
         here, low, high = (
-            np.where(np.isfinite(slopes), side_slopes * sizes, 0.0)
-            for side_slopes in (slopes, *(self._moved(point, column, by) for by in (-distance, distance)))
+            np.where(defined, by * sizes, 0.0) for by in (slopes, slopes_at(z - step), slopes_at(z + step))
         )
-        jumps = np.abs([high - low, high - here, here - low])
-        return np.max(jumps, axis=0), np.max(np.abs([low, high, here]), axis=0)
+        changes = np.abs([high - low, high - here, here - low])
+        return np.max(changes, axis=0), np.max(np.abs([low, high, here]), axis=0)
+
+    for column, v in enumerate(columns):
+        for share in (AT, NEAR):
+            distance = float(share * sizes[column])
+            with np.errstate(all="ignore"):
+                change, most = jump(column, distance)
+                bent = ~(change <= CHANGE * most + least) & ~(
+                    jump(column, 0.1 * distance)[0] <= _SHARP * change
+                )
+            of_rows = bent.any(axis=1) | ~defined[:, column]
+            if of_rows.any():
+                largest = max((float(x) for x in change[bent] / most[bent] if np.isfinite(x)), default=1.0)
+                names = tuple(
+                    name for name, is_bent in zip(equations.row_names, of_rows, strict=True) if is_bent
+                )
+                yield Bend(v.name, share == AT, InUnit(distance, v.unit), names, largest)
+                break
 
 
 def _size(v: Variable, value: float) -> float:
@@ -393,8 +379,3 @@ def _size(v: Variable, value: float) -> float:
     many turns, one turn at most."""
     size = max(v.quantity.nominal or 1.0, abs(value))
     return min(size, 2.0 * np.pi) if v.unit == "rad" else size
-
-
-@lru_cache(maxsize=8)
-def _derivatives(model: Model) -> _Derivatives:
-    return _Derivatives(model)
