@@ -19,13 +19,10 @@ from ..system.compiled_simulation import CompiledSystem
 from ..system.linear import LinearModel, place
 from ..system.linear import linearize as linearize_model
 from ..system.signals import at_time
-from ..system.simulation import Simulation
 from . import config as study_files
 from .config import Config
-from .drive import Drive
 from .equilibrium_point import asks_for_equilibrium, equilibrium_point, place_words
 from .event import Event
-from .operation import OperatingConditions
 from .package import drive_to_export, model_and_start
 from .readings import crank_angle
 from .rig import Rig
@@ -195,8 +192,7 @@ def _point_of_linkage(machine: Any, operating_point: At, inverse: bool) -> Linea
     start = {"phi": phi, "w": w} if inverse else {"phi_start": phi, "w_start": w}
     point = _at_values(machine if inverse else machine.direct(), start, operating_point)
     if operating_point is None:
-        unit = ("m", "m/s") if machine.slides else ("rad", "rad/s")
-        point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
+        point = point._replace(words=_in_words(point.model, {"phi": phi, "w": w}))
     driver_at = (point.inputs if inverse else point.states)["phi"] / ratio
     if not machine.turns and not low <= driver_at <= high:
         end = "lower" if driver_at < low else "upper"
@@ -226,8 +222,7 @@ def _values(model: Model, operating_point: At) -> dict[str, float]:
             if not sign:
                 raise InputError(
                     f"at = {shown(operating_point)}: must be NAME=VALUE, .. of states and inputs of {model.name}, "
-                    f'such as "{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a '
-                    'study, "equilibrium" of a machine'
+                    f'such as "{variables[0].name}=0.5"; RUN:TIME is of a study, "equilibrium" of a machine'
                 )
             pairs[name] = text
         operating_point = pairs
@@ -242,40 +237,14 @@ def _values(model: Model, operating_point: At) -> dict[str, float]:
     return values
 
 
-_EXAMPLES = {"rad": "30 deg", "rad/s": "60 rpm", "m": "20 mm", "m/s": "0.1 m/s"}
-
-
 # -- a study
 
 
 def _point_of_study(
     config: Config, operating_point: At, progress: Callable[[str], None] = lambda what: None
 ) -> LinearPoint:
-    """The point of the whole drive of a study."""
-    if asks_for_equilibrium(operating_point):
-        raise InputError(
-            f"at = {shown(operating_point)}: is of a linkage file, or of a machine by its name; a study has "
-            f"runs: {', '.join([START, STEADY, *config.events])}"
-        )
-    drive = drive_to_export(config, progress=progress)
-    point = drive_point(drive, config.operation, config.events, operating_point, progress)
-    return point._replace(title=config.title)
-
-
-def drive_point(
-    drive: Drive,
-    operation: OperatingConditions,
-    events: Mapping[str, Event],
-    operating_point: At = None,
-    progress: Callable[[str], None] = lambda what: None,
-) -> LinearPoint:
-    """The point of a drive in its operation, compiled to one system. The compiled system makes the runs, which
+    """The point of the whole drive of a study, compiled to one system. The compiled system makes the runs, which
     agree with the co-simulation of a study to some 1e-5.
-
-    Parameters
-    ----------
-    drive, operation, events : of a study
-    operating_point : `at` of `linearize`
 
     Raises
     ------
@@ -284,26 +253,22 @@ def drive_point(
     RunError
         where the torque limiter opens before.
     """
-    rig = Rig(operation, drive, None)
+    runs = [START, STEADY, *config.events]
+    if asks_for_equilibrium(operating_point):
+        raise InputError(
+            f"at = {shown(operating_point)}: is of a linkage file, or of a machine by its name; a study has runs: "
+            f"{', '.join(runs)}"
+        )
+    rig = Rig(config.operation, drive_to_export(config, progress=progress), None)
     with refusal_prefix("linear model: "):
         system = CompiledSystem(rig.graph)
     run, time, point_values = STEADY, None, {}
     if isinstance(operating_point, str) and "=" not in operating_point:
-        run, time = _run_and_time(operating_point, [START, STEADY, *events])
+        run, time = _run_and_time(operating_point, runs)
     else:
         point_values = _values(system.model, operating_point)
     progress(f"run to {run.replace('_', ' ')}")
-    simulation: Any  # of the compiled system, which has no FMUs to close
-    with rig.from_rest() as simulation:
-        if run in (START, STEADY):
-            simulation = _from_rest(rig, simulation, time, steady=run == STEADY)
-        elif events[run].from_rest:
-            assert time is not None
-            simulation = rig.from_rest(events[run])
-            _run(simulation, rig, time)
-        else:
-            assert time is not None
-            _in_event(rig, simulation, events[run], time)
+    simulation = _simulation_at(rig, run, config.events.get(run), time)
     assert system.model.state_layout is not None
     now = float(simulation.time)
     inputs = system.inputs | {full: float(at_time(x, now)) for full, x in simulation.signals.items()}
@@ -311,13 +276,8 @@ def drive_point(
     for group in (inputs, states):
         group |= {name: x for name, x in point_values.items() if name in group}
     text = f"{'steady running' if run == STEADY else run}, t = {now:.6g} s"
-    return LinearPoint(
-        system.model,
-        system.p,
-        inputs,
-        states,
-        ", ".join(filter(None, (text, _in_words(system.model, point_values)))),
-    )
+    words = ", ".join(filter(None, (text, _in_words(system.model, point_values))))
+    return LinearPoint(system.model, system.p, inputs, states, words, config.title)
 
 
 def _run_and_time(operating_point: str, runs: list[str]) -> tuple[str, float | None]:
@@ -339,8 +299,50 @@ def _run_and_time(operating_point: str, runs: list[str]) -> tuple[str, float | N
         raise InputError(f'{error}; must be RUN:TIME, such as "{name}:0.4 s"') from None
 
 
-def _run(simulation: Simulation, rig: Rig, time: float) -> None:
-    """Run to the time [s].
+def _simulation_at(rig: Rig, run: str, event: Event | None, time: float | None) -> Any:
+    """The compiled simulation of a run at the time [s]: of start-up and steady running, by default at their end, or
+    of an event."""
+    is_start = event.from_rest if event is not None else run == START and not rig.operation.empty_start
+    simulation: Any = rig.from_rest(event if is_start else None)
+    if is_start:
+        assert time is not None
+        return _run_to(simulation, rig, time)
+    started = start_up(rig, simulation, lambda time: None, rig.guards)
+    _refuse_opened(simulation, started.stop - 0.5 * rig.step)
+    rig = started.rig
+    if time is None:
+        return simulation
+    if event is None:
+        if run == STEADY and time < started.steady_from:
+            raise InputError(
+                f'at = "{STEADY}:{time:g} s": steady running begins at {started.steady_from:.4g} s; before it name '
+                f'"{START}:{time:g} s"'
+            )
+        return _run_to(rig.from_rest(), rig, time)
+    if not rig.takes(event):
+        raise InputError(f"at: {event.title} is not in the study, as {event.without}")
+    saved = simulation.save()
+    steady = started.run.sel(time=slice(started.steady_from, None))
+    angles = crank_angle(rig.drive, steady)
+    speed = float(angles[-1] - angles[0]) / float(steady["time"][-1] - steady["time"][0])
+    begin = saved + lead_times(rig, simulation, [event], float(angles[-1]), speed)[0]
+    stop = begin + event.time_followed(rig.operation.turn)
+    if not saved < time <= stop:
+        raise InputError(
+            f"at = {time:g} s: the run of {event.name} goes from {saved:.4g} s to {stop:.4g} s; the event begins at "
+            f"{begin:.4g} s"
+        )
+    if time > begin:
+        follow(rig, simulation, event, begin, time, guards=rig.guards)
+        _refuse_opened(simulation, time)
+        return simulation
+    simulation.restore()
+    simulation.signals = rig.signals()
+    return _run_to(simulation, rig, time)
+
+
+def _run_to(simulation: Any, rig: Rig, time: float) -> Any:
+    """The simulation, run to the time [s].
 
     Raises
     ------
@@ -350,62 +352,12 @@ def _run(simulation: Simulation, rig: Rig, time: float) -> None:
     if time > simulation.time:
         simulation.run(time, rig.step, guards=rig.guards)
     _refuse_opened(simulation, time)
+    return simulation
 
 
-def _refuse_opened(simulation: Simulation, time: float) -> None:
+def _refuse_opened(simulation: Any, time: float) -> None:
     if simulation.time < time * (1.0 - 1e-9) - 1e-9:
         raise RunError(
             f"the torque limiter opens at t = {simulation.time:.4g} s, before the point at {time:.4g} s; take an "
             "earlier one"
         )
-
-
-def _silent(time: float) -> None:
-    """Report no time of a run."""
-
-
-def _from_rest(rig: Rig, simulation: Any, time: float | None, steady: bool) -> Any:
-    """The simulation of start-up and steady running at the time [s], by default at its end; a time in `steady`
-    running lies behind the start-up."""
-    if time is None or steady or rig.operation.empty_start:
-        started = start_up(rig, simulation, _silent, rig.guards)
-        _refuse_opened(simulation, started.stop - 0.5 * rig.step)
-        if time is None:
-            return simulation
-        if steady and time < started.steady_from:
-            raise InputError(
-                f'at = "{STEADY}:{time:g} s": steady running begins at {started.steady_from:.4g} s; before it name '
-                f'"{START}:{time:g} s"'
-            )
-        rig = started.rig
-        simulation = rig.from_rest()
-    _run(simulation, rig, time)
-    return simulation
-
-
-def _in_event(rig: Rig, simulation: Any, event: Event, time: float) -> None:
-    """Bring the simulation to the time [s] of the run of an event."""
-    if not rig.takes(event):
-        raise InputError(f"at: {event.title} is not in the study, as {event.without}")
-    started = start_up(rig, simulation, _silent, rig.guards)
-    _refuse_opened(simulation, started.stop - 0.5 * rig.step)
-    rig = started.rig
-    begin = simulation.save()
-    steady = started.run.sel(time=slice(started.steady_from, None))
-    angles = crank_angle(rig.drive, steady)
-    angle = float(angles[-1])
-    speed = float(angles[-1] - angles[0]) / float(steady["time"][-1] - steady["time"][0])
-    (lead,) = lead_times(rig, simulation, [event], angle, speed)
-    stop = begin + lead + event.time_followed(rig.operation.turn)
-    if not begin < time <= stop:
-        raise InputError(
-            f"at = {time:g} s: the run of {event.name} goes from {begin:.4g} s to {stop:.4g} s; the event begins at "
-            f"{begin + lead:.4g} s"
-        )
-    if time > begin + lead:
-        follow(rig, simulation, event, begin + lead, time, guards=rig.guards)
-    else:
-        simulation.restore()
-        simulation.signals = rig.signals()
-        simulation.run(time, rig.step, guards=rig.guards)
-    _refuse_opened(simulation, time)

@@ -318,8 +318,8 @@ def _equations(model: Model) -> _Equations:
     kept = [k for k, v in enumerate(outputs) if v.type == "Real"]
     rows = (*states, *states, *(outputs[k] for k in kept))
     chosen = [k for k, v in enumerate(inputs) if v.type == "Real"]
-    values = [*traced.derivatives, *of_states, *(traced.outputs[k] for k in kept)]
-    values = casadi.vertcat(*map(casadi.SX, values))
+    of_rows = [*traced.derivatives, *of_states, *(traced.outputs[k] for k in kept)]
+    values = casadi.vertcat(*map(casadi.SX, of_rows))
     columns = casadi.vertcat(*of_states, *(of_inputs[k] for k in chosen))
     others = casadi.vertcat(*(symbol for k, symbol in enumerate(of_inputs) if k not in chosen))
     results = [casadi.densify(values), casadi.densify(casadi.jacobian(values, columns))]
