@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import importlib.util
 import json
 import os
@@ -17,7 +18,7 @@ import wheels
 import chainunit
 from chainunit.core.register import entries
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.study.registry import CAPABILITIES, capabilities
+from chainunit.study.registry import CAPABILITIES, _capability, capabilities
 
 PACKAGE = Path(chainunit.__file__).parent
 NAMES = sorted(wheels.declared(wheels.PROJECT.read_text("utf-8"))[CAPABILITIES])
@@ -60,14 +61,15 @@ print(json.dumps({"properties": list(properties), "refused": refused}))
 
 ORDER = """
 chains sizing static_inertia energy sides blade random_overloads flywheels torsion checks optimize identification
-watch sweep comparison linear handover vouching
+watch sweep
 """.split()
+COMMANDS_ALONE = ["comparison", "handover", "linear", "vouching"]
 
 
 def test_the_entry_points_name_the_folders():
     folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
     assert folders == set(NAMES) and len(NAMES) == len(folders)
-    assert [part.name for part in capabilities()] == ORDER and sorted(ORDER) == NAMES
+    assert [part.name for part in capabilities()] == ORDER and sorted([*ORDER, *COMMANDS_ALONE]) == NAMES
     # an install from before a new capability does not have it: install the project anew
     assert {name: entry.value for name, entry in entries(CAPABILITIES).items()} == {
         name: f"chainunit.capabilities.{name}" for name in NAMES
@@ -75,6 +77,17 @@ def test_the_entry_points_name_the_folders():
     own_tests = {path.parent.name for path in (Path(__file__).parent / "capabilities").glob("*/test_*.py")}
     assert own_tests <= set(NAMES)
     assert len([part for part in capabilities() if part.motor_table]) <= 1
+
+
+def test_a_folder_with_a_command_alone_is_no_capability_and_an_empty_one_is_an_error(tmp_path, monkeypatch):
+    for name in ("has_command", "has_nothing"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").touch()
+    (tmp_path / "has_command" / "command.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    assert list(_capability(importlib.import_module("has_command"))) == []
+    with pytest.raises(ModuleNotFoundError, match=r"has_nothing\.capability"):
+        list(_capability(importlib.import_module("has_nothing")))
 
 
 @pytest.mark.second

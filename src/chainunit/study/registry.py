@@ -15,7 +15,7 @@ from ..core.register import Register, entries
 
 CAPABILITIES = "chainunit.capabilities"
 """Group of the entry points of capabilities; each is a folder with the module `capability`, or with its contents, and
-with the modules `command` and `study_method` if it has these."""
+with the modules `command` and `study_method` if it has these. One with a command alone adds nothing to a study."""
 
 
 def _in_order(things: Iterator[Any]) -> tuple[Any, ...]:
@@ -31,15 +31,17 @@ def parts_of_line() -> tuple[Any, ...]:
 @cache
 def capabilities() -> tuple[Any, ...]:
     """All capabilities in their order, each a `chainunit.study.capability.StudyCapability`."""
-    return _in_order(_capability(folder) for folder in Register[ModuleType](CAPABILITIES).values())
+    folders = Register[ModuleType](CAPABILITIES).values()
+    return _in_order(capability for folder in folders for capability in _capability(folder))
 
 
-def _capability(folder: ModuleType) -> Any:
+def _capability(folder: ModuleType) -> Iterator[Any]:
     """The capability of a folder: in the folder itself, or in its module `capability`, if the folder has a command
-    and must be light."""
+    and must be light; none of a folder with a command alone."""
     if hasattr(folder, "CAPABILITY"):
-        return folder.CAPABILITY
-    return import_module(f"{folder.__name__}.capability").CAPABILITY
+        yield folder.CAPABILITY
+    elif find_spec(f"{folder.__name__}.capability") or not find_spec(f"{folder.__name__}.command"):
+        yield import_module(f"{folder.__name__}.capability").CAPABILITY
 
 
 def modules(name: str) -> Iterator[ModuleType]:
