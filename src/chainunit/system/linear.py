@@ -240,27 +240,27 @@ def linearize(
     x = _states(model, p, u, states or {})
     if model.derived_count and not hasattr(p, "derived"):
         p = model.with_derived(MATH, p)
-    equations, n = _equations(model), len(x)
+    derivatives, n = _derivatives(model), len(x)
     of_inputs = np.array(model.input_layout.values(u), float)
-    z = np.array([*x, *of_inputs[equations.inputs]], float)
-    fixed = np.delete(of_inputs, equations.inputs), layout.values(p), p.derived if model.derived_count else []
+    z = np.array([*x, *of_inputs[derivatives.inputs]], float)
+    fixed = np.delete(of_inputs, derivatives.inputs), layout.values(p), p.derived if model.derived_count else []
 
     def at_columns(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        values, slopes = equations.function(z, *fixed)
+        values, slopes = derivatives.function(z, *fixed)
         return np.array(values, float).ravel(), np.array(slopes, float).reshape(-1, len(z))
 
     values, slopes = at_columns(z)
     for k in np.flatnonzero(~np.isfinite(values))[:1]:
         raise InputError(
-            f"{model.name}: {equations.row_names[k]} is not a finite number at this point; take another point"
+            f"{model.name}: {derivatives.row_names[k]} is not a finite number at this point; take another point"
         )
     rows = [
         LinearSignal(v.name, v.unit, v.description, float(y))
-        for v, y in zip(equations.rows, values, strict=True)
+        for v, y in zip(derivatives.rows, values, strict=True)
     ]
     columns = [
         LinearSignal(v.name, v.unit, v.description, float(y))
-        for v, y in zip(equations.columns, z, strict=True)
+        for v, y in zip(derivatives.columns, z, strict=True)
     ]
     return LinearModel(
         title or model.name,
@@ -277,7 +277,7 @@ def linearize(
         slopes[:n, n:],
         slopes[n:, :n],
         slopes[n:, n:],
-        tuple(_bends(equations, z, values, slopes, lambda z: at_columns(z)[1])),
+        tuple(_bends(derivatives, z, values, slopes, lambda z: at_columns(z)[1])),
     )
 
 
@@ -293,7 +293,7 @@ def _states(model: Model, p: Any, u: Any, states: Mapping[str, float]) -> list[f
     return [float(x) for x in layout.values(layout.from_names(dict(states), model.begin(p, u)))]
 
 
-class _Equations(NamedTuple):
+class _Derivatives(NamedTuple):
     """The equations of a model with their derivatives. Rows are the derivatives of the states, the states and the
     outputs; columns are the states and the inputs."""
 
@@ -307,7 +307,7 @@ class _Equations(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def _equations(model: Model) -> _Equations:
+def _derivatives(model: Model) -> _Derivatives:
     import casadi
 
     traced = trace(model)
@@ -323,7 +323,7 @@ def _equations(model: Model) -> _Equations:
     columns = casadi.vertcat(*of_states, *(of_inputs[k] for k in chosen))
     others = casadi.vertcat(*(symbol for k, symbol in enumerate(of_inputs) if k not in chosen))
     results = [casadi.densify(values), casadi.densify(casadi.jacobian(values, columns))]
-    return _Equations(
+    return _Derivatives(
         rows,
         [f"der({v.name})" if k < len(states) else v.name for k, v in enumerate(rows)],
         (*states, *(inputs[k] for k in chosen)),
@@ -333,7 +333,7 @@ def _equations(model: Model) -> _Equations:
 
 
 def _bends(
-    equations: _Equations,
+    derivatives: _Derivatives,
     z: np.ndarray,
     values: np.ndarray,
     slopes: np.ndarray,
@@ -341,7 +341,7 @@ def _bends(
 ) -> Iterator[Bend]:
     """The places near the columns `z` where slopes change faster than those of smooth powers. A slope that is not
     defined there does not count."""
-    columns, rows = equations.columns, equations.rows
+    columns, rows = derivatives.columns, derivatives.rows
     sizes = np.array([_size(v, value) for v, value in zip(columns, z, strict=True)])
     least = _SLIGHT * (np.array([[v.quantity.nominal or 1.0] for v in rows]) + np.abs(values)[:, None])
     defined = np.isfinite(slopes)
@@ -368,7 +368,7 @@ def _bends(
             if of_rows.any():
                 largest = max((float(x) for x in change[bent] / most[bent] if np.isfinite(x)), default=1.0)
                 names = tuple(
-                    name for name, is_bent in zip(equations.row_names, of_rows, strict=True) if is_bent
+                    name for name, is_bent in zip(derivatives.row_names, of_rows, strict=True) if is_bent
                 )
                 yield Bend(v.name, share == AT, InUnit(distance, v.unit), names, largest)
                 break
