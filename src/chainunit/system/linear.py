@@ -243,7 +243,11 @@ def linearize(
     derivatives, n = _derivatives(model), len(x)
     of_inputs = np.array(model.input_layout.values(u), float)
     z = np.array([*x, *of_inputs[derivatives.inputs]], float)
-    fixed = np.delete(of_inputs, derivatives.inputs), layout.values(p), p.derived if model.derived_count else []
+    fixed = (
+        np.delete(of_inputs, derivatives.inputs),
+        layout.values(p),
+        p.derived if model.derived_count else [],
+    )
 
     def at_columns(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         values, slopes = derivatives.function(z, *fixed)
