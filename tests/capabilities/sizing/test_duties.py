@@ -18,13 +18,13 @@ DUTIES = Path(__file__).parents[2] / "data" / "duties"
 @pytest.mark.parametrize(
     ("name", "motor", "ratio", "flywheel", "gear", "relay"),
     [
-        ("d1", "IE3 4-pole 0.12 kW, 63M", 53.0, 0.0, 67.6, 0.445),
-        ("d2", "IE3 4-pole 0.55 kW, 80M", 100.0, 0.0, 697.0, 1.33),
+        ("d1", "IE3 4-pole 0.12 kW, 63M", 53.0, 0.0, 65.5, 0.445),
+        ("d2", "IE3 4-pole 0.55 kW, 80M", 100.0, 0.057, 693.0, 1.33),
         ("d5", "IE3 4-pole 4 kW, 112M", 10.0, 0.0, 413.0, 4.64),
         ("d6", "IE3 4-pole 4 kW, 112M", 37.5, 0.0, 1630.0, 8.04),
         ("m3", "IE3 4-pole 3 kW, 100L", 20.86, 0.15, None, None),
         ("sixdrive", "Y 80 0.55", 15.6, 0.0, 60.0, 1.33),
-        ("beamdrive", "IE3 4-pole 15 kW, 160L", 150.0, 0.0, 25300.0, 28.0),
+        ("beamdrive", "IE3 4-pole 18.5 kW, 180M", 150.0, 0.0, 27600.0, 34.3),
         ("jawdrive", "X 315S 110", 5.3, 0.0, None, 110.4),
         ("convdrive", "IE3 4-pole 1.1 kW, 90S", 3.55, 0.063, None, 2.45),
     ],
