@@ -28,8 +28,9 @@ from chainunit.study.config import load, parse
 from chainunit.study.given import given_sections
 from chainunit.study.measures import Answers
 from chainunit.study.origins import origin_of
+from chainunit.study.package import remarks_on_export
 from chainunit.study.parts import example
-from chainunit.study.remarks import conclude
+from chainunit.study.remarks import conclude, lengths_of_example
 from chainunit.study.result import as_dict
 
 KNIFE = example("knife")
@@ -316,3 +317,17 @@ def test_a_current_that_an_inverter_hardly_gives_has_a_note(tmp_path):
         if noted:
             assert "(4.50)" in notes[0].text and "(1.20)" in notes[0].text
             assert notes[0].quantities["current"][:2] == (pytest.approx(3.0 * rated), "A")
+
+
+def test_lengths_beside_those_of_the_example_are_named(tmp_path):
+    """r, l and z of a mill made a rocker that swung from -33 to -15 deg, as c stayed the example's: in silence."""
+    file = tmp_path / "mine.toml"
+    file.write_text('[machine]\nr = "140 mm"\nl = "1.1 m"\nz = "0.95 m"\n', "utf-8")
+    remark = lengths_of_example(load(file))
+    assert remark.text.startswith(
+        "The file gives the lengths r, l, z of the chain unit. The lengths h, c, hy, e, l1, l2 are"
+    )
+    assert remark.remedy.startswith("Give them, too, or rho = r/l")
+    assert remark.text in remarks_on_export(load(file))
+    file.write_text('[ratios]\nrho = 0.127\nl = "1.1 m"\n', "utf-8")
+    assert lengths_of_example(load(file)) is None and lengths_of_example(load(None)) is None

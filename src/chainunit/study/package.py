@@ -31,6 +31,7 @@ from .drive import Drive
 from .operation import OperatingConditions
 from .organ_limits import limits_of_organs
 from .registry import parts_of_line
+from .remarks import lengths_of_example
 from .verdict import on_limit, passed_limits
 
 
@@ -158,7 +159,8 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
 
 def remarks_on_export(config: Config) -> list[str]:
     """Sentences on the parts of a study that its FMU or package does not have, and on the limits of its model."""
-    sentences = [left_out(config.operation, config.given_events)]
+    lengths = lengths_of_example(config)
+    sentences = [left_out(config.operation, config.given_events), lengths.text if lengths else ""]
     if config.file.tables.get("organ") != "chain":
         sentences += beyond_two_bars(config.machine, config.feed, config.run.crank_speed)
     return list(filter(None, sentences))

@@ -14,15 +14,17 @@ from ..reading.text import aside, number
 from .analyses import all_analyses
 from .arrays import peak
 from .catalogue_drive import SLIP
+from .config import Config
 from .coupling import remark_on_coupling, remark_on_rams
 from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
 from .measures import STARTED, Answers
+from .parts import LENGTHS
 from .permitted_starts import standard_inertia
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
 from .record import LOAD_CYCLE, StudyRecord
 from .registry import capabilities, parts_of_line
-from .remark import DECLARED, SEVERITIES, RemarkCode, fault, note, warning
+from .remark import DECLARED, SEVERITIES, Remark, RemarkCode, fault, note, warning
 from .start_runs import speed_in_star
 from .starts import StartFindings
 from .verdict import START, STEADY, shown_speed
@@ -57,6 +59,8 @@ def conclude(study: StudyRecord) -> None:
     for value in config.file.unusual:
         if value.with_unit:
             study.say(_UNUSUAL, value=str(value))
+    if (lengths := lengths_of_example(config)) is not None:
+        study.remarks.append(lengths)
     if left_out := list(_left_out(study)):
         study.say(_LEFT_OUT, what=" and ".join(left_out))
     if study.answers:
@@ -110,6 +114,23 @@ _LEFT_OUT = note(
     "values-left-out",
     "The file leaves out {what}. The packaged values are used, and the result depends on them.",
 )
+_LENGTHS_OF_EXAMPLE = note(
+    "lengths-of-example",
+    "The file gives the lengths {stated} of the chain unit. The lengths {others} are those of the example, and may not "
+    "suit them.",
+    remedy="Give them, too, or rho = r/l, lam, mu, zeta, l and l1 in [ratios], from which all follow.",
+)
+
+
+def lengths_of_example(config: Config) -> Remark | None:
+    """The remark on a chain unit of which the file gives some lengths alone; None for another machine."""
+    stated = [name for name in LENGTHS if f"machine.{name}" in config.file.given]
+    others = [name for name in LENGTHS if name not in stated]
+    if not stated or not others or config.file.gives("ratios") or not config.machine.model.sides:
+        return None
+    return _LENGTHS_OF_EXAMPLE.remark(stated=", ".join(stated), others=", ".join(others))
+
+
 _RATING = ("limit.i", "limit.v", "armature.k")
 """Parameters that limit the torque of a motor without a nameplate."""
 
