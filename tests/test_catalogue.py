@@ -20,7 +20,7 @@ from chainunit.core.quantities import Layout
 from chainunit.drives.catalogue import KINDS, LAYOUT, catalogue, motor_of_catalogue, offer
 from chainunit.drives.catalogue_rows import heading
 from chainunit.drives.gearing import KINDS as TRANSMISSIONS
-from chainunit.drives.gearing import W_REST, Transmission, motor_side
+from chainunit.drives.gearing import W_REST, Transmission, geared_acceleration, motor_side
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import breakdown, steady
 from chainunit.drives.nameplate import LAYOUT as NAMEPLATE
@@ -688,6 +688,29 @@ def test_transmission_loses_power_whichever_way_it_flows():
     assert motor_side(xp, t, -80.0, 100.0) - t.d * 100.0 == pytest.approx(-80.0 * (2.0 - 1.0 / 0.9) / 12.0)
     # a worm gear locks itself: the motor must help even where the load would drive
     assert motor_side(xp, Transmission(ratio=50.0, efficiency=0.4), -80.0, 100.0) > 0.0
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.04, 0.43, 0.9])
+def test_a_rotor_turns_its_load_by_the_equation_of_motion_with_the_loss(loss):
+    """For motors and loads of any sign, forward, backward and near rest; without a loss as if no gear were there."""
+    rng = np.random.default_rng(7)
+    J, inertia = 10.0 ** rng.uniform(-3.0, 0.0, 2000), 10.0 ** rng.uniform(-4.0, 1.0, 2000)
+    tau, load = 50.0 * rng.normal(size=(2, 2000))
+    w = rng.choice([-100.0, -0.3, 0.0, 0.5, 150.0], 2000)
+    a = geared_acceleration(engines.numpy_(), load, inertia, w, J, tau, loss)
+    passed = load + inertia * a
+    lost = loss * np.abs(passed) * np.clip(w, -1.0, 1.0)
+    np.testing.assert_allclose(J * a, tau - passed - lost, atol=1e-12 * np.max(np.abs(tau) + np.abs(load)))
+    assert np.all(lost * w >= 0.0)
+    if loss == 0.0:
+        np.testing.assert_array_equal(a, (tau - load) / (J + inertia))
+
+
+def test_a_self_locking_gear_stands_where_the_load_drives():
+    """With a loss above 1 the load cannot drive the rotor: what the rotor feels stays above a part of its own
+    inertia, so that the acceleration is finite."""
+    a = geared_acceleration(engines.MATH, -80.0, 5.0, 100.0, 0.01, 0.0, 1.5)
+    assert math.isfinite(a) and a < 0.0
 
 
 def test_transmission_at_rest_and_in_arrays():

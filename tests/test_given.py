@@ -323,11 +323,13 @@ def test_lengths_beside_those_of_the_example_are_named(tmp_path):
     """r, l and z of a mill made a rocker that swung from -33 to -15 deg, as c stayed the example's: in silence."""
     file = tmp_path / "mine.toml"
     file.write_text('[machine]\nr = "140 mm"\nl = "1.1 m"\nz = "0.95 m"\n', "utf-8")
-    remark = lengths_of_example(load(file))
+    config = load(file)
+    remark = lengths_of_example(config.file, config.machine)
     assert remark.text.startswith(
         "The file gives the lengths r, l, z of the chain unit. The lengths h, c, hy, e, l1, l2 are"
     )
     assert remark.remedy.startswith("Give them, too, or rho = r/l")
-    assert remark.text in remarks_on_export(load(file))
+    assert remark.text in remarks_on_export(config)
     file.write_text('[ratios]\nrho = 0.127\nl = "1.1 m"\n', "utf-8")
-    assert lengths_of_example(load(file)) is None and lengths_of_example(load(None)) is None
+    for config in (load(file), load(None)):
+        assert lengths_of_example(config.file, config.machine) is None

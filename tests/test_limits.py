@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 
@@ -11,12 +12,16 @@ from event_tables import event_line
 
 from chainunit import InputError
 from chainunit.core.engines import MATH
+from chainunit.core.quantities import variables
 from chainunit.drives import induction_steady as induction
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
 from chainunit.study.limits import SPEED_DEVIATION, heating, starting
 from chainunit.study.readings import breakdown_speed
+from chainunit.study.remarks import _on_inertia, _on_star
 from chainunit.study.run import run_study
+from chainunit.study.start_runs import StartNumbers
+from chainunit.study.starts import StartFindings
 
 STAR = """start = "star-delta"
 event = []
@@ -187,6 +192,60 @@ def test_the_time_in_star_counts_a_third():
     assert check.value == pytest.approx(8.0 / 3.0 + 1.8) and "star" in check.title
     assert starting(3.0, plate, in_star=8.0).value == pytest.approx(1.0)
     assert starting(3.0, plate).value == 3.0 and starting(None, plate, in_star=8.0).value is None
+
+
+def held_in_star(angles, star_speed):
+    """Starts from these angles [deg] with that speed at the end of the time in star, others at nine tenths."""
+    values = {v.name: 1.0 for v in variables(StartNumbers)}
+    return StartFindings(
+        tuple(
+            StartNumbers(
+                **values
+                | {
+                    "angle": math.radians(x),
+                    "current": 600.0 + x,
+                    "star_speed": star_speed if x in angles else 0.9,
+                }
+            )
+            for x in (0.0, 90.0, 225.0)
+        ),
+        1.0,
+        math.inf,
+        "steady",
+    )
+
+
+@pytest.mark.second
+def test_a_load_that_holds_the_motor_in_star_is_named(tmp_path):
+    """A crusher stood for 8 s in star and then started direct; "more time in star" was the advice."""
+    study = run_study(parse(STAR % "3 s"), tmp_path)
+    for speed, codes in ((-0.001, ["stands-in-star"]), (0.3, [])):
+        study.findings["starts"] = held_in_star((0.0, 225.0), speed)
+        study.remarks.clear()
+        _on_star(study)
+        assert [remark.code for remark in study.remarks] == codes
+        for remark in study.remarks:
+            assert remark.text.startswith("The load holds the motor in star from 0 deg, 225 deg.")
+            assert remark.quantities["delta"].value == 825.0 and "empty_start" in remark.remedy
+
+
+@pytest.mark.second
+def test_an_inertia_beyond_the_standard_is_a_warning(tmp_path):
+    """0.04 P^0.9 p^2.5 of IEC 60034-12, by hand; it stood in the list of what is not checked alone."""
+    study = run_study(parse(STAR % "3 s"), tmp_path)
+    plate = study.plate.nameplate
+    most = 0.04 * (plate.power / 1e3) ** 0.9 * (plate.poles / 2.0) ** 2.5
+    inertia = float(np.mean(study.steady["machine.J"])) + study.drive.fmu_parameters.rotor.J - plate.J
+    for added, expected in (
+        (0.0, inertia > most),
+        (1.01 * most - inertia, True),
+        (0.99 * most - inertia, False),
+    ):
+        study.drive = dataclasses.replace(study.drive, added_inertia=study.drive.added_inertia + added)
+        study.remarks.clear()
+        _on_inertia(study)
+        assert [remark.code for remark in study.remarks] == ["heavy-to-start"] * expected
+        study.drive = dataclasses.replace(study.drive, added_inertia=study.drive.added_inertia - added)
 
 
 @pytest.mark.second

@@ -158,7 +158,7 @@ def test_the_inverter_is_ordered_by_all_starts_and_events():
     """By hand: a start from another angle takes 3.95 times the rated 6 A, the worst run of the study 2.3 times: 3.95
     x 6 A/1.5 = 15.8 A; the runs of the choice alone said 6 A."""
 
-    def study(peaks, event, proposal=None):
+    def study(peaks, event, proposal=None, until_trip=()):
         starts = tuple(
             StartNumbers(**NONE | {"angle": 0.1 * k, "current": 6.0 * x, "long_current": 0.0})
             for k, x in enumerate(peaks)
@@ -171,7 +171,10 @@ def test_the_inverter_is_ordered_by_all_starts_and_events():
                 "steady": SimpleNamespace(current_peak=9.0, current_rms=4.0),
                 "surge": SimpleNamespace(current_peak=6.0 * event),
             },
-            findings={"starts": StartFindings(starts, 1.0, math.inf, "steady")},
+            findings={
+                "starts": StartFindings(starts, 1.0, math.inf, "steady"),
+                "sizing": SimpleNamespace(currents_until_trip=lambda study: dict(until_trip)),
+            },
             proposal=proposal,
             title_of=lambda name: name,
         )
@@ -182,6 +185,9 @@ def test_the_inverter_is_ordered_by_all_starts_and_events():
     assert (need.current, need.case) == (pytest.approx(9.2), "surge")
     need = inverter_need(study((1.2, 1.3), 2.3, SimpleNamespace(inverter_current=9.5)))
     assert (need.current, need.case) == (9.5, "the runs of the choice")
+    # the recommended torque limiter ends the surge: 136 A were ordered for a motor of 54 A
+    need = inverter_need(study((1.2, 1.3), 2.3, until_trip={"surge": 12.6}))
+    assert (need.current, need.case) == (pytest.approx(8.4), "surge, with the torque limiter")
 
 
 @pytest.mark.parametrize(

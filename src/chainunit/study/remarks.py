@@ -10,11 +10,12 @@ from pkgutil import iter_modules
 
 import numpy as np
 
+from ..machines.machine import Machine
 from ..reading.text import aside, number
 from .analyses import all_analyses
 from .arrays import peak
 from .catalogue_drive import SLIP
-from .config import Config
+from .config import FileContents
 from .coupling import remark_on_coupling, remark_on_rams
 from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
@@ -59,7 +60,7 @@ def conclude(study: StudyRecord) -> None:
     for value in config.file.unusual:
         if value.with_unit:
             study.say(_UNUSUAL, value=str(value))
-    if (lengths := lengths_of_example(config)) is not None:
+    if (lengths := lengths_of_example(config.file, config.machine)) is not None:
         study.remarks.append(lengths)
     if left_out := list(_left_out(study)):
         study.say(_LEFT_OUT, what=" and ".join(left_out))
@@ -122,11 +123,11 @@ _LENGTHS_OF_EXAMPLE = note(
 )
 
 
-def lengths_of_example(config: Config) -> Remark | None:
+def lengths_of_example(file: FileContents, machine: Machine) -> Remark | None:
     """The remark on a chain unit of which the file gives some lengths alone; None for another machine."""
-    stated = [name for name in LENGTHS if f"machine.{name}" in config.file.given]
+    stated = [name for name in LENGTHS if f"machine.{name}" in file.given]
     others = [name for name in LENGTHS if name not in stated]
-    if not stated or not others or config.file.gives("ratios") or not config.machine.model.sides:
+    if not stated or not others or file.gives("ratios") or not machine.model.sides:
         return None
     return _LENGTHS_OF_EXAMPLE.remark(stated=", ".join(stated), others=", ".join(others))
 

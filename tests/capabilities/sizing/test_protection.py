@@ -34,6 +34,7 @@ from chainunit.capabilities.sizing.result import _relay as _relay_of
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout, variables
+from chainunit.drives.catalogue import catalogue
 from chainunit.drives.gearing import ordered_torque
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import steady
@@ -52,12 +53,13 @@ from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.coupling import transient_of_starts
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
+from chainunit.study.event_torques import gear_peaks
 from chainunit.study.events import one_sided_event
 from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.judgement import motor_verdict
 from chainunit.study.measures import read_answers, stall
 from chainunit.study.readings import crank_torque, largest_torque, pull_out_torque
-from chainunit.study.relay import CLASSES, MULTIPLE, class_holding, relay_trip, start_seconds
+from chainunit.study.relay import CLASSES, MULTIPLE, class_holding, relay_trip, stall_trip, start_seconds
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import _with_class_of_all_starts, run_study
@@ -313,6 +315,28 @@ def test_the_line_of_the_relay_tells_of_the_tolerance_of_the_current(trip_class,
     assert line() == f"relay at 8.04 A, class {trip_class}"
 
 
+def test_a_relay_that_trips_too_late_is_ordered_with_thermistors():
+    """The class that a start needs let a locked rotor burn: 12.3 s where it may stand for 12 s, and the first line
+    praised the class."""
+    plate = next(each.nameplate for each in catalogue() if each.designation == "IE3 4-pole 37 kW, 225S")
+    plate = dataclasses.replace(plate, locked_time=12.0)
+    study = SimpleNamespace(
+        drive=SimpleNamespace(follows=False, star_delta=None),
+        findings={},
+        answers={"steady": SimpleNamespace(current_rms=0.8 * plate.rated_current)},
+        plate=SimpleNamespace(nameplate=plate),
+    )
+    stall = plate.rated_current * plate.locked_current_ratio
+    for trip_class in (10, 20, 30):
+        study.relay_class = trip_class
+        named = next(each for each in CLASSES if each.name == str(trip_class))
+        trip = stall_trip(named, plate.rated_current, 0.8 * plate.rated_current, stall)
+        words = _relay_of(study, plate.rated_current).setting_words
+        assert ("order the motor with PTC thermistors" in words) == (trip > 12.0), trip_class
+    study.relay_class = 30
+    assert "thermistors" in _relay_of(study, plate.rated_current).setting_words
+
+
 def test_a_coupling_that_saves_nothing_is_not_recommended():
     """It is tried: with too little spared at the output of the gear it has no setting; an overload that it spares, or
     brings below the limit of the gear, is enough, whatever the gear carries in another."""
@@ -522,6 +546,9 @@ def test_the_gear_that_is_ordered_follows_from_the_printed_numbers(on_line, serv
     exact = order.decides.torque * times / permitted / kept
     assert order.rated == ordered_torque(exact) and exact <= order.rated <= 1.01 * exact
     assert (times == service) if service == 9.0 else rule
+    # without the limiter the overloads count whole
+    bare = max(gear_peaks(on_line)[name] for name in sizing_of(on_line).setting.overloads) / 2.0 / 0.9
+    assert order.without == max(order.rated, ordered_torque(bare))
 
 
 @pytest.mark.second
