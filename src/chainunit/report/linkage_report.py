@@ -257,15 +257,14 @@ def _animation(f: LinkageFindings) -> Animation:
         (*linkage.arrows(model.pins, joints, force, named=True), *linkage_loads.load_arrows(state)),
         blocks=linkage.blocks(state.m),
     )  # fmt: skip
-    shown = linkage.shown_pins(state.m.linkage)
     return Animation(
         tuple(linkage.links(state.m.linkage, {})),
-        tuple(pin for pin in state.m.linkage.ground if pin in shown),
+        linkage.supports(state.m.linkage),
         (clip,),
         float(time[-1]),
         "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads.",
         hanging=linkage.hanging(state.m),
-        orbit=(driver.bar.pin, driver.end) if model.turns else None,
+        circles=(*[(driver.bar.pin, driver.end)] * model.turns, *state.m.linkage.circles),
         names=linkage.labels(state.m.linkage),
         paths=linkage.paths(state.m, driver.end if f.back else ""),
         rails=linkage.rails(state.m),
