@@ -1,11 +1,11 @@
 """The decomposition of a planar linkage into Assur groups, from its links and joints alone.
 
-Each joint of two links, revolute or prismatic, gives two equations, one of a further kind may give one; each link has
-three unknowns. Equations are matched with unknowns (a maximum flow of joints into links). What an equation cannot find
-is over-determined, what no equation takes is free. In a full matching each link depends on the other links of its
-equations; the links that depend on each other, directly or by a circle, form a group, which no smaller part of it
-determines. The groups come in the order in which they can be solved. This is the fine
-Dulmage-Mendelsohn decomposition of the equations; where all their ranks are full, it is that into Assur groups.
+Each joint of two links, revolute or prismatic, gives two equations, one of a further kind may give one; each link
+has three unknowns. Equations are matched with unknowns (a maximum flow of joints into links). What an equation cannot
+find is over-determined, what no equation takes is free. In a full matching each link depends on the other links of
+its equations; the links that depend on each other, directly or by a circle, form a group, which no smaller part of it
+determines. The groups come in the order in which they can be solved. This is the fine Dulmage-Mendelsohn
+decomposition of the equations; where all their ranks are full, it is that into Assur groups.
 """
 
 from __future__ import annotations

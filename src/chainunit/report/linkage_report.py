@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import __version__
 from ..core.quantities import Layout
+from ..machines.linkages.joint_kinds import KINDS
 from ..machines.machine import Machine
-from ..mechanism.assur import PRISMATIC
 from ..mechanism.machine import MachineState
 from ..reading.tables import UnusualValue, slips_of
 from ..reading.text import array_entry
@@ -373,8 +373,7 @@ def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.B
 
 def _title(f: LinkageFindings, name: str) -> Line:
     joint = f.description.structure.joints[name]
-    kind = "guide" if joint.kind == PRISMATIC else "pin"
-    return line(Name(name), f": {kind}, on {joint.on[0]} from {joint.by[0]}")
+    return line(Name(name), f": {KINDS[joint.kind].noun}, on {joint.on[0]} from {joint.by[0]}")
 
 
 def _along(f: LinkageFindings, name: str) -> Line:

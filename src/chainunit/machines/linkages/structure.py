@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
+from .joint_kinds import KINDS, SINGLES
 
 Entry = float | str
 """A number, or the text of an expression."""
@@ -16,14 +17,30 @@ Entry = float | str
 
 class JointEntry(NamedTuple):
     """A joint as described: `on` and `by` are a link and a point of it; of a prismatic one the point of `on` slides
-    along the line from the point of `by` to its point `toward`, and `angle` is that of `on` less that of `by`."""
+    along the line from the point of `by` to its point `toward`, and `angle` is that of `on` less that of `by`.
+    `third` is a further link that its equations contain; `table` has all its entries."""
 
     name: str
     kind: str
     on: tuple[str, str]
     by: tuple[str, str]
-    toward: str = ""
-    angle: Entry = 0.0
+    toward: str
+    angle: Entry
+    third: str
+    table: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> JointEntry:
+        """The joint of a description."""
+        on, by = (tuple(table[end]) for end in ("on", "by"))
+        toward, angle, third = table.get("toward", ""), table.get("angle", 0.0), table.get("third", "")
+        return cls(table["name"], table["type"], on, by, toward, angle, third, table)
+
+    @property
+    def in_decomposition(self) -> JointOf:
+        """The joint as the decomposition sees it."""
+        kind = KINDS[self.kind]
+        return JointOf(self.name, self.kind, self.on[0], self.by[0], self.third, kind.equations, kind.alone)
 
     @property
     def links(self) -> set[str]:
@@ -86,7 +103,7 @@ def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: Driver
     InputError
         where the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
-    seen = [JointOf(j.name, j.kind, j.on[0], j.by[0]) for j in joints if j.name != driver.joint]
+    seen = [joint.in_decomposition for joint in joints if joint.name != driver.joint]
     slide = next(joint for joint in joints if joint.name == driver.joint)
     if GROUND in (slide.on[0], slide.by[0]):
         groups = decompose(links, seen, driver.link)
@@ -125,6 +142,14 @@ class Structure:
     start: float
     poses: Mapping[str, tuple[float, float, float]]
 
+    @property
+    def rate(self) -> float:
+        """How often a link turns in a turn of the driver, at most, as single links turn faster than those before
+        them."""
+        singles = [group for group in self.groups if group.kind in SINGLES]
+        rates = (SINGLES[g.kind].rate(self.joints[g.joints[1].name], g.links[0]) for g in singles)
+        return math.prod(max(1.0, rate) for rate in rates)
+
     @classmethod
     def of(
         cls,
@@ -153,7 +178,7 @@ class Structure:
             for group in groups
             for joint in (named[j.name] for j in group.joints)
             for end in (joint.on, joint.by)
-            if joint.kind == PRISMATIC or end[0] not in group.links
+            if joint.kind == PRISMATIC or (joint.kind == REVOLUTE and end[0] not in group.links)
         }
         if driver.linear:
             marked |= {named[driver.joint].on, named[driver.joint].by}
@@ -187,7 +212,7 @@ def _with_cylinder(links: Sequence[str], joints: Sequence[JointOf], slide: Joint
     rod, barrel = slide.on[0], slide.by[0]
     joint_by_name = {joint.name: joint for joint in joints}
     merged = [
-        joint._replace(**{end: barrel for end in ("on", "by") if getattr(joint, end) == rod})
+        joint._replace(**{end: barrel for end in ("on", "by", "third") if getattr(joint, end) == rod})
         for joint in joints
     ]
     groups = decompose([link for link in links if link != rod], merged, "")
@@ -274,13 +299,7 @@ def structure_of(data: Mapping[str, Any]) -> Structure:
         )
         for link in data["links"]
     ]
-    joints = [
-        JointEntry(
-            joint["name"], joint["type"], tuple(joint["on"]), tuple(joint["by"]),
-            joint.get("toward", ""), joint.get("angle", 0.0),
-        )
-        for joint in data["joints"]
-    ]  # fmt: skip
+    joints = [JointEntry.of(joint) for joint in data["joints"]]
     driver = DriverEntry(**data["driver"])
     start = data["start"]
     ends = [tuple(load[key]) for load in data["loads"] for key in ("on", "by") if key in load]

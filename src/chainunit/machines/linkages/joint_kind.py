@@ -1,0 +1,107 @@
+"""Kinds of joints of a linkage file, pins and guides: what they are called, their keys, and their equations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ...core.errors import shown
+from ...mechanism.assur import PRISMATIC, REVOLUTE
+
+if TYPE_CHECKING:
+    from ...groups.group import Group
+    from ...mechanism.assur import AssurGroup
+    from .entries import EntryReader
+    from .parts import LinkageParts
+    from .structure import JointEntry
+
+JointTable = dict[str, Any]
+"""A joint of a description."""
+
+
+class JointKind:
+    """A kind of joint: its `name` in `type`, its `noun` in reports, the `keys` that it has besides `type`, `on` and
+    `by`, of which the first one tells the kind where `type` is missing, with words on their `use`. `losses` are the
+    table of the losses of all such joints, and its keys; `equations` is their number. `alone` is the kind of the
+    group that a single link forms by such a joint and a pin, if there is one."""
+
+    name: ClassVar[str]
+    noun: ClassVar[str]
+    keys: ClassVar[tuple[str, ...]] = ()
+    use: ClassVar[str] = ""
+    losses: ClassVar[tuple[str, tuple[str, ...]]] = ("", ())
+    equations: ClassVar[int] = 2
+    alone: ClassVar[str] = ""
+
+    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+        """Add its own keys from its `table` to the `joint`, which has its ends."""
+
+    def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+        """Add what follows from all `joints` of the file; `points` by link are added to the links."""
+
+    def start_faults(
+        self, joint: JointTable, points: Mapping[str, Mapping[str, tuple[float, float]]]
+    ) -> Iterator[tuple[str, str]]:
+        """Faults by key at the start values of the parameters, from the `points` of each link in its frame [m]."""
+        return iter(())
+
+
+class PinKind(JointKind):
+    """A pin, about which its links turn."""
+
+    name, noun = REVOLUTE, "pin"
+    losses = ("pins", ("friction", "diameter", "damping"))
+
+
+class GuideKind(JointKind):
+    """A guide: a point of `on` slides along a line of `by`."""
+
+    name, noun = PRISMATIC, "guide"
+    keys = ("toward", "angle", "length")
+    use = "for a cylinder or a guide give it `toward` with a further point of {by}, on the line of the way"
+    losses = ("guides", ("friction", "damping"))
+
+    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+        """Add the line, the angle and the length of the block."""
+        by, start = joint["by"]
+        toward = table.get("toward")
+        if isinstance(toward, str):
+            toward = toward.rpartition(".")[2]
+        others = [name for name in reader.points[by] if name != start]
+        if toward not in others:
+            state = "is missing" if toward is None else f"is {shown(toward)}"
+            reader.fault(
+                f"{key}.toward",
+                f"{state}; must be another point of {by}, to which the line goes: "
+                f"{', '.join(others) or 'add one'}",
+            )
+        joint["toward"] = toward
+        joint["angle"] = reader.entry(f"{key}.angle", table.get("angle", 0.0), "rad")
+        if "length" in table:
+            joint["length"] = reader.entry(f"{key}.length", table["length"], "m")
+
+    def start_faults(
+        self, joint: JointTable, points: Mapping[str, Mapping[str, tuple[float, float]]]
+    ) -> Iterator[tuple[str, str]]:
+        """The fault of a line without a direction."""
+        (link, start), toward = joint["by"], joint["toward"]
+        if math.dist(points[link][start], points[link][toward]) == 0.0:
+            key = f"joints.{joint['name']}.toward"
+            yield key, f"{start} and {toward} are in one place, so that the line has no direction"
+
+
+class SingleLinkKind(JointKind):
+    """A kind of joint by which, and a pin, a single link forms a group of the kind `alone`."""
+
+    def group(self, parts: LinkageParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
+        """The group of the link."""
+        raise NotImplementedError
+
+    def rate(self, joint: JointEntry, link: str) -> float:
+        """How often the link turns, at most, while the links before it turn once."""
+        raise NotImplementedError
+
+    def dead(self, group: AssurGroup, where: str) -> str:
+        """The sentence on the group in its dead position."""
+        raise NotImplementedError
