@@ -53,7 +53,7 @@ TABLES = (
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
-_DRIVES = ("gear", "belt", "chain", "cam", "rack", "rolling")
+_DRIVES = ("belt", "chain", "cam", "rack", "rolling")
 """Kinds of joints of other programs."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 
@@ -336,7 +336,7 @@ class _LinkageReader(LoadReader):
         for name, key, table in self.tables("joints"):
             kind = KINDS.get(str(kind_name := kind_of(table)))
             if kind is None:
-                drive = "; a gear, a belt or a cam between links is not possible yet" * (kind_name in _DRIVES)
+                drive = "; a belt or a cam between links is not possible yet" * (kind_name in _DRIVES)
                 possible = " or ".join(f'"{possible_name}"' for possible_name in KINDS)
                 self.fault(f"{key}.type", f"is {shown(kind_name)}; must be {possible}{drive}")
                 continue
@@ -371,6 +371,11 @@ class _LinkageReader(LoadReader):
             joints.append(joint)
         for joint in joints:
             KINDS[joint["type"]].complete(self, joint, joints)
+            for link, points in joint.get("points", {}).items():
+                if not {*points}.isdisjoint((*self.points[link], *POINT_NAMES)):
+                    self.fault(
+                        f"joints.{joint['name']}", f"gives {link} a point of its name, too; rename the joint"
+                    )
         more, clashes = shared_pins(self.points, joints, self.table("driver"))
         for name, message in clashes:
             self.fault(f"joints.{name}", message)

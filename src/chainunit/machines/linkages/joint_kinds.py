@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...mechanism.assur import REVOLUTE
+from .gear import GearKind
 from .joint_kind import GuideKind, JointKind, PinKind, SingleLinkKind
 
-KINDS: Mapping[str, JointKind] = {kind.name: kind for kind in (PinKind(), GuideKind())}
+KINDS: Mapping[str, JointKind] = {kind.name: kind for kind in (PinKind(), GuideKind(), GearKind())}
 """The kinds by their names."""
 SINGLES: Mapping[str, SingleLinkKind] = {
     kind.alone: kind for kind in KINDS.values() if isinstance(kind, SingleLinkKind)
