@@ -238,7 +238,7 @@ class GearKind(SingleLinkKind):
                 f"{link} may turn {float(rate):.3g} times in a turn of the links before it by the teeth of "
                 f"{joint.name}, and must turn {_MOST} times at most; leave the fast wheel out: a gear to the motor is "
                 "the `ratio` at the top of the file",
-                key=link,
+                key=f"links.{link}",
             )
         return float(rate)
 
