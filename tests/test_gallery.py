@@ -130,7 +130,10 @@ def said(name, pattern):
 def test_the_straight_line_is_as_long_as_the_file_says():
     way, most = said("straight_line_pump", r"throw of the crank, (\d+) mm; the teeth bear up to (\S+) kN")
     out = turn("straight_line_pump", 2.0 * np.pi)
-    assert 1e3 * np.ptp(out.planet.E.x) == pytest.approx(way, rel=1e-12) and np.max(np.abs(out.planet.E.y)) < 1e-15
+    assert (
+        1e3 * np.ptp(out.planet.E.x) == pytest.approx(way, rel=1e-12)
+        and np.max(np.abs(out.planet.E.y)) < 1e-15
+    )
     assert 1e-3 * np.max(np.hypot(out.mesh.fx, out.mesh.fy)) == pytest.approx(most, abs=0.05)
 
 

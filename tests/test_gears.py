@@ -199,7 +199,7 @@ def test_against_an_independent_solution(name):
 @pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
-@pytest.mark.parametrize("name", [*MACHINES][:4])
+@pytest.mark.parametrize("name", ["five_bar", "planetary", "sun_and_planet", "cardan", "sector"])
 def test_fmus(name, make, tmp_path):
     """The same numbers through the FMU, before and after a step."""
     model, body, h = machine_of(described(name)), independent(name), 0.01
@@ -358,7 +358,11 @@ def on_one_centre():
         (changed(teeth=30), "joints.mesh.teeth", "two whole numbers"),
         (changed(internal=1), "joints.mesh.internal", "must be true or false"),
         (changed(internal=True), "joints.mesh.teeth", "fewer teeth than the ring"),
-        (changed(ratio=2), "joints.mesh.ratio", "unknown key; known here: type, on, by, toward, angle, length, teeth, internal"),
+        (
+            changed(ratio=2),
+            "joints.mesh.ratio",
+            "unknown key; known here: type, on, by, toward, angle, length, teeth",
+        ),
         (changed(type="revolute"), "joints.mesh.teeth", "belongs to a gear joint, and this one is a pin"),
         (changed(toward="O2"), "joints.mesh.toward", "belongs to a prismatic joint, and this one is a gear"),
         (changed(type="belt"), "joints.mesh.type", 'or "gear"; a belt or a cam'),

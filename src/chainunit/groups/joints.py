@@ -72,7 +72,7 @@ class JointData(Protocol):
 
     @property
     def form(self) -> str:
-        """`TURNS` if its links turn about the pin, `SLIDES` if they slide along each other."""
+        """`TURNS` if its links turn about the pin, `SLIDES` if they slide along each other; else another word."""
 
     def carrier(self, carries: Mapping[str, str]) -> str | None:
         """The link on which the opposite reaction acts, None for the ground, from the links that carry pins."""

@@ -66,17 +66,21 @@ class MeshData(NamedTuple):
 
     @property
     def form(self) -> str:
+        """Its links neither turn about it nor slide in it."""
         return "rolls"
 
     def carrier(self, carries: Mapping[str, str]) -> str | None:
+        """The other wheel; the arm carries the pitch point, but no force of the teeth."""
         return self.by
 
     def third_before(
         self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
     ) -> Third | None:
+        """The third derivatives of the centre and of the angle of the wheel."""
         return pins.get(self.centre, ZERO), self.rolling.turn(lambda name: links[name][1])
 
     def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
+        """What the opposite force does to the other wheel."""
         return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
@@ -105,11 +109,13 @@ class Mesh(Placed):
         return [{0: n.x, 1: n.y, 2: self._arm.squared()}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """Its right side, from the centre and the angle, which are known."""
         base = self._base.p2 if rates else self._base.p1
         point, turn = before if before is not None else (base, self._turns[len(rates)])
         return [self._arm.turned().dot(point) + self._arm.squared() * turn]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """The tangential force of the teeth [N]."""
         return self._arm.turned() * next(multipliers), None
 
 
@@ -134,14 +140,17 @@ class GearedLink(Group):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
+        """Its pin and its mesh."""
         bar = self.bar
         return HingeData(bar.pin, bar.name), MeshData(self.mesh, bar.name, bar.pin, self.by, self.rolling)
 
     @property
     def circles(self) -> tuple[tuple[str, str], ...]:
+        """The pitch circles of both wheels."""
         return (self.bar.pin, self.mesh), (self.by_centre, self.mesh)
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
+        """See `derived_count`."""
         arm, source = self.rolling.sight(before(self.start))
         wheel = rotated(Vec2(math.cos(self.angle), math.sin(self.angle)), mirrored(arm))
         return [source.x, source.y, wheel.x, wheel.y]
@@ -208,8 +217,8 @@ class GearKind(SingleLinkKind):
             on, by = (".".join(joint[end]) for end in ("on", "by"))
             reader.fault(
                 key,
-                f"no link holds its two wheels at their distance: {on} and {by} must be pinned to one link, or to the "
-                "ground; name the centres of the wheels in `on` and `by`",
+                f"no link holds its two wheels at their distance: {on} and {by} must be pinned to one link, or to "
+                "the ground; name the centres of the wheels in `on` and `by`",
             )
         elif not reader.errors:
             (z, other), sign = joint["teeth"], -1 if joint["internal"] else 1
@@ -226,7 +235,8 @@ class GearKind(SingleLinkKind):
         if math.dist(points[arm][a], points[arm][b]) == 0.0:
             yield (
                 f"joints.{joint['name']}",
-                f"its wheels have one centre, {a} and {b} of {arm} in one place, and cannot be in mesh; place them apart",
+                f"its wheels have one centre, {a} and {b} of {arm} in one place, and cannot be in mesh; place them "
+                "apart",
             )
 
     def rate(self, joint: JointEntry, link: str) -> float:
@@ -236,8 +246,8 @@ class GearKind(SingleLinkKind):
         if rate > _MOST:
             raise InputError(
                 f"{link} may turn {float(rate):.3g} times in a turn of the links before it by the teeth of "
-                f"{joint.name}, and must turn {_MOST} times at most; leave the fast wheel out: a gear to the motor is "
-                "the `ratio` at the top of the file",
+                f"{joint.name}, and must turn {_MOST} times at most; leave the fast wheel out: a gear to the motor "
+                "is the `ratio` at the top of the file",
                 key=f"links.{link}",
             )
         return float(rate)
@@ -263,8 +273,8 @@ class GearKind(SingleLinkKind):
         return (
             f"{other} has turned by nearly half a turn from its start at {where}, and {link} does not turn a whole "
             f"number of times as fast by the teeth of {joint.name}, so that it would not be back after a turn; drive "
-            "the slower of the two wheels with a whole ratio of the teeth, or let it swing by less than 168 deg about "
-            "its start"
+            "the slower of the two wheels with a whole ratio of the teeth, or let it swing by less than 168 deg "
+            "about its start"
         )
 
 
