@@ -318,6 +318,7 @@ def test_the_picture_has_the_pitch_circles_and_the_report_the_gear():
     findings = linkage_findings(machine, 3.0)
     assert findings.sentence == "crank + geared link (wheel) + RRR dyad (left, right)"
     assert findings.joints["mesh"].peak > 0.0
+    assert "what presses the wheels apart is in no reaction" in machine.model.fmu_data.notes
 
 
 def changed(**changes):

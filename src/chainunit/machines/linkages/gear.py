@@ -182,6 +182,7 @@ class GearKind(SingleLinkKind):
     name = noun = "gear"
     keys = ("teeth", "internal")
     use = "for a gear give it `teeth`, the numbers of teeth of both wheels"
+    limits = "The reaction of a gear is its tangential force; what presses the wheels apart is in no reaction."
     equations = 1
     alone = "geared link"
 

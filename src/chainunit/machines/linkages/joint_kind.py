@@ -23,14 +23,16 @@ JointTable = dict[str, Any]
 class JointKind:
     """A kind of joint: its `name` in `type`, its `noun` in reports, the `keys` that it has besides `type`, `on` and
     `by`, of which the first one tells the kind where `type` is missing, with words on their `use`. `losses` are the
-    table of the losses of all such joints, and its keys; `equations` is their number. `alone` is the kind of the
-    group that a single link forms by such a joint and a pin, if there is one."""
+    table of the losses of all such joints, and its keys; `limits` say what is not in their reactions; `equations` is
+    their number. `alone` is the kind of the group that a single link forms by such a joint and a pin, if there is
+    one."""
 
     name: ClassVar[str]
     noun: ClassVar[str]
     keys: ClassVar[tuple[str, ...]] = ()
     use: ClassVar[str] = ""
     losses: ClassVar[tuple[str, tuple[str, ...]]] = ("", ())
+    limits: ClassVar[str] = ""
     equations: ClassVar[int] = 2
     alone: ClassVar[str] = ""
 

@@ -36,6 +36,7 @@ from ...mechanism.models import InverseMachine, words_on_motion
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
 from .following import LEAST_MARGIN, FollowedLinkage
 from .geometry import LinkGeometry
+from .joint_kinds import KINDS
 from .loads import (
     ForceLaw,
     LinkAngle,
@@ -463,4 +464,6 @@ class LinkageDescription(LinkageOutputs):
     @property
     def notes(self) -> str:
         """Words for the description of the FMU."""
-        return notes_on(self.structure.driver, self.way.limits, self.angle_counts)
+        kinds = dict.fromkeys(joint.kind for joint in self.structure.joints.values())
+        limits = "".join(f" {KINDS[kind].limits}" for kind in kinds if KINDS[kind].limits)
+        return notes_on(self.structure.driver, self.way.limits, self.angle_counts) + limits
