@@ -12,9 +12,10 @@ from typing import Any
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
+from .joint_kind import JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
-from .structure import DriverEntry, JointEntry, groups_of
+from .structure import DriverEntry, groups_of
 
 Fault = tuple[str, str]
 Entries = Sequence[Mapping[str, Any]]
@@ -147,7 +148,7 @@ def freedom_faults(
 ) -> Iterator[Fault]:
     """Too many or too few degrees of freedom, and groups of a class that is not covered; the `hint` follows a refusal
     of too many."""
-    entries = [JointEntry.of(j) for j in joints]
+    entries = [JointEntry.from_table(j) for j in joints]
     try:
         groups_of([link["name"] for link in links], entries, DriverEntry(**driver))
     except InputError as error:

@@ -37,13 +37,14 @@ from .checks import (
 )
 from .declarations import RESERVED
 from .entries import is_among, is_given, sized
+from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
-from .structure import CYLINDER, JointEntry
+from .structure import CYLINDER
 from .way import WHOLE
 
 TABLES = (
@@ -482,7 +483,7 @@ class _LinkageReader(LoadReader):
         self.doubt_bodies(links, points, joints, number)
         entries = [
             (
-                JointEntry.of(j),
+                JointEntry.from_table(j),
                 number(j.get("angle", 0.0)),
             )
             for j in joints

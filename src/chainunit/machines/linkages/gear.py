@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from ...core.errors import InputError, shown
 from ...core.planar import ZERO, Link, Motion, Vec2, mirrored, rotated
@@ -21,12 +21,7 @@ from ...groups.body import Bar, Load
 from ...groups.group import Group, SolvedGroup
 from ...groups.joints import Hinge, HingeData, JointData, LinkageInMotion, Placed, Rates, Third
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
-from .joint_kind import JointTable, SingleLinkKind
-
-if TYPE_CHECKING:
-    from .entries import EntryReader
-    from .parts import LinkageParts
-    from .structure import JointEntry
+from .joint_kind import JointEntry, JointParts, JointReader, JointTable, SingleLinkKind
 
 _AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
 _MOST = 12
@@ -182,11 +177,13 @@ class GearKind(SingleLinkKind):
     name = noun = "gear"
     keys = ("teeth", "internal")
     use = "for a gear give it `teeth`, the numbers of teeth of both wheels"
-    limits = "The reaction of a gear is its tangential force; what presses the wheels apart is in no reaction."
+    limits = (
+        "The reaction of a gear is its tangential force; what presses the wheels apart is in no reaction."
+    )
     equations = 1
     alone = "geared link"
 
-    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add the teeth."""
         teeth, internal = table.get("teeth"), table.get("internal", False)
         whole = isinstance(teeth, list) and len(teeth) == 2 and all(type(z) is int and z > 0 for z in teeth)
@@ -206,7 +203,7 @@ class GearKind(SingleLinkKind):
             )
         joint |= {"teeth": teeth, "internal": internal}
 
-    def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+    def complete(self, reader: JointReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
         """Add the arm with its points at the centres, and the pitch point, which it carries by the name of the
         joint."""
         key, wheels = f"joints.{joint['name']}", (joint["on"][0], joint["by"][0])
@@ -253,7 +250,7 @@ class GearKind(SingleLinkKind):
             )
         return float(rate)
 
-    def group(self, parts: LinkageParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
+    def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
         """The wheel with its mesh; an idler only hands on the turn of the wheel before it."""
         other, arm = joint.other_link(link), joint.third
         before = next((g for g in parts.groups if isinstance(g, GearedLink) and g.bar.name == other), None)

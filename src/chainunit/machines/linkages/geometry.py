@@ -15,7 +15,8 @@ from ...core.planar import ZERO, Vec2, mirrored, rotated
 from ...groups.body import Mass
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import value_of
-from .structure import Entry, JointEntry, LinkEntry, Structure
+from .joint_kind import Entry, JointEntry
+from .structure import LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
 

@@ -1,23 +1,94 @@
-"""Kinds of joints of a linkage file, pins and guides: what they are called, their keys, and their equations."""
+"""Joints of a linkage file and their kinds, pins and guides: their names, their keys, and their equations."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from ...core.errors import shown
-from ...mechanism.assur import PRISMATIC, REVOLUTE
+from ...groups.body import Bar
+from ...groups.group import Group
+from ...mechanism.assur import PRISMATIC, REVOLUTE, AssurGroup
 
-if TYPE_CHECKING:
-    from ...groups.group import Group
-    from ...mechanism.assur import AssurGroup
-    from .entries import EntryReader
-    from .parts import LinkageParts
-    from .structure import JointEntry
-
+Entry = float | str
+"""A number, or the text of an expression."""
 JointTable = dict[str, Any]
 """A joint of a description."""
+
+
+class JointEntry(NamedTuple):
+    """A joint as described: `on` and `by` are a link and a point of it; of a prismatic one the point of `on` slides
+    along the line from the point of `by` to its point `toward`, and `angle` is that of `on` less that of `by`.
+    `third` is a further link that its equations contain; `table` has all its entries."""
+
+    name: str
+    kind: str
+    on: tuple[str, str]
+    by: tuple[str, str]
+    toward: str
+    angle: Entry
+    third: str
+    table: Mapping[str, Any]
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> JointEntry:
+        """The joint of a description."""
+        on, by = (tuple(table[end]) for end in ("on", "by"))
+        toward, angle, third = table.get("toward", ""), table.get("angle", 0.0), table.get("third", "")
+        return cls(table["name"], table["type"], on, by, toward, angle, third, table)
+
+    @property
+    def links(self) -> set[str]:
+        """Its two links, of which one may be the ground."""
+        return {self.on[0], self.by[0]}
+
+    def at(self, link: str) -> str:
+        """Its point on one of its links."""
+        return self.on[1] if self.on[0] == link else self.by[1]
+
+    def other_link(self, link: str) -> str:
+        """The link on its other side."""
+        return self.by[0] if self.on[0] == link else self.on[0]
+
+
+class JointReader(Protocol):
+    """What a kind of joint needs of the reader of a file."""
+
+    @property
+    def points(self) -> Mapping[str, Mapping[str, Any]]:
+        """The points of each link, the ground too."""
+
+    @property
+    def errors(self) -> Sequence[Any]:
+        """The faults so far."""
+
+    def fault(self, name: str, message: str) -> None:
+        """Collect the fault of a key."""
+
+    def entry(self, key: str, entry: Any, unit: str) -> Any:
+        """A number in SI units, or the text of an expression."""
+
+
+class JointParts(Protocol):
+    """What a kind of joint needs of the parts of a linkage."""
+
+    @property
+    def groups(self) -> Sequence[Group]:
+        """The groups so far."""
+
+    @property
+    def structure(self) -> Any:
+        """The linkage without numbers."""
+
+    def pin(self, link: str, point: str) -> str:
+        """The name of a point in the linkage."""
+
+    def hung(self, link: str, joint: JointEntry) -> Bar:
+        """The bar of a link that starts from the pin of a joint, along its own x axis."""
+
+    def receive(self, joint: JointEntry, pin: str, link: str) -> None:
+        """The reaction of a joint acts in the groups at that pin on that link."""
 
 
 class JointKind:
@@ -36,10 +107,10 @@ class JointKind:
     equations: ClassVar[int] = 2
     alone: ClassVar[str] = ""
 
-    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add its own keys from its `table` to the `joint`, which has its ends."""
 
-    def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+    def complete(self, reader: JointReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
         """Add what follows from all `joints` of the file; `points` by link are added to the links."""
 
     def start_faults(
@@ -64,7 +135,7 @@ class GuideKind(JointKind):
     use = "for a cylinder or a guide give it `toward` with a further point of {by}, on the line of the way"
     losses = ("guides", ("friction", "damping"))
 
-    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add the line, the angle and the length of the block."""
         by, start = joint["by"]
         toward = table.get("toward")
@@ -96,7 +167,7 @@ class GuideKind(JointKind):
 class SingleLinkKind(JointKind):
     """A kind of joint by which, and a pin, a single link forms a group of the kind `alone`."""
 
-    def group(self, parts: LinkageParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
+    def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
         """The group of the link."""
         raise NotImplementedError
 

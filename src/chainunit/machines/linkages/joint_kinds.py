@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...mechanism.assur import REVOLUTE
+from ...mechanism.assur import REVOLUTE, JointOf
 from .gear import GearKind
-from .joint_kind import GuideKind, JointKind, PinKind, SingleLinkKind
+from .joint_kind import GuideKind, JointEntry, JointKind, PinKind, SingleLinkKind
 
 KINDS: Mapping[str, JointKind] = {kind.name: kind for kind in (PinKind(), GuideKind(), GearKind())}
 """The kinds by their names."""
@@ -21,5 +21,11 @@ KEYS: Sequence[str] = ("type", "on", "by", *(key for kind in KINDS.values() for 
 
 def kind_of(table: Mapping[str, Any]) -> Any:
     """The name of the kind that the table of a joint gives, or that its keys tell; it may be wrong."""
-    told = (kind.name for kind in KINDS.values() if kind.keys and kind.keys[0] in table)
-    return table.get("type", next(told, REVOLUTE))
+    names = (kind.name for kind in KINDS.values() if kind.keys and kind.keys[0] in table)
+    return table.get("type", next(names, REVOLUTE))
+
+
+def in_decomposition(joint: JointEntry) -> JointOf:
+    """A joint as the decomposition sees it."""
+    kind = KINDS[joint.kind]
+    return JointOf(joint.name, kind.name, joint.on[0], joint.by[0], joint.third, kind.equations, kind.alone)

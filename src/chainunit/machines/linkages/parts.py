@@ -17,8 +17,9 @@ from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
 from ...groups.triad import Pose, Triad
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry, RoughPoses
+from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
-from .structure import CYLINDER, JointEntry
+from .structure import CYLINDER
 
 
 class LinkageParts:

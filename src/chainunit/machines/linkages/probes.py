@@ -13,8 +13,9 @@ from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.machine import Mechanism
 from .declarations import GuideReaction, PointMotion
 from .geometry import LinkFrame
+from .joint_kind import JointEntry
 from .parts import LinkageParts
-from .structure import DriverEntry, JointEntry, LinkEntry, Structure
+from .structure import DriverEntry, LinkEntry, Structure
 
 _Node = TypeVar("_Node")
 

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ...mechanism.assur import GROUND, REVOLUTE, in_order_of_motion
-from .structure import JointEntry
+from .joint_kind import JointEntry
+from .joint_kinds import in_decomposition
 
 
 def shared_pins(
@@ -54,7 +55,11 @@ def _ordered(
     """The links of each point; of three or more that one first on which the others hang."""
     apart = {point for pair in joined for _, point in pair if len({name for _, name in pair}) == 1}
     shared = {point: those for point, those in owners.items() if len(those) > 1 and point not in apart}
-    seen = [JointEntry.of(joint).in_decomposition for joint in named if joint["name"] != driver.get("joint")]
+    seen = [
+        in_decomposition(JointEntry.from_table(joint))
+        for joint in named
+        if joint["name"] != driver.get("joint")
+    ]
     links = [link for link in points if link != GROUND]
     ordered = in_order_of_motion(shared, links, seen, str(driver.get("link")))
     return {

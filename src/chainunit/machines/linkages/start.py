@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
-from .structure import JointEntry
+from .joint_kind import JointEntry
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]

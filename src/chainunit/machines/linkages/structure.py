@@ -5,55 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
-from .joint_kinds import KINDS, SINGLES
-
-Entry = float | str
-"""A number, or the text of an expression."""
-
-
-class JointEntry(NamedTuple):
-    """A joint as described: `on` and `by` are a link and a point of it; of a prismatic one the point of `on` slides
-    along the line from the point of `by` to its point `toward`, and `angle` is that of `on` less that of `by`.
-    `third` is a further link that its equations contain; `table` has all its entries."""
-
-    name: str
-    kind: str
-    on: tuple[str, str]
-    by: tuple[str, str]
-    toward: str
-    angle: Entry
-    third: str
-    table: Mapping[str, Any]
-
-    @classmethod
-    def of(cls, table: Mapping[str, Any]) -> JointEntry:
-        """The joint of a description."""
-        on, by = (tuple(table[end]) for end in ("on", "by"))
-        toward, angle, third = table.get("toward", ""), table.get("angle", 0.0), table.get("third", "")
-        return cls(table["name"], table["type"], on, by, toward, angle, third, table)
-
-    @property
-    def in_decomposition(self) -> JointOf:
-        """The joint as the decomposition sees it."""
-        kind = KINDS[self.kind]
-        return JointOf(self.name, self.kind, self.on[0], self.by[0], self.third, kind.equations, kind.alone)
-
-    @property
-    def links(self) -> set[str]:
-        """Its two links, of which one may be the ground."""
-        return {self.on[0], self.by[0]}
-
-    def at(self, link: str) -> str:
-        """Its point on one of its links."""
-        return self.on[1] if self.on[0] == link else self.by[1]
-
-    def other_link(self, link: str) -> str:
-        """The link on its other side."""
-        return self.by[0] if self.on[0] == link else self.on[0]
+from .joint_kind import Entry, JointEntry
+from .joint_kinds import SINGLES, in_decomposition
 
 
 @dataclass(frozen=True)
@@ -103,7 +60,7 @@ def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: Driver
     InputError
         where the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
-    seen = [joint.in_decomposition for joint in joints if joint.name != driver.joint]
+    seen = [in_decomposition(joint) for joint in joints if joint.name != driver.joint]
     slide = next(joint for joint in joints if joint.name == driver.joint)
     if GROUND in (slide.on[0], slide.by[0]):
         groups = decompose(links, seen, driver.link)
@@ -299,7 +256,7 @@ def structure_of(data: Mapping[str, Any]) -> Structure:
         )
         for link in data["links"]
     ]
-    joints = [JointEntry.of(joint) for joint in data["joints"]]
+    joints = [JointEntry.from_table(joint) for joint in data["joints"]]
     driver = DriverEntry(**data["driver"])
     start = data["start"]
     ends = [tuple(load[key]) for load in data["loads"] for key in ("on", "by") if key in load]
