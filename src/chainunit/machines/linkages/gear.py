@@ -185,7 +185,8 @@ class GearKind(SingleLinkKind):
 
     def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add the teeth."""
-        teeth, internal = table.get("teeth"), table.get("internal", False)
+        teeth: Any = table.get("teeth")
+        internal = table.get("internal", False)
         whole = isinstance(teeth, list) and len(teeth) == 2 and all(type(z) is int and z > 0 for z in teeth)
         if not whole:
             state = "is missing" if teeth is None else f"is {shown(teeth)}"
@@ -226,7 +227,7 @@ class GearKind(SingleLinkKind):
             joint |= {"third": arm, "held": held, "points": {arm: {joint["name"]: place}}}
 
     def start_faults(
-        self, joint: JointTable, points: Mapping[str, Mapping[str, tuple[float, float]]]
+        self, joint: Mapping[str, Any], points: Mapping[str, Mapping[str, tuple[float, float]]]
     ) -> Iterator[tuple[str, str]]:
         """The fault of wheels on one centre."""
         arm, (a, b) = joint["third"], joint["held"]

@@ -114,7 +114,7 @@ class JointKind:
         """Add what follows from all `joints` of the file; `points` by link are added to the links."""
 
     def start_faults(
-        self, joint: JointTable, points: Mapping[str, Mapping[str, tuple[float, float]]]
+        self, joint: Mapping[str, Any], points: Mapping[str, Mapping[str, tuple[float, float]]]
     ) -> Iterator[tuple[str, str]]:
         """Faults by key at the start values of the parameters, from the `points` of each link in its frame [m]."""
         return iter(())
@@ -155,7 +155,7 @@ class GuideKind(JointKind):
             joint["length"] = reader.entry(f"{key}.length", table["length"], "m")
 
     def start_faults(
-        self, joint: JointTable, points: Mapping[str, Mapping[str, tuple[float, float]]]
+        self, joint: Mapping[str, Any], points: Mapping[str, Mapping[str, tuple[float, float]]]
     ) -> Iterator[tuple[str, str]]:
         """The fault of a line without a direction."""
         (link, start), toward = joint["by"], joint["toward"]

@@ -168,9 +168,11 @@ def _with_cylinder(links: Sequence[str], joints: Sequence[JointOf], slide: Joint
     """
     rod, barrel = slide.on[0], slide.by[0]
     joint_by_name = {joint.name: joint for joint in joints}
+    renamed = {rod: barrel}
     merged = [
-        joint._replace(**{end: barrel for end in ("on", "by", "third") if getattr(joint, end) == rod})
+        joint._replace(on=on, by=by, third=third)
         for joint in joints
+        for on, by, third in [[renamed.get(link, link) for link in (joint.on, joint.by, joint.third)]]
     ]
     groups = decompose([link for link in links if link != rod], merged, "")
     dyad = next(group for group in groups if barrel in group.links)
