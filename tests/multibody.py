@@ -2,8 +2,9 @@
 multipliers, with numpy alone. It shares no line with the package: neither groups nor expressions nor loads.
 
 The unknowns are x, y and angle of the frame of each link. A revolute joint closes two points; a sliding one holds the
-point of `on` on the line of `by`, and the angle between both links; the driver has the last equation. A multiplier is
-the force (of a sliding joint the force across its line and the moment about the point) on `on` from `by`.
+point of `on` on the line of `by`, and the angle between both links; two wheels in mesh move alike along their common
+tangent at the pitch point; the driver has the last equation. A multiplier is the force (of a sliding joint the force
+across its line and the moment about the point) on `on` from `by`.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ def rotation(angle):
 
 
 class Multibody:
-    """A linkage from its description; `inputs` have values by name."""
+    """A linkage from its description; `inputs` have values by name. `wheels` has the wheel of each gear that
+    has its rough angle at the start."""
 
-    def __init__(self, data, inputs=None):
+    def __init__(self, data, inputs=None, wheels=None):
         self.data = data
         self.values = {each["name"]: each["value"] for each in (*data["parameters"], *data["inputs"])}
         self.values |= {"g": data["common"].get("g", 9.81), "ratio": 1.0}
@@ -56,6 +58,12 @@ class Multibody:
         self.joints += [joint for joint in data["joints"] if joint["name"] == data["driver"]["joint"]]
         self.start = data["start"]["value"]
         self.rough = np.array([data["start"]["poses"][name] for name in self.names], float).ravel()
+        self.wheels, self.phases = wheels or {}, {}
+        if self.wheels:
+            x = self.closed(self.start, self.rough)
+            self.phases = {
+                joint["name"]: self.lag(x, joint) for joint in self.joints if joint["type"] == "gear"
+            }
 
     def number(self, entry, **more):
         """The value of an entry."""
@@ -96,13 +104,47 @@ class Multibody:
         way = self.points[link][joint["toward"]] - self.points[link][start]
         return rotation(self.angle(x, link)[0]) @ (way / np.hypot(*way))
 
+    def mesh(self, x, joint):
+        """Of two wheels: the pitch point, the unit tangent of the pitch circles, and the radius of `on`; it is below
+        0 where the pitch point lies beyond its centre, as seen from that of `by`."""
+        teeth, inner = joint["teeth"], joint["internal"]
+        (c, _), (e, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+        distance = np.sqrt((e - c) @ (e - c))
+        radius = distance * teeth[0] / (teeth[0] + (-1 if inner else 1) * teeth[1])
+        return c + (e - c) / distance * radius, turned(e - c) / distance, radius
+
+    def end(self, joint, end):
+        """The link and the place of an end of a joint."""
+        link, name = joint[end]
+        return link, self.points[link][name]
+
+    def lag(self, x, joint):
+        """The angle of the wheel `on` less the one that the teeth alone would give it."""
+        on, by, arm = (self.angle(x, link)[0] for link in (joint["on"][0], joint["by"][0], joint["third"]))
+        ratio = joint["teeth"][1] / joint["teeth"][0] * (1 if joint["internal"] else -1)
+        return on - arm - ratio * (by - arm)
+
     def equations(self, x, q):
         """Misfits of all joints and of the driver, and their derivatives by the unknowns."""
         gaps, rows = [], []
         for joint in self.joints:
-            (p, p_by), (r, r_by) = (
-                self.place(x, link, self.points[link][name]) for link, name in (joint["on"], joint["by"])
-            )
+            if joint["type"] == "gear":
+                point, tangent, radius = self.mesh(x, joint)
+                row = np.zeros(x.size, x.dtype)
+                for end, sign in (("on", 1.0), ("by", -1.0)):
+                    if joint[end][0] != "ground":
+                        columns = self.columns(joint[end][0])
+                        arm = point - x[columns][:2]
+                        row[columns] += sign * np.array([*tangent, arm[0] * tangent[1] - arm[1] * tangent[0]])
+                wheel = self.wheels[joint["name"]]
+                if joint["name"] in self.phases:
+                    gaps.append(radius * (self.lag(x, joint) - self.phases[joint["name"]]))
+                else:
+                    angle, row = self.angle(x, wheel)
+                    gaps.append(angle - self.rough[self.columns(wheel)][2])
+                rows.append(row)
+                continue
+            (p, p_by), (r, r_by) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
             if joint["type"] == "revolute":
                 gaps += [*(p - r)]
                 rows += [*(p_by - r_by)]
@@ -148,7 +190,7 @@ class Multibody:
         """The numbers of the equations of angles."""
         found, k = set(), 0
         for joint in self.joints:
-            k += 2
+            k += 1 if joint["type"] == "gear" else 2
             if joint["type"] == "prismatic":
                 found.add(k - 1)
         return found | (set() if self.data["driver"]["linear"] else {k})
@@ -219,9 +261,14 @@ class Multibody:
         factors = np.linalg.solve(rows.T, needed - applied)
         found = {"kinetic_energy": kinetic, "potential_energy": potential, "load_power": load_power}
         found["tau"] = factors[-1] * by_q[-1]
-        for k, joint in enumerate(self.joints):
-            one, two = factors[2 * k : 2 * k + 2]
-            name = joint["name"]
+        left = iter(factors)
+        for joint in self.joints:
+            one, name = next(left), joint["name"]
+            if joint["type"] == "gear":
+                force = self.mesh(x, joint)[1] * one
+                found |= {f"{name}.fx": force[0], f"{name}.fy": force[1]}
+                continue
+            two = next(left)
             if joint["type"] == "revolute":
                 found |= {f"{name}.fx": one, f"{name}.fy": two}
                 continue

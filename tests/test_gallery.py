@@ -48,6 +48,7 @@ KINDS = {
     "scotch_yoke_pump": ["RPP"],
     "slider_crank_press": ["RRP"],
     "stephenson_six_bar": ["RRR", "RRR"],
+    "straight_line_pump": ["geared link"],
     "tipper": ["cylinder"],
     "toggle_clamp": ["RRR"],
     "watt_six_bar": ["RRR", "RRR"],
@@ -124,6 +125,16 @@ def said(name, pattern):
     """Numbers of the comment at the top of a file."""
     comment = (FOLDER / f"{name}.toml").read_text("utf-8").partition("title =")[0].replace("\n# ", " ")
     return [float(each) for each in re.search(pattern, comment).groups()]
+
+
+def test_the_straight_line_is_as_long_as_the_file_says():
+    way, most = said("straight_line_pump", r"throw of the crank, (\d+) mm; the teeth bear up to (\S+) kN")
+    out = turn("straight_line_pump", 2.0 * np.pi)
+    assert (
+        1e3 * np.ptp(out.planet.E.x) == pytest.approx(way, rel=1e-12)
+        and np.max(np.abs(out.planet.E.y)) < 1e-15
+    )
+    assert 1e-3 * np.max(np.hypot(out.mesh.fx, out.mesh.fy)) == pytest.approx(most, abs=0.05)
 
 
 def test_the_dwell_is_where_the_file_says():

@@ -80,6 +80,16 @@ def growth(v: Vec2) -> Vec2:
 ZERO = Vec2(0.0, 0.0)
 
 
+def rotated(v: Vec2, by: Vec2) -> Vec2:
+    """A vector that is turned by the angle of the unit vector `by`."""
+    return Vec2(v.x * by.x - v.y * by.y, v.x * by.y + v.y * by.x)
+
+
+def mirrored(by: Vec2) -> Vec2:
+    """The unit vector of the opposite angle."""
+    return Vec2(by.x, -by.y)
+
+
 class Motion:
     """A point `p` with its derivatives `p1`, `p2` by the coordinate q [m, m/rad, m/rad^2]."""
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .block import GroupMatrix
 from .body import Bar, Load
-from .joints import UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Seat, Third
+from .joints import SLIDES, UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Seat, Third
 
 
 class SolvedGroup:
@@ -108,7 +108,12 @@ class Group:
     @property
     def guides(self) -> Mapping[Joint, str | None]:
         """Its sliding joints, each with the link on which the opposite reaction acts, None for the ground."""
-        return {(joint.pin, joint.link): joint.carrier({}) for joint in self.joints if joint.slides}
+        return {(joint.pin, joint.link): joint.carrier({}) for joint in self.joints if joint.form == SLIDES}
+
+    @property
+    def circles(self) -> tuple[tuple[str, str], ...]:
+        """The circles that a picture of it shows, each by the pins at its centre and on its rim."""
+        return ()
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """Numbers that follow from its lengths; `before` gives the linkage before the group at a crank angle

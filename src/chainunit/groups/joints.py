@@ -21,6 +21,8 @@ Joint = tuple[str, str]
 """A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
 Seat = tuple[int, Vec2]
 """A pin on a link: the number of the link in its group, and the arm from its start."""
+TURNS, SLIDES = "turns", "slides"
+"""Forms of the relative motion in a joint."""
 UNKNOWNS = 4
 """Number of the unknowns of a link: derivatives of its start along x and y, of its angle, and of its way along the
 line on which it starts."""
@@ -57,6 +59,37 @@ class LinkageInMotion(Protocol):
         """Links by name."""
 
 
+class JointData(Protocol):
+    """A joint as data."""
+
+    @property
+    def pin(self) -> str:
+        """The pin at which its reaction counts."""
+
+    @property
+    def link(self) -> str:
+        """The link on which its reaction acts."""
+
+    @property
+    def form(self) -> str:
+        """`TURNS` if its links turn about the pin, `SLIDES` if they slide along each other; else another word."""
+
+    def carrier(self, carries: Mapping[str, str]) -> str | None:
+        """The link on which the opposite reaction acts, None for the ground, from the links that carry pins."""
+
+    def third_before(
+        self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
+    ) -> Third | None:
+        """The third derivatives of its pin or line on a link before the group, from those of the `links` and `pins`;
+        None if it joins two links of the group."""
+
+    def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
+        """What the opposite reaction does to the link `carrier`."""
+
+    def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
+        """The derivatives by q of what the present reaction does to its links, as arms and lines turn."""
+
+
 class HingeData(NamedTuple):
     """A hinge as data: its pin, the link on which its reaction acts, and the link of the same group that carries the
     pin; None if a link before the group does."""
@@ -66,27 +99,21 @@ class HingeData(NamedTuple):
     by: str | None = None
 
     @property
-    def slides(self) -> bool:
-        """Whether its links slide along each other."""
-        return False
+    def form(self) -> str:
+        return TURNS
 
     def carrier(self, carries: Mapping[str, str]) -> str | None:
-        """The link on which the opposite reaction acts, None for the ground, from the links that carry pins."""
         return carries.get(self.pin)
 
     def third_before(
         self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
     ) -> Third | None:
-        """The third derivatives of its pin or line on a link before the group, from those of the `links` and `pins`;
-        None if it joins two links of the group."""
         return (pins.get(self.pin, ZERO), 0.0) if self.by is None else None
 
     def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
-        """What the opposite reaction does to the link `carrier`."""
         return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
-        """The derivatives by q of what the present reaction does to its links, as arms and lines turn."""
         p1, start = m.pins[self.pin].p1, m.links[self.link].pin.p1
         if p1 is not start:
             yield self.link, (ZERO, (p1 - start).cross(reaction))
@@ -103,9 +130,8 @@ class GuideData(NamedTuple):
     by: str | Rail
 
     @property
-    def slides(self) -> bool:
-        """Whether its links slide along each other."""
-        return True
+    def form(self) -> str:
+        return SLIDES
 
     def carrier(self, carries: Mapping[str, str]) -> str | None:
         return self.by.of if isinstance(self.by, Rail) else self.by
@@ -127,7 +153,7 @@ class GuideData(NamedTuple):
         return -reaction, -(reaction.moment + arm.cross(reaction))
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
-        """See `HingeData`: the force is normal to the line, which turns with the link."""
+        """See `JointData`: the force is normal to the line, which turns with the link."""
         link = m.links[self.link]
         more = reaction.turned() * link.t1
         yield self.link, (more, 0.0)
@@ -135,10 +161,6 @@ class GuideData(NamedTuple):
             other = m.links[carrier]
             arm, arm1 = link.pin.p - other.pin.p, link.pin.p1 - other.pin.p1
             yield carrier, (-more, -(arm1.cross(reaction) + arm.cross(more)))
-
-
-JointData = HingeData | GuideData
-"""A joint as data."""
 
 
 class Slide(NamedTuple):

@@ -1,11 +1,11 @@
 """The decomposition of a planar linkage into Assur groups, from its links and joints alone.
 
-Each joint of two links, revolute or prismatic, gives two equations, each link three unknowns. Equations are matched
-with unknowns (a maximum flow of joints into links). What an equation cannot find is over-determined, what no equation
-takes is free. In a full matching each link depends on the other links of its equations; the links that depend on each
-other, directly or by a circle, form a group, which no smaller part of it determines. The groups come in the order in
-which they can be solved. This is the fine Dulmage-Mendelsohn decomposition of the equations; where all their ranks
-are full, it is that into Assur groups.
+Each joint of two links, revolute or prismatic, gives two equations, one of a further kind may give one; each link
+has three unknowns. Equations are matched with unknowns (a maximum flow of joints into links). What an equation cannot
+find is over-determined, what no equation takes is free. In a full matching each link depends on the other links of
+its equations; the links that depend on each other, directly or by a circle, form a group, which no smaller part of it
+determines. The groups come in the order in which they can be solved. This is the fine Dulmage-Mendelsohn
+decomposition of the equations; where all their ranks are full, it is that into Assur groups.
 """
 
 from __future__ import annotations
@@ -27,12 +27,21 @@ class FreeLinksError(InputError):
 
 
 class JointOf(NamedTuple):
-    """A joint as the decomposition sees it: its name, its kind, and the two links."""
+    """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
+    contain. `alone` is the kind of the group that a single link forms by it and a revolute joint."""
 
     name: str
     kind: str
     on: str
     by: str
+    third: str = ""
+    equations: int = 2
+    alone: str = ""
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """All links that its equations contain."""
+        return (self.on, self.by, self.third) if self.third else (self.on, self.by)
 
     def other_link(self, link: str) -> str:
         """The link on its other side."""
@@ -40,11 +49,13 @@ class JointOf(NamedTuple):
 
 
 class AssurGroup(NamedTuple):
-    """A group: its kind (RRR, RRP, RPR, PRP, RPP, or triad), its links, and its joints in the order of their roles.
+    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, or that of a single link), its links, and its joints in the
+    order of their roles.
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
-    the joints are the outer ones of the legs, then their inner ones.
+    the joints are the outer ones of the legs, then their inner ones. Of a single link the revolute one
+    stands first.
     """
 
     kind: str
@@ -108,9 +119,9 @@ def _dependences(
     """For each link the others on which its equations depend."""
     depends: dict[str, dict[str, None]] = {link: {} for link in unknown}
     for (k, _), link in matched.items():
-        other = joints[k].other_link(link)
-        if other in depends:
-            depends[link][other] = None
+        for other in joints[k].links:
+            if other in depends and other != link:
+                depends[link][other] = None
     return depends
 
 
@@ -126,8 +137,7 @@ def _matching(room: Mapping[str, int], joints: Sequence[JointOf]) -> dict[tuple[
     owners: dict[str, list[tuple[int, int]]] = {link: [] for link in room}
 
     def augment(equation: tuple[int, int], seen: set[str]) -> bool:
-        joint = joints[equation[0]]
-        for link in (joint.on, joint.by):
+        for link in joints[equation[0]].links:
             if link in owners and link not in seen:
                 seen.add(link)
                 if len(owners[link]) < room[link]:
@@ -143,11 +153,11 @@ def _matching(room: Mapping[str, int], joints: Sequence[JointOf]) -> dict[tuple[
         return False
 
     for k in range(len(joints)):
-        for number in range(2):
+        for number in range(joints[k].equations):
             seen: set[str] = set()
             if not augment((k, number), seen):
                 involved = sorted(seen) or [joints[k].on]
-                fixing = [j.name for j in joints if {j.on, j.by} & set(involved)]
+                fixing = [j.name for j in joints if {*j.links} & {*involved}]
                 raise InputError(
                     f"too few degrees of freedom: the joints {', '.join(fixing)} fix the link"
                     f"{'s' * (len(involved) > 1)} {', '.join(involved)} more than once; take out a joint, such as "
@@ -168,11 +178,7 @@ def _freedoms(
     # all that a free link carries along: equations can be handed on to it
     loose = {link for link, count in free.items() if count}
     while True:
-        more = {
-            link
-            for (k, _), link in matched.items()
-            if link not in loose and {joints[k].on, joints[k].by} & loose
-        }
+        more = {link for (k, _), link in matched.items() if link not in loose and {*joints[k].links} & loose}
         if not more:
             break
         loose |= more
@@ -233,6 +239,10 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
     outer = {
         link: [j for j in joints if link in (j.on, j.by) and j.other_link(link) in placed] for link in part
     }
+    if len(part) == 1 and len(outer[part[0]]) == 2:
+        pair = sorted(outer[part[0]], key=lambda joint: joint.kind != REVOLUTE)
+        if pair[0].kind == REVOLUTE and pair[1].alone and {*pair[1].links} <= {*part} | placed:
+            return AssurGroup(pair[1].alone, part, tuple(pair))
     if len(part) == 2 and len(inner) == 1 and all(len(link_joints) == 1 for link_joints in outer.values()):
         return _dyad(part, inner[0], {link: link_joints[0] for link, link_joints in outer.items()})
     if len(part) == 4:
@@ -243,9 +253,13 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
                 len(meeting) == 1 for meeting in (*pairs, *(outer[leg] for leg in legs))
             ):
                 return _triad(ternary, legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs])
+    number, many = (
+        len([j for j in joints if {*part} & {*j.links} and {*j.links} <= {*part} | placed]),
+        len(part) > 1,
+    )
     raise InputError(
-        f"the links {', '.join(part)} form one group with {len(part)} links and "
-        f"{len(inner) + sum(map(len, outer.values()))} joints: a class that is not covered; covered are dyads "
+        f"the link{'s' * many} {', '.join(part)} form{'s' * (not many)} one group with {len(part)} "
+        f"link{'s' * many} and {number} joint{'s' * (number > 1)}: a class that is not covered; covered are dyads "
         "(class II) and triads (class III, a ternary link on three legs); drive another link, or add a link that "
         "splits the group",
         key=part[0],

@@ -15,19 +15,20 @@ from ..core.brief import briefly_shown
 from ..core.planar import Vec2
 from ..groups.driver import Driver
 from ..groups.group import Group
-from ..groups.joints import Joint
+from ..groups.joints import TURNS, Joint
 from .extremes import MotionExtreme
 
 
 class Connections(NamedTuple):
     """How a group hangs in its linkage: names of its links, of the pins that it adds, and its joints: each with the
     link on which the opposite reaction acts, None for the ground, and again that link where it stands before the
-    group. `guides` are those of its joints that slide."""
+    group. `guides` are those of its joints that slide, `hinges` those that turn, each with the same link."""
 
     links: tuple[str, ...]
     pins: tuple[str, ...]
     joints: tuple[tuple[Joint, str | None, str | None], ...]
-    guides: tuple[Joint, ...] = ()
+    guides: tuple[Joint, ...]
+    hinges: tuple[tuple[Joint, str | None], ...]
 
 
 class Topology(NamedTuple):
@@ -44,15 +45,12 @@ class Topology(NamedTuple):
         return tuple(joint for group in self.groups for joint, *_ in group.joints)
 
     @property
-    def guides(self) -> tuple[Joint, ...]:
-        """The joints that slide."""
-        return tuple(joint for group in self.groups for joint in group.guides)
-
-    @property
     def links(self) -> dict[str, tuple[str, ...]]:
         """The pins and points on each link, to draw it; the pin that the link starts from stands first."""
         pins: dict[str, dict[str, None]] = {link: {} for group in self.groups for link in group.links}
-        for pin, link in (*self.joints, *self.carries.items()):
+        held = {*(joint for group in self.groups for joint in group.guides)}
+        held |= {joint for group in self.groups for joint, _ in group.hinges}
+        for pin, link in (*(joint for joint in self.joints if joint in held), *self.carries.items()):
             pins[link][pin] = None
         return {link: tuple(names) for link, names in pins.items()}
 
@@ -78,16 +76,23 @@ class Linkage:
             inner, bars, guides = group.pins, group.bars, group.guides
             links = tuple(bar.name for bar in bars)
             carries |= inner
-            joints = []
+            joints, hinges = [], []
             for joint in group.joints:
                 name = joint.pin, joint.link
                 carrier = joint.carrier(carries)
                 joints.append((name, carrier, None if carrier in links else carrier))
+                if joint.form == TURNS:
+                    hinges.append((name, carrier))
             for bar in bars:
                 carries |= dict.fromkeys(bar.points, bar.name)
                 points[bar.name] = tuple(bar.points)
-            groups.append(Connections(links, tuple(inner), tuple(joints), tuple(guides)))
+            groups.append(Connections(links, tuple(inner), tuple(joints), tuple(guides), tuple(hinges)))
         return Topology(carries, tuple(groups), points)
+
+    @property
+    def circles(self) -> tuple[tuple[str, str], ...]:
+        """The circles that a picture shows, each by the pins at its centre and on its rim."""
+        return tuple(circle for group in self.groups for circle in group.circles)
 
     @property
     def derived_count(self) -> int:

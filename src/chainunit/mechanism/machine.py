@@ -67,10 +67,9 @@ class Mechanism:
                 if bar.mass is not None:
                     self.bodies[bar.name] = body_on(link, bar.mass)
             self.slides.update(zip(connections.guides, solved.slides, strict=True))
-            for joint, carrier, _ in connections.joints:
-                if joint not in self.slides:
-                    turn = links[joint[1]].t1
-                    self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
+            for joint, carrier in connections.hinges:
+                turn = links[joint[1]].t1
+                self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
 
     @property
     def _data(self) -> tuple[Group, ...]:
@@ -120,9 +119,7 @@ class Mechanism:
         """The derivatives of `turns` by q."""
         slopes = {}
         for _, connections in self._groups:
-            for joint, carrier, _ in connections.joints:
-                if joint in self.slides:
-                    continue
+            for joint, carrier in connections.hinges:
                 t2 = self.links[joint[1]].t2
                 slopes[joint] = t2 if carrier is None else t2 - self.links[carrier].t2
         return slopes

@@ -17,6 +17,12 @@ def shown_pins(linkage: Linkage) -> set[str]:
     return {pin for pin in (*joined, *topology.carries) if "." not in pin or pin in joined}
 
 
+def supports(linkage: Linkage) -> tuple[str, ...]:
+    """The drawn pins of the ground on which links stand."""
+    held = shown_pins(linkage) & {pin for pins in linkage.topology.links.values() for pin in pins}
+    return tuple(pin for pin in linkage.ground if pin in held)
+
+
 def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
     """The places x, y of the pins and points of a mechanism that are drawn [m]."""
     shown = shown_pins(mechanism.linkage)
@@ -33,5 +39,5 @@ def sketch_of(mechanism: Mechanism) -> Sketch:
         {name: (float(x), float(y)) for name, (x, y) in positions.items()},
         links,
         linkage.driver.bar.name,
-        frozenset(linkage.ground) & {*positions},
+        frozenset(supports(linkage)),
     )

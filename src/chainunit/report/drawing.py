@@ -159,28 +159,33 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     crank, canvas = whole.linkage.driver, _Canvas()
     ways = linkage.rails(orbit)
     ends = [end for way in ways.values() for end in way]
-    to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end]), *ends])
+    circles = [
+        (places[centre], math.dist(places[centre], places[rim])) for centre, rim in whole.linkage.circles
+    ]
+    rims = [(x + side * r, y + side * r) for (x, y), r in circles for side in (-1.0, 1.0)]
+    to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end]), *ends, *rims])
     page_points = {name: to_page(place) for name, place in places.items()}
     links = [_straightened(link, page_points) for link in linkage.links(whole.linkage, {})]
     sizes = dimensions(machine)
     canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
     for way in ways.values():
         _rail(canvas, *map(to_page, way))
+    dashed = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
+    for (x, y), rim in ((page_points[centre], page_points[rim]) for centre, rim in whole.linkage.circles):
+        canvas.add("circle", cx=x, cy=y, r=math.dist((x, y), rim), **dashed)
     if isinstance(crank, Crank):
         # the circle of the crank pin, or its arc
         # a link with its bearing alone, such as a drum or a fan, is a disc of any size
         radius = math.dist(page_points[crank.bar.pin], page_points[crank.end]) or _DISC
         x, y = page_points[crank.bar.pin]
-        look = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
         if machine.model.turns:
-            canvas.add("circle", cx=x, cy=y, r=radius, **look)
+            canvas.add("circle", cx=x, cy=y, r=radius, **dashed)
         else:
             arc = map(to_page, _curve(linkage.places(orbit)[crank.end]))
-            canvas.add("polyline", points=" ".join(f"{x:.2f},{y:.2f}" for x, y in arc), **look)
+            canvas.add("polyline", points=" ".join(f"{x:.2f},{y:.2f}" for x, y in arc), **dashed)
     hanging = linkage.hanging(orbit)
-    for pin in whole.linkage.ground:
-        if pin in page_points:
-            _support(canvas, page_points[pin], -1.0 if pin in hanging else 1.0)
+    for pin in linkage.supports(whole.linkage):
+        _support(canvas, page_points[pin], -1.0 if pin in hanging else 1.0)
     lines = [(page_points[a], page_points[b]) for link in links for a, b in _sides(link)]
     for link in links:
         colour, weight = _LOOKS[link.look]

@@ -12,6 +12,7 @@ from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
 from ..mechanism.sketch import places as places
 from ..mechanism.sketch import shown_pins as shown_pins
+from ..mechanism.sketch import supports as supports
 from .motion import Arrow, DrawnLink
 
 

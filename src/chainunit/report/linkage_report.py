@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import __version__
 from ..core.quantities import Layout
+from ..machines.linkages.joint_kinds import KINDS
 from ..machines.machine import Machine
-from ..mechanism.assur import PRISMATIC
 from ..mechanism.machine import MachineState
 from ..reading.tables import UnusualValue, slips_of
 from ..reading.text import array_entry
@@ -257,15 +257,14 @@ def _animation(f: LinkageFindings) -> Animation:
         (*linkage.arrows(model.pins, joints, force, named=True), *linkage_loads.load_arrows(state)),
         blocks=linkage.blocks(state.m),
     )  # fmt: skip
-    shown = linkage.shown_pins(state.m.linkage)
     return Animation(
         tuple(linkage.links(state.m.linkage, {})),
-        tuple(pin for pin in state.m.linkage.ground if pin in shown),
+        linkage.supports(state.m.linkage),
         (clip,),
         float(time[-1]),
         "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads.",
         hanging=linkage.hanging(state.m),
-        orbit=(driver.bar.pin, driver.end) if model.turns else None,
+        circles=(*[(driver.bar.pin, driver.end)] * model.turns, *state.m.linkage.circles),
         names=linkage.labels(state.m.linkage),
         paths=linkage.paths(state.m, driver.end if f.back else ""),
         rails=linkage.rails(state.m),
@@ -374,8 +373,7 @@ def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.B
 
 def _title(f: LinkageFindings, name: str) -> Line:
     joint = f.description.structure.joints[name]
-    kind = "guide" if joint.kind == PRISMATIC else "pin"
-    return line(Name(name), f": {kind}, on {joint.on[0]} from {joint.by[0]}")
+    return line(Name(name), f": {KINDS[joint.kind].noun}, on {joint.on[0]} from {joint.by[0]}")
 
 
 def _along(f: LinkageFindings, name: str) -> Line:

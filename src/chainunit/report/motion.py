@@ -80,8 +80,8 @@ class Animation:
     turn: float
     caption: Line = ()
     hanging: tuple[str, ...] = ()
-    orbit: tuple[str, str] | None = None
-    """the centre of a circle, and a joint on it"""
+    circles: tuple[tuple[str, str], ...] = ()
+    """circles, each by the joints at its centre and on its rim"""
     groups: tuple[str, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     """the labels of joints whose label differs from their name"""
@@ -107,7 +107,7 @@ def pictures(animation: Animation, units: Units) -> dict[str, Any]:
         "links": [asdict(link) for link in animation.links],
         "grounds": animation.grounds,
         "hanging": animation.hanging,
-        "orbit": animation.orbit,
+        "circles": animation.circles,
         "groups": animation.groups,
         "names": dict(animation.names),
         "paths": [

@@ -37,6 +37,11 @@ const machinePicture = (stage, motion, tables) => {
         reach(j.x, x);
         reach(j.y, y);
       }
+    for (const r of motion.runs)
+      for (const [centre, rim] of motion.circles.map((ends) => ends.map((name) => r.joints[name]))) {
+        const radius = Math.hypot(rim.x[0] - centre.x[0], rim.y[0] - centre.y[0]);
+        for (const [list, all] of [[centre.x, x], [centre.y, y]]) reach(list.flatMap((place) => [place - radius, place + radius]), all);
+      }
     const ends = (list) => list.reduce((a, b) => Math.max(a, b)) - list.reduce((a, b) => Math.min(a, b));
     const size = Math.max(ends(x), ends(y)), arrow = 0.26 * size;
     for (const r of motion.runs)
@@ -67,10 +72,7 @@ const machinePicture = (stage, motion, tables) => {
         d: `M${px - 22} ${py + 22 * up} h44` + [-18, -8, 2, 12].map((s) => `M${px + s} ${py + 22 * up} l8 ${8 * up}`).join(""),
       });
     }
-    if (motion.orbit) {
-      const [[ox, oy], [px, py]] = motion.orbit.map(at);
-      drawn(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) });
-    }
+    parts.circles = motion.circles.map((ends) => [ends, drawn(stage, "circle", { class: "orbit" })]);
     for (const ends of motion.rails) {
       const [ax, ay, bx, by] = ends.map((v, i) => origin[i % 2] + (i % 2 ? -scale : scale) * v);
       const length = Math.hypot(bx - ax, by - ay) || 1, ux = (bx - ax) / length, uy = (by - ay) / length;
@@ -228,6 +230,10 @@ const machinePicture = (stage, motion, tables) => {
     for (const [link, band] of parts.loads) {
       band.setAttribute("points", points(link));
       band.setAttribute("stroke-width", (34 * of(run.loads[link.name], frame)) / heaviest);
+    }
+    for (const [ends, circle] of parts.circles) {
+      const [[ox, oy], [px, py]] = ends.map(at);
+      for (const [name, value] of Object.entries({ cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) })) circle.setAttribute(name, value);
     }
     for (const [joint, block] of parts.blocks) {
       const [x, y] = at(joint);

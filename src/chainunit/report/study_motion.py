@@ -43,12 +43,12 @@ def motion(study: StudyRecord) -> Animation:
     thin = f"; a thin line is the {', the '.join(paths)}" if paths else ""
     return Animation(
         tuple(_links(whole, supplement)),
-        tuple(pin for pin in whole.linkage.ground if pin in linkage.shown_pins(whole.linkage)),
+        linkage.supports(whole.linkage),
         tuple(_run(study, name, interval, supplement) for name in run_names.in_order(study)),
         turn,
         supplement.caption or _CAPTION.format(loads, thin),
         hanging=linkage.hanging(whole),
-        orbit=(crank.bar.pin, crank.end),
+        circles=((crank.bar.pin, crank.end), *whole.linkage.circles),
         groups=tuple(dict.fromkeys(supplement.groups.values())),
         names=linkage.labels(whole.linkage) | dict(supplement.names),
         paths=paths,

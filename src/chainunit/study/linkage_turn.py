@@ -19,7 +19,7 @@ from ..machines.equilibria import Equilibria
 from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
-from ..mechanism.assur import PRISMATIC
+from ..mechanism.assur import DYADS, PRISMATIC
 from ..mechanism.sampled_quantities import largest, means, roots
 from ..reading.tables import option_value
 
@@ -135,7 +135,7 @@ class LinkageFindings:
         pinned = groups and groups[0].kind == CYLINDER
         parts = [] if pinned else [self.machine.model.driver_noun]
         for group in groups:
-            kind = group.kind if group.kind in ("triad", CYLINDER) else f"{group.kind} dyad"
+            kind = f"{group.kind} dyad" if group.kind in DYADS else group.kind
             parts.append(f"{kind} ({', '.join(group.links)})")
         return " + ".join(parts)
 

@@ -12,8 +12,10 @@ from typing import Any
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
+from .joint_kind import JointEntry
+from .joint_kinds import KINDS
 from .loads import MOTION
-from .structure import DriverEntry, JointEntry, groups_of
+from .structure import DriverEntry, groups_of
 
 Fault = tuple[str, str]
 Entries = Sequence[Mapping[str, Any]]
@@ -146,7 +148,7 @@ def freedom_faults(
 ) -> Iterator[Fault]:
     """Too many or too few degrees of freedom, and groups of a class that is not covered; the `hint` follows a refusal
     of too many."""
-    entries = [JointEntry(j["name"], j["type"], tuple(j["on"]), tuple(j["by"])) for j in joints]
+    entries = [JointEntry.from_table(j) for j in joints]
     try:
         groups_of([link["name"] for link in links], entries, DriverEntry(**driver))
     except InputError as error:
@@ -193,14 +195,7 @@ def length_faults(points: Places, joints: Entries, driver: str) -> Iterator[Faul
     for joint in joints:
         for link, point in (joint["on"], joint["by"]):
             ends.setdefault(link, []).append((point, joint["type"]))
-        if joint["type"] == PRISMATIC:
-            link, start = joint["by"]
-            if math.dist(points[link][start], points[link][joint["toward"]]) == 0.0:
-                key = f"joints.{joint['name']}.toward"
-                yield (
-                    key,
-                    f"{start} and {joint['toward']} are in one place, so that the line has no direction",
-                )
+        yield from KINDS[joint["type"]].start_faults(joint, points)
     for link, those in ends.items():
         if link in (GROUND, driver) or len(those) != 2 or {kind for _, kind in those} != {REVOLUTE}:
             continue

@@ -12,6 +12,7 @@ from ...groups.dyad import RRP, Dyad
 from ...mechanism.assur import AssurGroup
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism
+from .joint_kinds import SINGLES
 
 PLACES = 720
 """Places over the span at which a group is looked at."""
@@ -45,12 +46,15 @@ _DEAD = {
 
 def dead_group(group: AssurGroup, where: str, margin: float, least: float) -> InputError:
     """The refusal of a group that comes to a dead position, where its `margin` is not above the `least` one."""
+    key = f"links.{group.links[0]}"
+    if group.kind in SINGLES:
+        return InputError(SINGLES[group.kind].dead(group, where), key)
     reason = _DEAD[group.kind].format(*group.links)
     size = f"{margin:.1g}" if margin > _NO_MARGIN else "0"
     return InputError(
         f"the group of {', '.join(group.links)} comes to a dead position at {where}: there {reason}, so that its "
         f"forces have no limit (its margin is {size} and must be > {least:g}); change its lengths",
-        key=f"links.{group.links[0]}",
+        key=key,
     )
 
 

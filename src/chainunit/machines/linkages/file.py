@@ -37,12 +37,14 @@ from .checks import (
 )
 from .declarations import RESERVED
 from .entries import is_among, is_given, sized
+from .joint_kind import JointEntry
+from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
-from .structure import CYLINDER, JointEntry
+from .structure import CYLINDER
 from .way import WHOLE
 
 TABLES = (
@@ -50,11 +52,9 @@ TABLES = (
     "joints", "loads", "pins", "guides", "start", "groups",
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
-_JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
-_OF_PIN, _OF_GUIDE = ("friction", "diameter", "damping"), ("friction", "damping")
-_DRIVES = ("gear", "belt", "chain", "cam", "rack", "rolling")
+_DRIVES = ("belt", "chain", "cam", "rack", "rolling")
 """Kinds of joints of other programs."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 
@@ -154,6 +154,14 @@ class _LinkageReader(LoadReader):
         self.refuse()
         start = self.start(values, links, joints, driver, span)
         self.refuse()
+        for joint in joints:
+            for carrier, points in joint.pop("points", {}).items():
+                if carrier == GROUND:
+                    ground = {**ground, **points}
+                links = [
+                    link | {"points": {**link["points"], **points}} if link["name"] == carrier else link
+                    for link in links
+                ]
         described = {
             "name": name,
             "title": title,
@@ -199,7 +207,7 @@ class _LinkageReader(LoadReader):
         if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
             self.fault("groups", f"is {shown(tables)}; must be tables [[groups]] with kind and links")
             return []
-        kinds = (*DYADS, "triad", CYLINDER)
+        kinds = (*DYADS, "triad", CYLINDER, *SINGLES)
         for k, table in enumerate(tables, 1):
             key = f"groups.{k}"
             self.keys(key, table, ("kind", "links"))
@@ -327,21 +335,20 @@ class _LinkageReader(LoadReader):
         """The joints: the named ones, and a revolute one for each further link in a point of the same name."""
         joints = []
         for name, key, table in self.tables("joints"):
-            kind = table.get("type", PRISMATIC if "toward" in table else REVOLUTE)
-            if kind not in (REVOLUTE, PRISMATIC):
-                drive = "; a gear, a belt or a cam between links is not possible yet" * (kind in _DRIVES)
-                self.fault(f"{key}.type", f'is {shown(kind)}; must be "revolute" or "prismatic"{drive}')
+            kind = KINDS.get(str(kind_name := kind_of(table)))
+            if kind is None:
+                drive = "; a belt or a cam between links is not possible yet" * (kind_name in _DRIVES)
+                possible = " or ".join(f'"{possible_name}"' for possible_name in KINDS)
+                self.fault(f"{key}.type", f"is {shown(kind_name)}; must be {possible}{drive}")
                 continue
-            losses = ("pins", _OF_PIN) if kind == REVOLUTE else ("guides", _OF_GUIDE)
-            for entry_key in {*losses[1]} & {*table}:
+            loss_table, loss_keys = kind.losses
+            for entry_key in {*loss_keys} & {*table}:
                 self.fault(
                     f"{key}.{entry_key}",
-                    f"is not possible for one joint yet; give it in [{losses[0]}], for all of them",
+                    f"is not possible for one joint yet; give it in [{loss_table}], for all of them",
                 )
             self.keys(
-                key,
-                {entry_key: x for entry_key, x in table.items() if entry_key not in losses[1]},
-                _JOINT_KEYS,
+                key, {entry_key: x for entry_key, x in table.items() if entry_key not in loss_keys}, KEYS
             )
             ends = []
             for end in ("on", "by"):
@@ -352,41 +359,28 @@ class _LinkageReader(LoadReader):
             if ends[0][0] == ends[1][0]:
                 self.fault(key, f"joins the link {ends[0][0]} with itself")
                 continue
-            joint: dict[str, Any] = {"name": name, "type": kind, "on": ends[0], "by": ends[1]}
-            if kind == PRISMATIC:
-                joint |= self.sliding(key, table, ends[1])
-            else:
-                for entry_key in ("toward", "angle", "length"):
-                    if entry_key in table:
+            joint: dict[str, Any] = {"name": name, "type": kind.name, "on": ends[0], "by": ends[1]}
+            kind.read(self, key, table, joint)
+            for other in KINDS.values():
+                for entry_key in other.keys:
+                    if entry_key in table and entry_key not in kind.keys:
+                        use = other.use.format(by=ends[1][0])
                         self.fault(
                             f"{key}.{entry_key}",
-                            "belongs to a prismatic joint, and this one is a pin: for a cylinder or a guide give it "
-                            f"`toward` with a further point of {ends[1][0]}, on the line of the way",
+                            f"belongs to a {other.name} joint, and this one is a {kind.noun}: {use}",
                         )
             joints.append(joint)
+        for joint in joints:
+            KINDS[joint["type"]].complete(self, joint, joints)
+            for link, points in joint.get("points", {}).items():
+                if not {*points}.isdisjoint((*self.points[link], *POINT_NAMES)):
+                    self.fault(
+                        f"joints.{joint['name']}", f"gives {link} a point of its name, too; rename the joint"
+                    )
         more, clashes = shared_pins(self.points, joints, self.table("driver"))
         for name, message in clashes:
             self.fault(f"joints.{name}", message)
         return joints + more
-
-    def sliding(self, key: str, table: Mapping[str, Any], by: list[str]) -> dict[str, Any]:
-        """The keys of a sliding joint."""
-        joint: dict[str, Any] = {}
-        toward = table.get("toward")
-        if isinstance(toward, str):
-            toward = toward.rpartition(".")[2]
-        if not is_among(toward, self.points[by[0]]) or toward == by[1]:
-            others = [name for name in self.points[by[0]] if name != by[1]]
-            self.fault(
-                f"{key}.toward",
-                f"{is_given(toward)}; must be another point of {by[0]}, to which the line goes: "
-                f"{', '.join(others) or 'add one'}",
-            )
-        joint["toward"] = toward
-        joint["angle"] = self.entry(f"{key}.angle", table.get("angle", 0.0), "rad")
-        if "length" in table:
-            joint["length"] = self.entry(f"{key}.length", table["length"], "m")
-        return joint
 
     def driver(self, joints: list[dict[str, Any]]) -> tuple[dict[str, Any], list[float] | None]:
         """The driver, and its range; None for one that turns all the way round."""
@@ -489,7 +483,7 @@ class _LinkageReader(LoadReader):
         self.doubt_bodies(links, points, joints, number)
         entries = [
             (
-                JointEntry(j["name"], j["type"], tuple(j["on"]), tuple(j["by"]), j.get("toward", "")),
+                JointEntry.from_table(j),
                 number(j.get("angle", 0.0)),
             )
             for j in joints

@@ -11,11 +11,12 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ...core.planar import ZERO, Vec2
+from ...core.planar import ZERO, Vec2, mirrored, rotated
 from ...groups.body import Mass
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import value_of
-from .structure import Entry, JointEntry, LinkEntry, Structure
+from .joint_kind import Entry, JointEntry
+from .structure import LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
 
@@ -36,16 +37,6 @@ class LinkFrame(NamedTuple):
 
 
 OWN = LinkFrame(ZERO, ALONG_X)
-
-
-def rotated(v: Vec2, by: Vec2) -> Vec2:
-    """A vector that is turned by the angle of the unit vector `by`."""
-    return Vec2(v.x * by.x - v.y * by.y, v.x * by.y + v.y * by.x)
-
-
-def mirrored(by: Vec2) -> Vec2:
-    """The unit vector of the opposite angle."""
-    return Vec2(by.x, -by.y)
 
 
 class LinkGeometry:

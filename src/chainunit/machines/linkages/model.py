@@ -24,7 +24,7 @@ from ...core.model import About, FmuData, Requirement
 from ...core.planar import ZERO
 from ...core.quantities import Value, declared_class, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
-from ...groups.triad import MOST_MISFIT
+from ...groups.triad import MOST_MISFIT, Triad
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
@@ -36,6 +36,7 @@ from ...mechanism.models import InverseMachine, words_on_motion
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
 from .following import LEAST_MARGIN, FollowedLinkage
 from .geometry import LinkGeometry
+from .joint_kinds import KINDS
 from .loads import (
     ForceLaw,
     LinkAngle,
@@ -98,7 +99,7 @@ class LinkageDescription(LinkageOutputs):
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data = data
         self.structure = structure_of(data)
-        self.way = DriverWay.of(data)
+        self.way = DriverWay.of(data, self.structure.rate)
         check_groups(self.structure, data.get("groups", ()))
         tables = data.get("tables", {})
         self.curves = {
@@ -447,7 +448,7 @@ class LinkageDescription(LinkageOutputs):
         last = 0
         for assur_group in linkage.groups:
             last += assur_group.derived_count
-            if assur_group.derived_count:
+            if isinstance(assur_group, Triad):
                 yield derived[last - 2], -math.inf, MOST_MISFIT
         values = self.values(xp, p, u)
         for _, width, sign in self.widths:
@@ -463,4 +464,6 @@ class LinkageDescription(LinkageOutputs):
     @property
     def notes(self) -> str:
         """Words for the description of the FMU."""
-        return notes_on(self.structure.driver, self.way.limits, self.angle_counts)
+        kinds = dict.fromkeys(joint.kind for joint in self.structure.joints.values())
+        limits = "".join(f" {KINDS[kind].limits}" for kind in kinds if KINDS[kind].limits)
+        return notes_on(self.structure.driver, self.way.limits, self.angle_counts) + limits

@@ -17,7 +17,9 @@ from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
 from ...groups.triad import Pose, Triad
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry, RoughPoses
-from .structure import CYLINDER, JointEntry
+from .joint_kind import JointEntry
+from .joint_kinds import SINGLES
+from .structure import CYLINDER
 
 
 class LinkageParts:
@@ -44,9 +46,10 @@ class LinkageParts:
         first, *rest = [*self.structure.groups, None]
         cylinder = first is not None and first.kind == CYLINDER
         self.driver = self._cylinder(first) if first is not None and cylinder else self._driver()
-        self.groups: tuple[Group, ...] = tuple(
-            self._group(group) for group in (rest if cylinder else self.structure.groups) if group is not None
-        )
+        self.groups: tuple[Group, ...] = ()
+        for group in rest if cylinder else self.structure.groups:
+            if group is not None:
+                self.groups += (self._group(group),)
 
     def pin(self, link: str, point: str) -> str:
         """The name of a point in the linkage."""
@@ -64,7 +67,7 @@ class LinkageParts:
 
     # bars
 
-    def _bar(self, link: str, frame: LinkFrame, start: str = "", length: Any = None) -> Bar:
+    def bar(self, link: str, frame: LinkFrame, start: str = "", length: Any = None) -> Bar:
         """The bar of a link in a frame; it starts from the pin `start`."""
         entry = self.structure.links[link]
         self.frames[link] = frame
@@ -79,6 +82,11 @@ class LinkageParts:
             points[pin], self._carriers[pin] = (place.x, place.y), link
         return Bar(link, start, length, self.geometry.mass(entry, frame), points)
 
+    def hung(self, link: str, joint: JointEntry) -> Bar:
+        """The bar of a link that starts from the pin of a joint, along its own x axis."""
+        frame = LinkFrame(self.geometry.point(link, joint.at(link)), ALONG_X)
+        return self.bar(link, frame, self.outer(joint, link))
+
     # joints
 
     def _rail(self, joint: JointEntry, link: str, point: Vec2) -> Rail:
@@ -92,21 +100,21 @@ class LinkageParts:
             frame.components(self.geometry.direction(joint, carrier)),
         )
 
-    def _receive(self, joint: JointEntry, pin: str, link: str) -> None:
+    def receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
         self.receivers[joint.name] = (pin, link), 1.0 if joint.on[0] == link else -1.0
 
-    def _outer(self, joint: JointEntry, link: str) -> str:
+    def outer(self, joint: JointEntry, link: str) -> str:
         """The pin of a link before it from which a link starts."""
         other = joint.other_link(link)
         pin = self.pin_on(other, joint.at(other))
-        self._receive(joint, pin, link)
+        self.receive(joint, pin, link)
         return pin
 
     def _guide(self, joint: JointEntry, link: str) -> str:
         """The pin at which the force of a sliding joint counts: the point of `on`."""
         pin = self.pin_on(*joint.on)
-        self._receive(joint, pin, link)
+        self.receive(joint, pin, link)
         return pin
 
     # the driver and the groups
@@ -115,17 +123,15 @@ class LinkageParts:
         entry, geometry = self.structure.driver, self.geometry
         joint, link = self.structure.joints[entry.joint], entry.link
         if not entry.linear:
-            frame = LinkFrame(geometry.point(link, joint.at(link)), ALONG_X)
             zero = geometry.number(entry.zero)
-            start = self._outer(joint, link)
-            bar = self._bar(link, frame, start)
-            end = next(iter(bar.points), start)
+            bar = self.hung(link, joint)
+            end = next(iter(bar.points), bar.pin)
             return Crank(bar, end, Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero)), entry.sense)
         sign = 1.0 if joint.on[0] == link else -1.0
         along = geometry.direction(joint, link) * sign
         frame = LinkFrame(geometry.point(link, joint.at(link)), along)
         rail = Rail(None, geometry.point(GROUND, joint.at(GROUND)), geometry.direction(joint, GROUND) * sign)
-        bar = self._bar(link, frame)
+        bar = self.bar(link, frame)
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)))
 
     def _cylinder(self, group: AssurGroup) -> Driver:
@@ -144,7 +150,7 @@ class LinkageParts:
         (near, far) = (
             frame.coordinates(self.geometry.point(link, slide.at(link))) for link, frame in frames.items()
         )
-        bars = self._bar(barrel, frames[barrel], self._outer(p, barrel)), self._bar(rod, frames[rod])
+        bars = self.bar(barrel, frames[barrel], self.outer(p, barrel)), self.bar(rod, frames[rod])
         swung = self._rod(lever, q, c)
 
         def turn() -> Any:
@@ -170,15 +176,17 @@ class LinkageParts:
         joints = [self.structure.joints[j.name] for j in group.joints]
         if group.kind == "triad":
             return self._triad(group.links[0], group.links[1:], joints[:3], joints[3:])
+        if group.kind in SINGLES:
+            return SINGLES[group.kind].group(self, group.links[0], *joints)
         build: Callable[..., Group] = {
             "RRR": self._rrr, "RRP": self._rrp, "RPR": self._rpr, "PRP": self._prp, "RPP": self._rpp
         }[group.kind]  # fmt: skip
         return build(*group.links, *joints)
 
     def _rod(self, link: str, outer: JointEntry, inner: JointEntry) -> Bar:
-        start = self._outer(outer, link)
+        start = self.outer(outer, link)
         frame, length = self.geometry.span(link, outer.at(link), inner.at(link))
-        return self._bar(link, frame, start, length)
+        return self.bar(link, frame, start, length)
 
     def _rrr(self, first: str, second: str, p: JointEntry, b: JointEntry, q: JointEntry) -> Group:
         inner = self._inner(b, first, second)
@@ -194,7 +202,7 @@ class LinkageParts:
         """The pin between two links, which the second one carries."""
         pin = self.pin(second, joint.at(second))
         self._carriers[pin] = second
-        self._receive(joint, pin, first)
+        self.receive(joint, pin, first)
         return pin
 
     def _side(self, first: str, value: Callable[[], Any]) -> float:
@@ -214,7 +222,7 @@ class LinkageParts:
         """A block whose frame starts at the point `start` on its rail."""
         point = self.geometry.point(link, start)
         line = self._rail(rail, link, point)
-        bar = self._bar(link, LinkFrame(point, self.geometry.direction(rail, link)))
+        bar = self.bar(link, LinkFrame(point, self.geometry.direction(rail, link)))
         return bar, line, self._guide(rail, link)
 
     def _rrp(self, first: str, slider: str, p: JointEntry, c: JointEntry, g: JointEntry) -> Group:
@@ -238,9 +246,9 @@ class LinkageParts:
             frame.coordinates(self.geometry.point(link, g.at(link)))
             for frame, link in zip(frames, (first, second), strict=True)
         )
-        starts = self._outer(p, first), self._outer(q, second)
+        starts = self.outer(p, first), self.outer(q, second)
         bars = [
-            self._bar(link, frame, start)
+            self.bar(link, frame, start)
             for link, frame, start in zip((first, second), frames, starts, strict=True)
         ]
 
@@ -259,14 +267,14 @@ class LinkageParts:
 
     def _rpp(self, block: str, yoke: str, p: JointEntry, s: JointEntry, g: JointEntry) -> Group:
         pin = self.geometry.point(block, p.at(block))
-        start = self._outer(p, block)
+        start = self.outer(p, block)
         along = self.geometry.direction(g, yoke)
         origin = self.geometry.line_through(s, block, pin)
         rail = self._rail(g, yoke, origin)
         frame = LinkFrame(origin, along)
         slot = frame.components(self.geometry.direction(s, yoke))
         in_block = self.geometry.across(s, along, yoke)
-        bars = self._bar(block, LinkFrame(pin, in_block), start), self._bar(yoke, frame)
+        bars = self.bar(block, LinkFrame(pin, in_block), start), self.bar(yoke, frame)
         return RPP(*bars, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
 
     def _triad(
@@ -275,7 +283,7 @@ class LinkageParts:
         # the ternary link carries the pins
         self._carriers |= {self.pin(ternary, j.at(ternary)): ternary for j in inner if j.kind == REVOLUTE}
         # before the legs: one that slides in it may do so at a point of it
-        plate = self._bar(ternary, OWN)
+        plate = self.bar(ternary, OWN)
         built = [self._leg(*ends, ternary) for ends in zip(legs, outer, inner, strict=True)]
         x, y, angle = self.structure.poses[ternary]
         mass = plate.mass or Mass(0.0, 0.0, 0.0, 0.0)
@@ -288,13 +296,13 @@ class LinkageParts:
         pin = self.pin(ternary, inner.at(ternary))
         if inner.kind == REVOLUTE:
             arm = self.geometry.point(ternary, inner.at(ternary))
-            self._receive(inner, pin, link)
+            self.receive(inner, pin, link)
             if outer.kind == REVOLUTE:
                 return RodLeg(self._rod(link, outer, inner), pin, arm)
             bar, rail, guide = self._slider(link, outer, inner.at(link))
             return BlockLeg(bar, pin, arm, rail, guide)
         point = self.geometry.point(link, outer.at(link))
-        start = self._outer(outer, link)
+        start = self.outer(outer, link)
         place = self.geometry.line_through(inner, link, point)
-        bar = self._bar(link, LinkFrame(point, self.geometry.direction(inner, link)), start)
+        bar = self.bar(link, LinkFrame(point, self.geometry.direction(inner, link)), start)
         return SlotLeg(bar, place, self.geometry.direction(inner, ternary), self._guide(inner, link))

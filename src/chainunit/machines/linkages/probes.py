@@ -9,12 +9,13 @@ from typing import Any, TypeVar
 
 from ...core.planar import Motion, Vec2
 from ...groups.joints import GuideForce
-from ...mechanism.assur import GROUND, PRISMATIC
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.machine import Mechanism
 from .declarations import GuideReaction, PointMotion
 from .geometry import LinkFrame
+from .joint_kind import JointEntry
 from .parts import LinkageParts
-from .structure import DriverEntry, JointEntry, LinkEntry, Structure
+from .structure import DriverEntry, LinkEntry, Structure
 
 _Node = TypeVar("_Node")
 
@@ -106,7 +107,7 @@ def _orientation(structure: Structure, link: str) -> set[str]:
 def _pinned(structure: Structure, end: tuple[str, str]) -> set[tuple[str, str]]:
     """The points, by link and name, that meet this one at all times, and itself: revolute joints hold them together,
     or a centroid lies in them."""
-    pins = [{j.on, j.by} for j in structure.joints.values() if j.kind != PRISMATIC]
+    pins = [{j.on, j.by} for j in structure.joints.values() if j.kind == REVOLUTE]
     for name, link in structure.links.items():
         pins += [
             {(name, _CENTROID), (name, pin)} for pin, place in link.points.items() if place == link.centroid

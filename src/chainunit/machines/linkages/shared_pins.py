@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ...mechanism.assur import GROUND, REVOLUTE, JointOf, in_order_of_motion
+from ...mechanism.assur import GROUND, REVOLUTE, in_order_of_motion
+from .joint_kind import JointEntry
+from .joint_kinds import in_decomposition
 
 
 def shared_pins(
@@ -54,9 +56,9 @@ def _ordered(
     apart = {point for pair in joined for _, point in pair if len({name for _, name in pair}) == 1}
     shared = {point: those for point, those in owners.items() if len(those) > 1 and point not in apart}
     seen = [
-        JointOf(j["name"], j["type"], j["on"][0], j["by"][0])
-        for j in named
-        if j["name"] != driver.get("joint")
+        in_decomposition(JointEntry.from_table(joint))
+        for joint in named
+        if joint["name"] != driver.get("joint")
     ]
     links = [link for link in points if link != GROUND]
     ordered = in_order_of_motion(shared, links, seen, str(driver.get("link")))

@@ -11,8 +11,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ...core.errors import InputError
-from ...mechanism.assur import GROUND, PRISMATIC
-from .structure import JointEntry
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
+from .joint_kind import JointEntry
 
 Point = tuple[float, float]
 Pose = tuple[float, float, float]
@@ -80,7 +80,7 @@ class StartPose:
                     self.angles.setdefault(pair[0], self.angles[pair[1]] + turn)
                 if pair[0] in self.angles:
                     self.angles.setdefault(pair[1], self.angles[pair[0]] - turn)
-            else:
+            elif joint.kind == REVOLUTE:
                 for one, other in ((on, by), (by, on)):
                     if one in self.places:
                         self.places.setdefault(other, self.places[one])

@@ -5,38 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
-
-Entry = float | str
-"""A number, or the text of an expression."""
-
-
-class JointEntry(NamedTuple):
-    """A joint as described: `on` and `by` are a link and a point of it; of a prismatic one the point of `on` slides
-    along the line from the point of `by` to its point `toward`, and `angle` is that of `on` less that of `by`."""
-
-    name: str
-    kind: str
-    on: tuple[str, str]
-    by: tuple[str, str]
-    toward: str = ""
-    angle: Entry = 0.0
-
-    @property
-    def links(self) -> set[str]:
-        """Its two links, of which one may be the ground."""
-        return {self.on[0], self.by[0]}
-
-    def at(self, link: str) -> str:
-        """Its point on one of its links."""
-        return self.on[1] if self.on[0] == link else self.by[1]
-
-    def other_link(self, link: str) -> str:
-        """The link on its other side."""
-        return self.by[0] if self.on[0] == link else self.on[0]
+from .joint_kind import Entry, JointEntry
+from .joint_kinds import SINGLES, in_decomposition
 
 
 @dataclass(frozen=True)
@@ -86,7 +60,7 @@ def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: Driver
     InputError
         where the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
-    seen = [JointOf(j.name, j.kind, j.on[0], j.by[0]) for j in joints if j.name != driver.joint]
+    seen = [in_decomposition(joint) for joint in joints if joint.name != driver.joint]
     slide = next(joint for joint in joints if joint.name == driver.joint)
     if GROUND in (slide.on[0], slide.by[0]):
         groups = decompose(links, seen, driver.link)
@@ -125,6 +99,14 @@ class Structure:
     start: float
     poses: Mapping[str, tuple[float, float, float]]
 
+    @property
+    def rate(self) -> float:
+        """How often a link turns in a turn of the driver, at most, as single links turn faster than those before
+        them."""
+        singles = [group for group in self.groups if group.kind in SINGLES]
+        rates = (SINGLES[g.kind].rate(self.joints[g.joints[1].name], g.links[0]) for g in singles)
+        return math.prod(max(1.0, rate) for rate in rates)
+
     @classmethod
     def of(
         cls,
@@ -153,7 +135,7 @@ class Structure:
             for group in groups
             for joint in (named[j.name] for j in group.joints)
             for end in (joint.on, joint.by)
-            if joint.kind == PRISMATIC or end[0] not in group.links
+            if joint.kind == PRISMATIC or (joint.kind == REVOLUTE and end[0] not in group.links)
         }
         if driver.linear:
             marked |= {named[driver.joint].on, named[driver.joint].by}
@@ -186,9 +168,11 @@ def _with_cylinder(links: Sequence[str], joints: Sequence[JointOf], slide: Joint
     """
     rod, barrel = slide.on[0], slide.by[0]
     joint_by_name = {joint.name: joint for joint in joints}
+    renamed = {rod: barrel}
     merged = [
-        joint._replace(**{end: barrel for end in ("on", "by") if getattr(joint, end) == rod})
+        joint._replace(on=on, by=by, third=third)
         for joint in joints
+        for on, by, third in [[renamed.get(link, link) for link in (joint.on, joint.by, joint.third)]]
     ]
     groups = decompose([link for link in links if link != rod], merged, "")
     dyad = next(group for group in groups if barrel in group.links)
@@ -274,13 +258,7 @@ def structure_of(data: Mapping[str, Any]) -> Structure:
         )
         for link in data["links"]
     ]
-    joints = [
-        JointEntry(
-            joint["name"], joint["type"], tuple(joint["on"]), tuple(joint["by"]),
-            joint.get("toward", ""), joint.get("angle", 0.0),
-        )
-        for joint in data["joints"]
-    ]  # fmt: skip
+    joints = [JointEntry.from_table(joint) for joint in data["joints"]]
     driver = DriverEntry(**data["driver"])
     start = data["start"]
     ends = [tuple(load[key]) for load in data["loads"] for key in ("on", "by") if key in load]

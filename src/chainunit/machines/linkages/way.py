@@ -19,20 +19,21 @@ no jumps."""
 class DriverWay:
     """The way of a driver: whether it slides (`linear`), the `name` of its joint, or of the link that turns, its
     place at the `start`, and the `limits` of its range; None for one that turns all the way round. Places are in rad
-    or m."""
+    or m; `count` is their number."""
 
     linear: bool
     name: str
     start: float
     limits: tuple[float, float] | None = None
+    count: int = ANGLES
 
     @classmethod
-    def of(cls, data: Mapping[str, Any]) -> DriverWay:
-        """The way of the driver of a description."""
+    def of(cls, data: Mapping[str, Any], rate: float = 1.0) -> DriverWay:
+        """The way of the driver of a description; a link turns `rate` times in a turn of it, at most."""
         driver, span = data["driver"], data.get("range")
         name = driver["joint" if driver["linear"] else "link"]
         limits = None if span is None else (float(span[0]), float(span[1]))
-        return cls(driver["linear"], name, data["start"]["value"], limits)
+        return cls(driver["linear"], name, data["start"]["value"], limits, ANGLES * math.ceil(0.5 * rate))
 
     @property
     def turns(self) -> bool:
@@ -52,9 +53,9 @@ class DriverWay:
     def places(self) -> list[float]:
         """Evenly spaced places: from one end of the range to the other, or from the start on around."""
         if self.limits is None:
-            return [self.start + WHOLE * k / ANGLES for k in range(ANGLES)]
+            return [self.start + WHOLE * k / self.count for k in range(self.count)]
         low, high = self.limits
-        return [*(low + (high - low) * k / ANGLES for k in range(ANGLES)), high]
+        return [*(low + (high - low) * k / self.count for k in range(self.count)), high]
 
     def closed_places(self) -> list[float]:
         """The places with the last one, which after a turn is the first one again."""

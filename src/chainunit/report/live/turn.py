@@ -81,9 +81,9 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         "curves": list(_curves(machine, model_columns, units)),
         "picture": {
             "links": [asdict(link) for link in linkage.links(whole.linkage, {})],
-            "grounds": [pin for pin in whole.linkage.ground if pin in shown],
+            "grounds": linkage.supports(whole.linkage),
             "hanging": linkage.hanging(whole),
-            "orbit": (driver.bar.pin, driver.end) if model.turns else None,
+            "circles": (*[(driver.bar.pin, driver.end)] * model.turns, *whole.linkage.circles),
             "names": linkage.labels(whole.linkage),
             "joints": shown,
             "blocks": {name[5:-1]: name for name in lines if name[5:-1] in shown},

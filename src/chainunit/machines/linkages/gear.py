@@ -1,0 +1,303 @@
+"""Gears: two wheels that are pinned to one link, the arm, and roll on each other at their pitch point.
+
+Relative to the arm a wheel turns z'/z times as fast as the other one, the other way round, or the same way in a ring
+with internal teeth. Its place follows in closed form from the places of the other wheel and of the arm. The force of
+the teeth acts at the pitch point, along the common tangent of the pitch circles: the part of it that gives a torque.
+The force by which slanting flanks press the wheels apart along the line of their centres is in no pin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, ClassVar, NamedTuple
+
+from ...core.errors import InputError, shown
+from ...core.planar import ZERO, Link, Motion, Vec2, mirrored, rotated
+from ...groups.block import Row
+from ...groups.body import Bar, Load
+from ...groups.group import Group, SolvedGroup
+from ...groups.joints import Hinge, HingeData, JointData, LinkageInMotion, Placed, Rates, Third
+from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
+from .joint_kind import JointEntry, JointParts, JointReader, JointTable, SingleLinkKind
+
+_AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
+_MOST = 12
+"""Largest number of turns of a wheel in a turn of the links before it: a linkage is checked at so many places."""
+_LEAST_COSINE = -0.98
+"""Cosine of the angle, of about 168 deg, by which a wheel may turn whose ratio is no whole number: half a turn on
+either side of its start has one angle, and the places at which a linkage is checked lie some degrees apart."""
+
+
+class Rolling(NamedTuple):
+    """How a wheel turns: `ratio` times as fast as the link `source`, both seen from the `arm`; None is the ground."""
+
+    arm: str | None
+    source: str | None
+    ratio: Fraction
+
+    def turn(self, turn_of: Callable[[str], Any]) -> Any:
+        """The derivative of its angle, from the derivatives of the same order of links by name."""
+        arm, source = (0.0 if name is None else turn_of(name) for name in (self.arm, self.source))
+        return arm + (source - arm) * float(self.ratio)
+
+    def sight(self, linkage: LinkageInMotion) -> tuple[Vec2, Vec2]:
+        """The direction of the arm, and that of the source as the arm sees it, unit vectors."""
+        arm, source = (_AT_REST if name is None else linkage.links[name] for name in (self.arm, self.source))
+        return arm.u, rotated(source.u, mirrored(arm.u))
+
+
+class MeshData(NamedTuple):
+    """The mesh of two wheels as data: the pitch point `pin`, a point of the arm, the wheel `link` on which its force
+    acts, on the pin `centre`, the wheel `by` from which it acts, None for the ground, and how the first one turns."""
+
+    pin: str
+    link: str
+    centre: str
+    by: str | None
+    rolling: Rolling
+
+    @property
+    def form(self) -> str:
+        """Its links neither turn about it nor slide in it."""
+        return "rolls"
+
+    def carrier(self, carries: Mapping[str, str]) -> str | None:
+        """The other wheel; the arm carries the pitch point, but no force of the teeth."""
+        return self.by
+
+    def third_before(
+        self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
+    ) -> Third | None:
+        """The third derivatives of the centre and of the angle of the wheel."""
+        return pins.get(self.centre, ZERO), self.rolling.turn(lambda name: links[name][1])
+
+    def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
+        """What the opposite force does to the other wheel."""
+        return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
+
+    def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
+        """See `JointData`: the force turns with the arm, and so does its lever on the link, which starts from its
+        centre."""
+        turn = 0.0 if self.rolling.arm is None else m.links[self.rolling.arm].t1
+        more = reaction.turned() * turn
+        yield self.link, (more, 0.0)
+        if carrier is not None:
+            point, start = m.pins[self.pin], m.links[carrier].pin
+            yield carrier, (-more, -((point.p1 - start.p1).cross(reaction) + (point.p - start.p).cross(more)))
+
+
+class Mesh(Placed):
+    """The mesh at one position: `arm` goes from the centre of the wheel to the pitch point, `base` is the motion of
+    the centre, and `turns` are the derivatives by q of the angle of the wheel."""
+
+    __slots__ = ("_arm", "_base", "_turns")
+
+    def __init__(self, arm: Vec2, base: Motion, turns: Sequence[Any]) -> None:
+        self._arm, self._base, self._turns = arm, base, turns
+
+    def rows(self) -> list[Row]:
+        """Its row: of the pitch point along the tangent, times the radius."""
+        n = self._arm.turned()
+        return [{0: n.x, 1: n.y, 2: self._arm.squared()}]
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """Its right side, from the centre and the angle, which are known."""
+        base = self._base.p2 if rates else self._base.p1
+        point, turn = before if before is not None else (base, self._turns[len(rates)])
+        return [self._arm.turned().dot(point) + self._arm.squared() * turn]
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """The tangential force of the teeth [N]."""
+        return self._arm.turned() * next(multipliers), None
+
+
+@dataclass
+class GearedLink(Group):
+    """A wheel on a pin that moves in a known way, in mesh with another wheel: its bar, the pitch point, the wheel
+    `by`, the pin at its centre, and how the wheel turns. It has the angle `angle` [rad] at the place `start` of the
+    driver. Its margin is 1 or, if its ratio is no whole number, 0 where its source has turned by nearly half a
+    turn."""
+
+    bar: Bar
+    mesh: str
+    by: str | None
+    by_centre: str
+    rolling: Rolling
+    angle: float
+    start: float
+
+    derived_count: ClassVar[int] = 4
+    """The number of values that `derive` gives: at the start the directions of the source and of the wheel, as the
+    arm sees them."""
+
+    @property
+    def joints(self) -> tuple[JointData, ...]:
+        """Its pin and its mesh."""
+        bar = self.bar
+        return HingeData(bar.pin, bar.name), MeshData(self.mesh, bar.name, bar.pin, self.by, self.rolling)
+
+    @property
+    def circles(self) -> tuple[tuple[str, str], ...]:
+        """The pitch circles of both wheels."""
+        return (self.bar.pin, self.mesh), (self.by_centre, self.mesh)
+
+    def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
+        """See `derived_count`."""
+        arm, source = self.rolling.sight(before(self.start))
+        wheel = rotated(Vec2(math.cos(self.angle), math.sin(self.angle)), mirrored(arm))
+        return [source.x, source.y, wheel.x, wheel.y]
+
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The wheel, turned from its start as the source was."""
+        rolling, centre, ratio = self.rolling, linkage.pins[self.bar.pin], self.rolling.ratio
+        arm, source = rolling.sight(linkage)
+        turned = rotated(source, mirrored(Vec2(derived[0], derived[1])))
+        if ratio.denominator == 1:
+            margin = 1.0
+            step = wheel = turned if ratio > 0 else mirrored(turned)
+            for _ in range(abs(int(ratio)) - 1):
+                wheel = rotated(wheel, step)
+        else:
+            margin = (turned.x - _LEAST_COSINE) * (1.0 / (1.0 - _LEAST_COSINE))
+            angle = xp.atan2(turned.y, turned.x) * float(ratio)
+            wheel = Vec2(xp.cos(angle), xp.sin(angle))
+        u = rotated(rotated(wheel, Vec2(derived[2], derived[3])), arm)
+        links = linkage.links
+        turns = rolling.turn(lambda name: links[name].t1), rolling.turn(lambda name: links[name].t2)
+        mesh = Mesh(linkage.pins[self.mesh].p - centre.p, centre, turns)
+        return SolvedGroup([(centre, u)], (Hinge(0, base=centre), mesh), margin)
+
+
+class GearKind(SingleLinkKind):
+    """A gear: the links `on` and `by` are wheels about their points, which are pinned to one link."""
+
+    name = noun = "gear"
+    keys = ("teeth", "internal")
+    use = "for a gear give it `teeth`, the numbers of teeth of both wheels"
+    limits = (
+        "The reaction of a gear is its tangential force; what presses the wheels apart is in no reaction."
+    )
+    equations = 1
+    alone = "geared link"
+
+    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+        """Add the teeth."""
+        teeth: Any = table.get("teeth")
+        internal = table.get("internal", False)
+        whole = isinstance(teeth, list) and len(teeth) == 2 and all(type(z) is int and z > 0 for z in teeth)
+        if not whole:
+            state = "is missing" if teeth is None else f"is {shown(teeth)}"
+            reader.fault(
+                f"{key}.teeth",
+                f"{state}; must be two whole numbers > 0, the teeth of {joint['on'][0]} and of {joint['by'][0]}, "
+                "such as [20, 40]",
+            )
+        if not isinstance(internal, bool):
+            reader.fault(f"{key}.internal", f"is {shown(internal)}; must be true or false")
+        elif whole and internal and teeth[0] == teeth[1]:
+            reader.fault(
+                f"{key}.teeth",
+                f"is {shown(teeth)}; a wheel in a ring has fewer teeth than the ring; give both numbers",
+            )
+        joint |= {"teeth": teeth, "internal": internal}
+
+    def complete(self, reader: JointReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+        """Add the arm with its points at the centres, and the pitch point, which it carries by the name of the
+        joint."""
+        key, wheels = f"joints.{joint['name']}", (joint["on"][0], joint["by"][0])
+        centres = [dict(_meeting(reader.points, joints, *joint[end])) for end in ("on", "by")]
+        arm = next(
+            (link for link in reader.points if link not in wheels and all(link in c for c in centres)), ""
+        )
+        if not arm:
+            on, by = (".".join(joint[end]) for end in ("on", "by"))
+            reader.fault(
+                key,
+                f"no link holds its two wheels at their distance: {on} and {by} must be pinned to one link, or to "
+                "the ground; name the centres of the wheels in `on` and `by`",
+            )
+        elif not reader.errors:
+            (z, other), sign = joint["teeth"], -1 if joint["internal"] else 1
+            share, held = z / (z + sign * other), [centre[arm] for centre in centres]
+            a, b = (reader.points[arm][point] for point in held)
+            place = [f"({x}) + {share!r} * (({y}) - ({x}))" for x, y in zip(a, b, strict=True)]
+            joint |= {"third": arm, "held": held, "points": {arm: {joint["name"]: place}}}
+
+    def start_faults(
+        self, joint: Mapping[str, Any], points: Mapping[str, Mapping[str, tuple[float, float]]]
+    ) -> Iterator[tuple[str, str]]:
+        """The fault of wheels on one centre."""
+        arm, (a, b) = joint["third"], joint["held"]
+        if math.dist(points[arm][a], points[arm][b]) == 0.0:
+            yield (
+                f"joints.{joint['name']}",
+                f"its wheels have one centre, {a} and {b} of {arm} in one place, and cannot be in mesh; place them "
+                "apart",
+            )
+
+    def rate(self, joint: JointEntry, link: str) -> float:
+        """See `SingleLinkKind`; seen from an arm that turns, too, the ground turns."""
+        ratio, other = _ratio(joint, link), joint.other_link(link)
+        rate = abs(1 - ratio) * (joint.third != GROUND) + abs(ratio) * (other != GROUND)
+        if rate > _MOST:
+            raise InputError(
+                f"{link} may turn {float(rate):.3g} times in a turn of the links before it by the teeth of "
+                f"{joint.name}, and must turn {_MOST} times at most; leave the fast wheel out: a gear to the motor "
+                "is the `ratio` at the top of the file",
+                key=f"links.{link}",
+            )
+        return float(rate)
+
+    def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
+        """The wheel with its mesh; an idler only hands on the turn of the wheel before it."""
+        other, arm = joint.other_link(link), joint.third
+        before = next((g for g in parts.groups if isinstance(g, GearedLink) and g.bar.name == other), None)
+        rolling = Rolling(_moving(arm), _moving(other), _ratio(joint, link))
+        if before is not None and before.rolling.arm == rolling.arm:
+            rolling = before.rolling._replace(ratio=rolling.ratio * before.rolling.ratio)
+        bar, mesh = parts.hung(link, pin), parts.pin(arm, joint.name)
+        parts.receive(joint, mesh, link)
+        structure, centre = parts.structure, parts.pin(other, joint.at(other))
+        return GearedLink(
+            bar, mesh, _moving(other), centre, rolling, structure.poses[link][2], structure.start
+        )
+
+    def dead(self, group: AssurGroup, where: str) -> str:
+        """See `SingleLinkKind`: the ratio is no whole number."""
+        (link,), joint = group.links, group.joints[1]
+        other = joint.other_link(link)
+        return (
+            f"{other} has turned by nearly half a turn from its start at {where}, and {link} does not turn a whole "
+            f"number of times as fast by the teeth of {joint.name}, so that it would not be back after a turn; drive "
+            "the slower of the two wheels with a whole ratio of the teeth, or let it swing by less than 168 deg "
+            "about its start"
+        )
+
+
+def _moving(link: str) -> str | None:
+    """The name of a link that may move, None for the ground."""
+    return None if link == GROUND else link
+
+
+def _ratio(joint: JointEntry, link: str) -> Fraction:
+    """How often a wheel turns per turn of the other one, seen from the arm."""
+    on, by = joint.table["teeth"]
+    ratio = Fraction(by, on) if link == joint.on[0] else Fraction(on, by)
+    return ratio if joint.table["internal"] else -ratio
+
+
+def _meeting(
+    points: Mapping[str, Mapping[str, Any]], joints: Sequence[JointTable], link: str, point: str
+) -> set[tuple[str, str]]:
+    """The points, by link and name, that pins hold together with this one, and itself."""
+    pins = [{tuple(joint["on"]), tuple(joint["by"])} for joint in joints if joint["type"] == REVOLUTE]
+    met, grown = set[tuple[str, str]](), {(link, point)}
+    while met != grown:
+        met = grown
+        names = {name for _, name in met}
+        alike = {(owner, name) for owner, owned in points.items() for name in names & {*owned}}
+        grown = met.union(alike, *(pair for pair in pins if pair & met))
+    return met

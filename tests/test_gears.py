@@ -1,0 +1,406 @@
+"""Gears of linkage files: four machines of other kinds and three trains against an independent solution, in Python
+and in FMUs; energy, slopes, mirror and scale; what is refused.
+
+Measured: motion, torque and every reaction within 1e-14 of the independent solution."""
+
+from __future__ import annotations
+
+import copy
+import math
+
+import fmpy
+import numpy as np
+import pytest
+from multibody import Multibody
+from test_linkage_random import by_the_machine, deviations
+
+from chainunit.core.errors import InputError
+from chainunit.core.native.compilers import compiler
+from chainunit.fmu.export import export as export_python
+from chainunit.fmu.native.export import export
+from chainunit.machines.linkages.file import description_of
+from chainunit.machines.linkages.model import machine_of
+from chainunit.machines.machine import Machine
+from chainunit.report.drawing import drawing
+from chainunit.study.linkage_turn import linkage_findings
+
+
+def link(mass, **points):
+    """A link with a mass that lies off its points."""
+    return {
+        "points": {name: [float(x) for x in place] for name, place in points.items()},
+        "mass": mass, "inertia": 0.004 * mass, "centroid": [0.03, 0.01 * mass],
+    }  # fmt: skip
+
+
+def five_bar():
+    """Two cranks that turn against each other, and a dyad."""
+    return {
+        "ground": {"O1": [0, 0], "O2": [0.3, 0]},
+        "driver": {"link": "crank"},
+        "links": {
+            "crank": link(2.0, O1=[0, 0], A=[0.06, 0]),
+            "wheel": link(1.5, O2=[0, 0], B=[0.05, 0.01]),
+            "left": link(1.1, A=[0, 0], C=[0.25, 0]),
+            "right": link(0.9, B=[0, 0], C=[0.24, 0]),
+        },
+        "joints": {"mesh": {"type": "gear", "on": "wheel.O2", "by": "crank.O1", "teeth": [30, 30]}},
+        "loads": {"push": {"on": "left.C", "force": [100, -50]}},
+        "start": {"phi": 0.2, "points": {"C": [0.15, 0.2]}, "angles": {"wheel": 0.7}},
+    }
+
+
+def planetary():
+    """A planet that the crank carries around a fixed sun; a pin on it drives a slider."""
+    return {
+        "ground": {"O1": [0, 0], "G": [0, -0.05], "G2": [1, -0.05]},
+        "driver": {"link": "crank", "positive": "clockwise", "zero": 0.4},
+        "links": {
+            "crank": link(2.0, O1=[0, 0], A=[0.09, 0]),
+            "planet": link(1.2, A=[0, 0], P=[0.02, 0.005]),
+            "rod": link(0.8, P=[0, 0], S=[0.4, 0]),
+            "ram": link(3.0, S=[0, 0]),
+        },
+        "joints": {
+            "mesh": {"on": "planet.A", "by": "ground.O1", "teeth": [20, 40]},
+            "guide": {"on": "ram.S", "by": "ground.G", "toward": "G2"},
+        },
+        "loads": {"push": {"on": "ram.S", "force": [-300, 40]}},
+        "start": {"phi": 0.3, "points": {"S": [0.45, -0.05]}, "angles": {"planet": 1.1}},
+    }
+
+
+def sun_and_planet():
+    """Watt's gear: the planet is fixed to the connecting rod, the arm keeps it at the sun, which has the load."""
+    return {
+        "ground": {"O1": [0, 0], "O2": [0.7, 0.8]},
+        "driver": {"link": "arm"},
+        "links": {
+            "arm": link(1.0, O1=[0, 0], A=[0.15, 0]),
+            "rod": link(4.0, A=[0, 0], B=[0.85, 0]),
+            "beam": link(6.0, O2=[0, 0], B=[0.6, 0]),
+            "sun": link(9.0, O1=[0, 0], W=[0.2, 0]),
+        },
+        "joints": {"mesh": {"on": "rod.A", "by": "sun.O1", "teeth": [25, 25]}},
+        "loads": {"load": {"type": "torque", "on": "sun", "torque": "-moment * (1 + 0.2 * sin(phi))"}},
+        "parameters": {"moment": "30 N m"},
+        "start": {"points": {"B": [0.15, 0.85]}, "angles": {"sun": 0.3}},
+    }
+
+
+def cardan():
+    """A wheel of half the teeth in a ring: the point E of its pitch circle runs on a straight line."""
+    return {
+        "ground": {"O1": [0, 0]},
+        "driver": {"link": "crank"},
+        "links": {
+            "crank": link(2.0, O1=[0, 0], A=[0.1, 0]),
+            "planet": link(1.3, A=[0, 0], E=[0.1, 0], F=[0.0, 0.07]),
+        },
+        "joints": {"mesh": {"on": "ground.O1", "by": "planet.A", "teeth": [40, 20], "internal": True}},
+        "loads": {
+            "piston": {"on": "planet.E", "force": [-500, 0]},
+            "other": {"type": "follower", "on": "planet.F", "force": [20, 70]},
+        },
+        "start": {"angles": {"planet": 0.0}},
+    }
+
+
+def idler():
+    """A small wheel between two large ones; it turns twice as fast, and the last one as the first."""
+    data = five_bar()
+    data["ground"] |= {"I": [0.15, -0.02]}
+    data["links"] |= {"idler": link(0.4, I=[0, 0], K=[0.02, 0])}
+    data["joints"] = {
+        "first": {"on": "crank.O1", "by": "idler.I", "teeth": [40, 20]},
+        "second": {"on": "wheel.O2", "by": "idler.I", "teeth": [40, 20]},
+    }
+    data["start"]["angles"] |= {"idler": 0.5}
+    return data
+
+
+def sector():
+    """The rocker of a four-bar turns a pinion 2.6 times as far to and fro; on it stands a rod with a slider."""
+    return {
+        "ground": {"O1": [0, 0], "O2": [0.6, 0.4], "O3": [0.72, 0.4], "G": [0.9, 0.5], "G2": [0.9, 1.5]},
+        "driver": {"link": "crank"},
+        "links": {
+            "crank": link(2.0, O1=[0, 0], A=[0.05, 0]),
+            "coupler": link(3.0, A=[0, 0], B=[0.6, 0]),
+            "rocker": link(3.0, O2=[0, 0], B=[0.4, 0]),
+            "pinion": link(1.0, O3=[0, 0], C=[0.06, 0]),
+            "rod": link(0.7, C=[0, 0], D=[0.4, 0]),
+            "ram": link(2.0, D=[0, 0]),
+        },
+        "joints": {
+            "teeth": {"on": "pinion.O3", "by": "rocker.O2", "teeth": [50, 130]},
+            "guide": {"on": "ram.D", "by": "ground.G", "toward": "G2"},
+        },
+        "loads": {"lift": {"on": "ram.D", "force": [0, -200]}},
+        "start": {"points": {"B": [0.6, 0.0], "D": [0.9, 0.78]}, "angles": {"pinion": 0.4}},
+    }
+
+
+def wobbling_arm():
+    """The rocker is the arm: a wheel on it rolls on one that turns with the crank, by way of another gear."""
+    data = sector()
+    data["links"] |= {
+        "twin": link(1.0, O2=[0, 0]),
+        "roller": link(0.5, B=[0, 0], R=[0.03, 0.02]),
+    }
+    for name in ("rod", "ram", "pinion"):
+        del data["links"][name]
+    data["joints"] = {
+        "far": {"on": "twin.O2", "by": "crank.O1", "teeth": [30, 30]},
+        "near": {"on": "roller.B", "by": "twin.O2", "teeth": [20, 40]},
+    }
+    data["loads"] = {"pull": {"on": "roller.R", "force": [30, 60]}}
+    data["start"] = {"phi": 1.0, "points": {"B": [0.6, 0.0]}, "angles": {"twin": 0.1, "roller": 2.0}}
+    return data
+
+
+MACHINES = {
+    made.__name__: (made, wheels)
+    for made, wheels in (
+        (five_bar, {"mesh": "wheel"}),
+        (planetary, {"mesh": "planet"}),
+        (sun_and_planet, {"mesh": "sun"}),
+        (cardan, {"mesh": "planet"}),
+        (idler, {"first": "idler", "second": "wheel"}),
+        (sector, {"teeth": "pinion"}),
+        (wobbling_arm, {"far": "twin", "near": "roller"}),
+    )
+}
+STATES = [(0.3, 2.0, 5.0), (1.9, -3.0, 4.0), (4.4, 6.0, -20.0), (-7.7, 1.0, 0.0)]
+
+
+def described(name):
+    return description_of(MACHINES[name][0](), name)
+
+
+def independent(name):
+    return Multibody(described(name), wheels=MACHINES[name][1])
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_against_an_independent_solution(name):
+    """Motion of every link and point, the pitch points among them, every reaction, torque and energies."""
+    model, body = machine_of(described(name)), independent(name)
+    kinds = [group.kind for group in model.described_by.structure.groups]
+    assert kinds.count("geared link") == len(MACHINES[name][1])
+    for q, w, a in STATES:
+        found, _, _ = by_the_machine(model, q, w, a)
+        wanted = body.solution(body.followed(q), q, w, a)
+        assert {f"{gear}.fx" for gear in MACHINES[name][1]} <= wanted.keys()
+        key, worst = max(deviations(found, wanted), key=lambda pair: pair[1])
+        assert worst < 1e-11, (q, key, worst)
+
+
+@pytest.mark.second
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
+@pytest.mark.parametrize("name", ["five_bar", "planetary", "sun_and_planet", "cardan", "sector"])
+def test_fmus(name, make, tmp_path):
+    """The same numbers through the FMU, before and after a step."""
+    model, body, h = machine_of(described(name)), independent(name), 0.01
+    if make == "python":
+        file = export_python(model, tmp_path / "unit.fmu")
+    else:
+        file = export(model, tmp_path / "unit.fmu", fmi=int(make[-1]))
+    for q, w, a in STATES[:2]:
+        wanted = body.solution(body.followed(q), q, w, a)
+        rows = fmpy.simulate_fmu(
+            str(file), stop_time=h, step_size=h, output=[*wanted], fmi_type="CoSimulation",
+            start_values={"phi": q, "w": w, "a": a},
+        )  # fmt: skip
+        end = q + h * w + 0.5 * h * h * a, w + h * a, a
+        for row, values in ((rows[0], wanted), (rows[-1], body.solution(body.followed(end[0]), *end))):
+            found = {key: float(row[key]) for key in values}
+            key, worst = max(deviations(found, values), key=lambda pair: pair[1])
+            assert worst < 1e-11, (q, key, worst)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_torque_inertia_and_slopes_belong_together(name):
+    """Torque by the teeth and by virtual work; the inertia is that of the kinetic energy; slopes against differences
+    of eighth order, with friction in the pins."""
+    data = MACHINES[name][0]()
+    machine = Machine(machine_of(description_of(data | {"pins": {"friction": 0.1, "diameter": 0.03}}, name)))
+    q, w = np.linspace(0.05, 6.2, 25), 3.0
+    state = machine.state(machine.inputs({"phi": q, "w": w}))
+    losses = state.effects["pins"].dissipative + sum(
+        state.effects[key].dissipative for key in ("guides",) if key in state.effects
+    )
+    size = np.max(np.abs(state.torque(4.0)))
+    assert np.max(np.abs(losses)) > 0.0
+    assert np.max(np.abs(state.torque_by_reactions(4.0) + losses - state.torque(4.0))) < 1e-12 * size
+    here = machine.evaluate({"phi": q, "w": w})
+    assert here["kinetic_energy"] == pytest.approx(0.5 * here["J"] * w * w, rel=1e-14)
+    weights = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
+    pairs, h = (
+        (("phi", "tau_bias", "tau_bias_dphi"), ("w", "tau_bias", "tau_bias_dw"), ("phi", "J", "dJ_dphi")),
+        2e-3,
+    )
+    for place, value, slope in pairs:
+
+        def moved(step, place=place, value=value):
+            inputs = {"phi": q, "w": np.full_like(q, w)}
+            return machine.evaluate(inputs | {place: inputs[place] + step})[value]
+
+        differences = sum(f * (moved(k * h) - moved(-k * h)) for k, f in enumerate(weights, 1)) / h
+        assert here[slope] == pytest.approx(differences, abs=1e-8 * np.max(np.abs(differences)) + 1e-12)
+
+
+def test_a_point_of_cardans_wheel_runs_on_a_straight_line():
+    """Its way is twice the throw of the crank, and no load across the line needs a torque."""
+    machine = Machine(machine_of(described("cardan")))
+    q = np.linspace(0.0, 6.0, 40)
+    out = machine.outputs(q, 1.0)
+    assert np.max(np.abs(out.planet.E.y)) < 1e-16
+    assert out.planet.E.x == pytest.approx(0.2 * np.cos(q), abs=1e-15)
+    assert np.ptp(out.planet.F.y) > 0.1
+
+
+def test_the_sun_of_watt_turns_twice():
+    model = machine_of(described("sun_and_planet"))
+    assert model.described_by.link_turns["sun"][0] == 2.0 and model.described_by.link_turns["rod"][0] == 0.0
+    course = Machine(model).outputs(np.linspace(0.0, 4.0 * math.pi, 400), 1.0).sun.angle
+    assert course[0] == pytest.approx(0.3, abs=1e-12)
+    assert course[-1] - course[0] == pytest.approx(8.0 * math.pi, abs=1e-9)
+    assert np.max(np.abs(np.diff(course))) < 0.15
+
+
+def test_mirrored_and_scaled():
+    """The mirror image that is driven the other way has the same torque; a machine of twice the size four times."""
+    plain, mirrored, twice = five_bar(), five_bar(), five_bar()
+    turn = np.linspace(-0.2, 5.0, 17)
+
+    def torque(data, q):
+        return Machine(machine_of(description_of(data, "machine"))).outputs(q, 3.0, 2.0).tau
+
+    mirrored["driver"]["positive"], mirrored["start"]["points"]["C"][1] = "clockwise", -0.2
+    mirrored["start"]["angles"]["wheel"] *= -1.0
+    mirrored["loads"]["push"]["force"][1] *= -1.0
+    for each in mirrored["links"].values():
+        each["centroid"][1] *= -1.0
+        each["points"] = {name: [x, -y] for name, (x, y) in each["points"].items()}
+    wanted = torque(plain | {"gravity": 0.0}, turn)
+    assert torque(mirrored | {"gravity": 0.0}, turn) == pytest.approx(wanted, rel=1e-12)
+
+    def grown(place):
+        return [2.0 * x for x in place]
+
+    twice["ground"] = {name: grown(place) for name, place in twice["ground"].items()}
+    twice["start"]["points"] = {name: grown(place) for name, place in twice["start"]["points"].items()}
+    twice["loads"]["push"]["force"] = grown(twice["loads"]["push"]["force"])
+    for each in twice["links"].values():
+        each["points"] = {name: grown(place) for name, place in each["points"].items()}
+        each |= {"centroid": grown(each["centroid"]), "inertia": 4.0 * each["inertia"]}
+    assert torque(twice | {"gravity": 19.62}, turn) == pytest.approx(4.0 * torque(plain, turn), rel=1e-12)
+
+
+def test_the_numbers_of_teeth_in_any_order_and_the_gear_by_either_wheel():
+    """A gear named from the other wheel has the opposite force; only the ratio of the teeth matters."""
+    other = five_bar()
+    other["joints"]["mesh"] = {"on": "crank.O1", "by": "wheel.O2", "teeth": [7, 7]}
+    one, two = (
+        Machine(machine_of(description_of(d, "one"))).outputs(1.0, 2.0, 3.0) for d in (five_bar(), other)
+    )
+    assert float(two.mesh.fy) == pytest.approx(-float(one.mesh.fy), rel=1e-13)
+    assert float(two.tau) == pytest.approx(float(one.tau), rel=1e-13)
+
+
+def test_the_picture_has_the_pitch_circles_and_the_report_the_gear():
+    machine = Machine(machine_of(described("five_bar")))
+    picture = drawing(machine)
+    assert machine.state(machine.inputs({"phi": 0.2})).m.linkage.circles == (("O2", "mesh"), ("O1", "mesh"))
+    assert picture.count('stroke-dasharray="4 4"') == 3
+    findings = linkage_findings(machine, 3.0)
+    assert findings.sentence == "crank + geared link (wheel) + RRR dyad (left, right)"
+    assert findings.joints["mesh"].peak > 0.0
+    assert "what presses the wheels apart is in no reaction" in machine.model.fmu_data.notes
+
+
+def changed(**changes):
+    data = copy.deepcopy(five_bar())
+    gear = data["joints"]["mesh"]
+    for key, value in changes.items():
+        if value is None:
+            del gear[key]
+        else:
+            gear[key] = value
+    return data
+
+
+def twice_in_mesh():
+    data = changed()
+    data["joints"]["again"] = data["joints"]["mesh"] | {"teeth": [20, 20]}
+    return data
+
+
+def on_the_dyad():
+    data = changed()
+    data["joints"]["mesh"] = {"on": "left.C", "by": "wheel.B", "teeth": [10, 20]}
+    return data
+
+
+def on_one_centre():
+    data = changed()
+    data["ground"]["O2"] = [0, 0]
+    return data
+
+
+@pytest.mark.parametrize(
+    ("data", "key", "words"),
+    [
+        (changed(teeth=None), "joints.mesh.teeth", "is missing; must be two whole numbers > 0"),
+        (changed(teeth=[30, 0]), "joints.mesh.teeth", "of wheel and of crank"),
+        (changed(teeth=[30, 20.5]), "joints.mesh.teeth", "two whole numbers"),
+        (changed(teeth=30), "joints.mesh.teeth", "two whole numbers"),
+        (changed(internal=1), "joints.mesh.internal", "must be true or false"),
+        (changed(internal=True), "joints.mesh.teeth", "fewer teeth than the ring"),
+        (
+            changed(ratio=2),
+            "joints.mesh.ratio",
+            "unknown key; known here: type, on, by, toward, angle, length, teeth",
+        ),
+        (changed(type="revolute"), "joints.mesh.teeth", "belongs to a gear joint, and this one is a pin"),
+        (changed(toward="O2"), "joints.mesh.toward", "belongs to a prismatic joint, and this one is a gear"),
+        (changed(type="belt"), "joints.mesh.type", 'or "gear"; a belt or a cam'),
+        (changed(on="wheel.B"), "joints.mesh", "wheel.B and crank.O1 must be pinned to one link"),
+        (changed(by="ground.O1"), "joints.mesh", "wheel.O2 and ground.O1 must be pinned to one link"),
+        (changed(teeth=[20, 30]), "links.wheel", "drive the slower of the two wheels"),
+        (changed(teeth=[30, 20]), "links.wheel", "does not turn a whole number of times"),
+        (changed(teeth=[1, 13]), "links.wheel", "must turn 12 times at most"),
+        (twice_in_mesh(), "links.wheel", "fix the link wheel more than once"),
+        (on_one_centre(), "joints.mesh", "cannot be in mesh; place them apart"),
+        (on_the_dyad(), "links.", "form one group with 3 links and 5 joints: a class that is not covered"),
+    ],
+    ids=lambda x: x if isinstance(x, str) and " " in x else "",
+)
+def test_what_is_refused(data, key, words):
+    with pytest.raises(InputError) as caught:
+        machine_of(description_of(data, "wrong"))
+    (fault,) = caught.value.faults
+    assert (fault.key or "").startswith(key), fault.key
+    assert words in str(fault), str(fault)
+
+
+def test_a_wheel_needs_its_angle_at_the_start():
+    data = five_bar()
+    del data["start"]["angles"]
+    data["links"]["wheel"]["points"] = {"O2": [0, 0]}
+    data["links"] = {name: data["links"][name] for name in ("crank", "wheel")}
+    del data["loads"]
+    data["start"] = {}
+    with pytest.raises(InputError, match="give the angle of wheel in"):
+        machine_of(description_of(data, "lost"))
+
+
+def test_a_driver_that_swings_may_have_any_ratio():
+    """Within half a turn of its start."""
+    data = changed(teeth=[20, 30])
+    data["driver"]["range"] = [-0.8, 1.0]
+    model = machine_of(description_of(data, "swinging"))
+    angle = Machine(model).outputs(np.array([-0.6, 0.2, 0.9]), 1.0).wheel.angle
+    assert angle == pytest.approx(0.7 - 1.5 * (np.array([-0.6, 0.2, 0.9]) - 0.2), abs=1e-14)
