@@ -890,7 +890,9 @@ def test_any_linkage_moves(knife):
     """Also behind the open coupling; links keep their lengths, and the blade stays on its path."""
     moving = pictures(study_motion.motion(knife))
     assert [run["name"] for run in moving["runs"]] == ["start_up", "hard_cut", "hard_cut_coasting"]
-    assert moving["hanging"] == ("O3", "O4") and moving["orbit"] == ("O1", "A") and moving["groups"] == ()
+    assert (
+        moving["hanging"] == ("O3", "O4") and moving["circles"] == (("O1", "A"),) and moving["groups"] == ()
+    )
     (path,) = moving["paths"]
     size = np.ptp(path["y"])
     for run in moving["runs"]:
