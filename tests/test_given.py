@@ -324,7 +324,7 @@ def test_lengths_beside_those_of_the_example_are_named(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('[machine]\nr = "140 mm"\nl = "1.1 m"\nz = "0.95 m"\n', "utf-8")
     config = load(file)
-    remark = lengths_of_example(config.file, config.machine)
+    remark = lengths_of_example(config.file.given, bool(config.machine.model.sides))
     assert remark.text.startswith(
         "The file gives the lengths r, l, z of the chain unit. The lengths h, c, hy, e, l1, l2 are"
     )
@@ -332,4 +332,4 @@ def test_lengths_beside_those_of_the_example_are_named(tmp_path):
     assert remark.text in remarks_on_export(config)
     file.write_text('[ratios]\nrho = 0.127\nl = "1.1 m"\n', "utf-8")
     for config in (load(file), load(None)):
-        assert lengths_of_example(config.file, config.machine) is None
+        assert lengths_of_example(config.file.given, bool(config.machine.model.sides)) is None

@@ -159,7 +159,7 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
 
 def remarks_on_export(config: Config) -> list[str]:
     """Sentences on the parts of a study that its FMU or package does not have, and on the limits of its model."""
-    lengths = lengths_of_example(config.file, config.machine)
+    lengths = lengths_of_example(config.file.given, bool(config.machine.model.sides))
     sentences = [left_out(config.operation, config.given_events), lengths.text if lengths else ""]
     if config.file.tables.get("organ") != "chain":
         sentences += beyond_two_bars(config.machine, config.feed, config.run.crank_speed)

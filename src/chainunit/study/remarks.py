@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import replace
 from importlib import import_module
 from pkgutil import iter_modules
 
 import numpy as np
 
-from ..machines.machine import Machine
 from ..reading.text import aside, number
 from .analyses import all_analyses
 from .arrays import peak
 from .catalogue_drive import SLIP
-from .config import FileContents
 from .coupling import remark_on_coupling, remark_on_rams
 from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve, slowed
@@ -60,7 +58,7 @@ def conclude(study: StudyRecord) -> None:
     for value in config.file.unusual:
         if value.with_unit:
             study.say(_UNUSUAL, value=str(value))
-    if (lengths := lengths_of_example(config.file, config.machine)) is not None:
+    if (lengths := lengths_of_example(config.file.given, bool(config.machine.model.sides))) is not None:
         study.remarks.append(lengths)
     if left_out := list(_left_out(study)):
         study.say(_LEFT_OUT, what=" and ".join(left_out))
@@ -123,11 +121,12 @@ _LENGTHS_OF_EXAMPLE = note(
 )
 
 
-def lengths_of_example(file: FileContents, machine: Machine) -> Remark | None:
-    """The remark on a chain unit of which the file gives some lengths alone; None for another machine."""
-    stated = [name for name in LENGTHS if f"machine.{name}" in file.given]
+def lengths_of_example(given: Set[str], has_sides: bool) -> Remark | None:
+    """The remark on a chain unit, which has sides, of which the file gives some lengths alone, by the names of all
+    values that it gives; None for another machine."""
+    stated = [name for name in LENGTHS if f"machine.{name}" in given]
     others = [name for name in LENGTHS if name not in stated]
-    if not stated or not others or file.gives("ratios") or not machine.model.sides:
+    if not stated or not others or not has_sides or any(name.startswith("ratios.") for name in given):
         return None
     return _LENGTHS_OF_EXAMPLE.remark(stated=", ".join(stated), others=", ".join(others))
 
