@@ -85,7 +85,7 @@ def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:
     is torque (2 - 1/efficiency)/ratio: the same loss relieves the motor. Below an efficiency of 1/2 this part changes
     its sign, and the transmission is self-locking: the motor must help to turn it. At rest there is no loss.
     """
-    return (torque + lost_torque(xp, 1.0 / t.efficiency - 1.0, torque, w)) / t.ratio + t.d * w
+    return (torque + lost_torque(xp, t.loss, torque, w)) / t.ratio + t.d * w
 
 
 def lost_torque(xp: Any, loss: Any, torque: Any, w: Any) -> Any:

@@ -46,11 +46,16 @@ def inverter_need(study: StudyRecord) -> InverterNeed | None:
     if rated is None or study.config.drive.start != "inverter":
         return None
     named = (("start_up", study.start), *study.answers.items())
-    peaks = {study.title_of(name): a.current_peak for name, a in named if a and a.current_peak is not None}
+    currents = {name: a.current_peak for name, a in named if a and a.current_peak is not None}
+    until_trip: dict[str, float] = {}
     for findings in study.findings.values():
-        for name, current in findings.currents_until_trip(study).items():
-            del peaks[study.title_of(name)]
-            peaks[f"{study.title_of(name)}, with the torque limiter"] = current
+        until_trip |= findings.currents_until_trip(study)
+    peaks = {
+        f"{study.title_of(name)}{', with the torque limiter' * (name in until_trip)}": until_trip.get(
+            name, current
+        )
+        for name, current in currents.items()
+    }
     lasting: list[float] = []
     if starts := StartFindings.found_in(study):
         worst = max(starts.starts, key=lambda start: start.current)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..drives.nameplate import Nameplate
 from .arrays import rms
 
 
@@ -85,8 +86,14 @@ def protecting_class(
 def protects(number: int, setting: float, before: float, stall_current: float, stall_time: float) -> bool:
     """Whether the slowest relay of the class of that `number` trips before the locked rotor of a warm motor is too
     hot, see `protecting_class`."""
-    trip = None if number > HEAVIEST else stall_trip(_NAMED[str(number)], setting, before, stall_current)
+    trip = stall_trip(_NAMED[str(number)], setting, before, stall_current)
     return trip is not None and trip <= stall_time
+
+
+def locked_rotor(plate: Nameplate, before: float) -> tuple[float, float, float, float]:
+    """The last four arguments of `protecting_class` and `protects`, for a relay that is set to the rated current of a
+    motor, which had the RMS current `before` [A]."""
+    return plate.rated_current, before, plate.rated_current * plate.locked_current_ratio, plate.locked_time
 
 
 def stall_trip(trip_class: TripClass, setting: float, before: float, current: float) -> float | None:

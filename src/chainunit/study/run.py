@@ -32,7 +32,7 @@ from .pulls import least_pulls
 from .readings import crank_angle
 from .record import Spread, StudyRecord
 from .registry import registered
-from .relay import class_holding, protecting_class, start_seconds
+from .relay import class_holding, locked_rotor, protecting_class, start_seconds
 from .remarks import EVENT_LEFT_OUT, STATE_NOT_SAVED, WITHOUT_COMPILER, conclude
 from .rig import Rig
 from .start_up import start_up
@@ -142,14 +142,8 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
     findings, plate = StartFindings.found_in(study), study.plate
     if findings is None or plate is None or study.drive.follows:
         return
-    least, nameplate = max(findings.start_class, study.relay_class), plate.nameplate
-    before, stall = (
-        study.answers[verdict.STEADY].current_rms,
-        nameplate.rated_current * nameplate.locked_current_ratio,
-    )
-    trip_class = protecting_class(
-        least, findings.relay_seconds, nameplate.rated_current, before, stall, nameplate.locked_time
-    )
+    least, before = max(findings.start_class, study.relay_class), study.answers[verdict.STEADY].current_rms
+    trip_class = protecting_class(least, findings.relay_seconds, *locked_rotor(plate.nameplate, before))
     if trip_class == study.relay_class:
         return
     study.relay_class = trip_class

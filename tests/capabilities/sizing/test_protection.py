@@ -335,6 +335,9 @@ def test_a_relay_that_trips_too_late_is_ordered_with_thermistors():
         assert ("order the motor with PTC thermistors" in words) == (trip > 12.0), trip_class
     study.relay_class = 30
     assert "thermistors" in _relay_of(study, plate.rated_current).setting_words
+    # the trip of a relay heavier than class 30 is not known
+    study.relay_class = 40
+    assert "thermistors" not in _relay_of(study, plate.rated_current).setting_words
 
 
 def test_a_coupling_that_saves_nothing_is_not_recommended():

@@ -14,7 +14,7 @@ from ...reading.text import aside, number
 from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
-from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words, protects
+from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words, locked_rotor, protects
 from ...study.starts import StartFindings, transient_words
 from ...study.verdict import STEADY
 from .candidate import Candidate, TrialResult
@@ -349,11 +349,9 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
 def _too_slow(study: StudyRecord) -> str | None:
     """The means beside a relay that trips too late with the rotor locked, in words; None beside another one."""
     before = study.answers[STEADY].current_rms if STEADY in study.answers else None
-    if study.plate is None or before is None:
+    if study.plate is None or before is None or study.relay_class > HEAVIEST:
         return None
-    plate = study.plate.nameplate
-    stall = plate.rated_current * plate.locked_current_ratio
-    if protects(study.relay_class, plate.rated_current, before, stall, plate.locked_time):
+    if protects(study.relay_class, *locked_rotor(study.plate.nameplate, before)):
         return None
     return "trips too late with the rotor locked: order the motor with PTC thermistors, too"
 

@@ -33,9 +33,10 @@ def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) ->
     """The drive with a load observer by that `table`, for a machine with this `feed` and `turn` in normal running."""
     p, speed = drive.fmu_parameters, turn.crank_speed * drive.ratio
     passed = np.asarray(turn.crank_torque) / drive.ratio
-    torque = passed + lost_torque(np, drive.gear_loss, passed, speed) + p.rotor.d * speed
+    lost = lost_torque(np, drive.gear_loss, passed, speed)
+    torque = passed + lost + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
-    friction = p.rotor.d + float(np.mean(lost_torque(np, drive.gear_loss, passed, speed))) / speed
+    friction = p.rotor.d + float(np.mean(lost)) / speed
     values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": friction}
     values |= weights(signals) | tuning(table, feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
