@@ -392,14 +392,16 @@ class Grid:
         self._refuse(memory)
 
     def _reduce(self, states: Memory, memory: Memory) -> None:
-        """Reduce stored states."""
+        """Reduce the inner dimension of stored `states` into `memory`: a row with a state without results has the
+        largest reason of its states, and no results."""
         memory.reason[...] = np.max(states.reason, axis=1)
         rows = iter(memory.results)
         for column, request in self._reduced:
             with np.errstate(invalid="ignore"):
-                parts = by_array(request, states.results[column.place])
-            for part in parts:
-                next(rows)[...] = np.where(memory.reason == 0, part, np.nan)
+                reduced = by_array(request, states.results[column.place])
+            # several for a histogram, one for each bin
+            for result in reduced:
+                next(rows)[...] = np.where(memory.reason == 0, result, np.nan)
 
     def _entries(self) -> dict[tuple[int, int], Any]:
         sizes = self._equations.sizes
