@@ -86,21 +86,21 @@ class CompiledSimulation(Simulation):
     def __init__(
         self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
     ) -> None:
-        self._system = CompiledSystem(system)
+        self._compiled = CompiledSystem(system)
         self.time, self.signals = start_time, dict(signals or {})
-        self._graph = system
+        self._system = system
         self._check_signals()
         start = {full: float(at_time(signal, start_time)) for full, signal in self.signals.items()}
-        self._states = self._system.start(start)
+        self._states = self._compiled.start(start)
         self._saved = self.time, self._states
 
     def _check_signals(self) -> None:
         for full, signal in self.signals.items():
-            if full not in self._system.inputs:
+            if full not in self._compiled.inputs:
                 raise InputError(f"{full}: no such input of the system")
             if not is_evaluated(signal):
                 raise InputError(f"{full}: a compiled system takes numbers and profiles as signals")
-        self.signals = self._graph.in_units(self.signals, "input")
+        self.signals = self._system.in_units(self.signals, "input")
 
     @property
     def states(self) -> Any:
@@ -132,7 +132,7 @@ class CompiledSimulation(Simulation):
             chosen = np.append(chosen, len(times) - 1)
         signals = {full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()}
         rows = {**outputs, **signals}
-        declared = {v.name: v for v in self._system.model.input_layout.variables} | self._system.outputs
+        declared = {v.name: v for v in self._compiled.model.input_layout.variables} | self._compiled.outputs
         variables = {
             full: (
                 "time",
@@ -204,16 +204,16 @@ def _advance(
         return []
     for simulation in simulations:
         simulation._check_signals()
-    system, signals = simulations[0]._system, [simulation.signals for simulation in simulations]
+    system, signals = simulations[0]._compiled, [simulation.signals for simulation in simulations]
     if any(
-        simulation._system.model is not system.model or simulation.signals.keys() != signals[0].keys()
+        simulation._compiled.model is not system.model or simulation.signals.keys() != signals[0].keys()
         for simulation in simulations
     ):
         raise InputError("simulations side by side must have one model, and signals of the same inputs")
     kept, guards = selected(options.names, [*system.outputs, *signals[0]]), options.guards
     needed = {*kept, *guards}
     outputs = [name for name in system.outputs if name in needed]
-    by_name = [system.model.parameter_layout.by_name(simulation._system.p) for simulation in simulations]
+    by_name = [system.model.parameter_layout.by_name(simulation._compiled.p) for simulation in simulations]
     varying = [name for name, value in by_name[0].items() if any(p[name] != value for p in by_name)]
     driven = [
         full
