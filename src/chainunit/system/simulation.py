@@ -412,7 +412,7 @@ class FmuSimulation(Simulation):
         return self._handles(rows.selected(names, there))
 
     def _guarded(self, guards: Mapping[str, float]) -> list[Guarded]:
-        """Handles and limits of the guards, by instance."""
+        """The guarded outputs of each instance with their limits; refuses a guard that is no output."""
         for full in guards:
             self.system.connector(full, "output")
         return [
