@@ -183,18 +183,19 @@ class LoadReader(EntryReader):
         return units_by_name
 
     def count(self, *expressions: Expression) -> None:
-        """Count the points of the tables in the expressions of a load or of a parameter.
+        """Add the points of the tables in the expressions of a load or of a parameter to those of the file: a table
+        over phi counts once in all of them, a table over x as often as it is looked up.
 
         Raises
         ------
         InputError
-            in one line, where all of the file come to more than `MOST_POINTS` with them.
+            in one line, for the expressions with which the file first has more than `MOST_POINTS`.
         """
         before = self.looked_up
         over_phi = {name for parsed in expressions for name in parsed.names} & {*self.table_units}
-        names = [*over_phi, *(name for parsed in expressions for name in parsed.lookups)]
-        self.looked_up += sum(self.sizes.get(name, 0) for name in names)
-        self.looked_up += sum(points for parsed in expressions for points in parsed.points)
+        for parsed in expressions:
+            self.looked_up += sum(parsed.points) + sum(self.sizes.get(name, 0) for name in parsed.lookups)
+        self.looked_up += sum(self.sizes[name] for name in over_phi)
         if before <= MOST_POINTS < self.looked_up:
             raise InputError(
                 f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
@@ -217,8 +218,9 @@ class LoadReader(EntryReader):
         """
         begin = f"is {shown(text)}; in {name} "
         if "." not in name:
+            argument = name.partition("(")[2].removesuffix(")")
             raise InputError(
-                f"{begin}{name[4:-1]} is no place of the motion; write a point of a link and its axis, such as "
+                f"{begin}{argument} is no place of the motion; write a point of a link and its axis, such as "
                 "min(ram.C.y); of two numbers the lesser is min(a, b)"
             )
         _, link, point, axis = parts_of_extreme(name)
