@@ -328,10 +328,8 @@ def inspect_steadiness(
     speeds = 2.0 * math.pi * np.round(lasts / np.median(lasts)) / lasts
     degree = min(DRIFT, (len(speeds) - 2) // 2)
     slow = np.polynomial.Polynomial.fit(middles, speeds, degree)(middles)
-    mean, spread = (
-        float(np.mean(speeds)),
-        math.sqrt(np.sum((speeds - slow) ** 2) / (len(speeds) - degree - 1)),
-    )
+    mean = float(np.mean(speeds))
+    spread = math.sqrt(np.sum((speeds - slow) ** 2) / (len(speeds) - degree - 1))
     # a mark stands in the first row behind it
     instant = recording.step / math.sqrt(6.0) / float(np.median(lasts)) if name == "mark" else 0.0
     if spread <= (WANDERS + 3.0 * instant) * mean:
