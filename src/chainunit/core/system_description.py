@@ -71,11 +71,10 @@ class Member:
 class SystemDescription:
     """What all values of a system share, from its description.
 
-    The description has the `name` and `title` of the model, the
-    `connections`, the inputs and outputs that are `left_out`, the free `terminals` by full name, the `extra` outputs
-    besides the variables of the first parts; the outputs in the order of their dependencies, all (`steps`), the
-    outputs for the derivatives (`rate_steps`) and for the constraints (`closed_steps`); and the order of the `start`,
-    in which no outputs stand for the states.
+    The description has the `name` and `title` of the model, the `connections`, the inputs and outputs that are
+    `left_out`, the free `terminals` by full name, the `extra` outputs besides the variables of the first parts; the
+    outputs in the order of their dependencies, all (`steps`), the outputs for the derivatives (`rate_steps`) and for
+    the constraints (`closed_steps`); and the order of the `start`, in which no outputs stand for the states.
     """
 
     def __init__(self, data: Mapping[str, Any], models: Mapping[str, Model]) -> None:
@@ -90,12 +89,9 @@ class SystemDescription:
         common = {
             f"{name}.{setting}": setting for name in self.models for setting in SOLVER if self.has_states
         }
-        settings = [
-            (_SOLVER, SystemSolver, group(SystemSolver, "internal integrator", default=SystemSolver()))
-        ]
-        self.Parameters = self._declared(
-            "Parameters", lambda model: model.Parameters, common, settings if self.has_states else ()
-        )
+        solver = group(SystemSolver, "internal integrator", default=SystemSolver())
+        settings = [(_SOLVER, SystemSolver, solver)] if self.has_states else []
+        self.Parameters = self._declared("Parameters", lambda model: model.Parameters, common, settings)
         inputs = left_out | set(self.sources)
         self.Inputs = self._declared("Inputs", lambda model: model.Inputs, inputs)
         self.States = self._declared("States", lambda model: model.States, ())
@@ -140,16 +136,13 @@ class SystemDescription:
         return declared_class("FurtherOutputs", (), fields) if fields else None
 
     def _member(self, name: str, model: Model, inputs: Iterable[str], common: Mapping[str, str]) -> Member:
-        def getter(full: str) -> Any:
-            return attrgetter(full)
-
         parameters = [f"{name}.{parameter}" for parameter in model.parameter_layout.names]
         taken = [f"{name}.{variable}" for variable in model.input_layout.names]
         return Member(
             name,
             model,
-            [getter(common.get(full, full)) for full in parameters],
-            [None if full in {*inputs} else getter(full) for full in taken],
+            [attrgetter(common.get(full, full)) for full in parameters],
+            [None if full in {*inputs} else attrgetter(full) for full in taken],
             [self.sources.get(full) for full in taken],
             {
                 output: (k, attrgetter(output))
