@@ -133,14 +133,10 @@ class CompiledSimulation(Simulation):
         signals = {full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()}
         rows = {**outputs, **signals}
         declared = {v.name: v for v in self._compiled.model.input_layout.variables} | self._compiled.outputs
-        variables = {
-            full: (
-                "time",
-                rows[full][chosen],
-                {"units": declared[full].unit, "long_name": declared[full].description},
-            )
-            for full in kept
-        }
+        variables = {}
+        for full in kept:
+            attributes = {"units": declared[full].unit, "long_name": declared[full].description}
+            variables[full] = "time", rows[full][chosen], attributes
         return xr.Dataset(variables, {"time": ("time", times[chosen], {"units": "s", "long_name": "time"})})
 
     def save(self) -> float:
@@ -222,10 +218,8 @@ def _advance(
             hasattr(run_signals[full], "changes") or run_signals[full] != signal for run_signals in signals
         )
     ]
-    changes = max(
-        (len(getattr(run_signals[full], "changes", ())) for run_signals in signals for full in driven),
-        default=0,
-    )
+    profiles = [getattr(run_signals[full], "changes", ()) for run_signals in signals for full in driven]
+    changes = max(map(len, profiles), default=0)
     loop = Transients(
         system.model, outputs, varying=varying, driven=driven, guarded=list(guards), changes=changes
     )

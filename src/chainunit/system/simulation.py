@@ -281,14 +281,11 @@ class FmuSimulation(Simulation):
 
     def _handles(self, fulls: Iterable[str]) -> list[tuple[Instance, Any, list[str]]]:
         """Instances, handles and full names, by component."""
-        return [
-            (
-                self._instances[name],
-                self._instances[name].handle([full.partition(".")[2] for full in group]),
-                group,
-            )
-            for name, group in self._by_instance(fulls).items()
-        ]
+        handles = []
+        for name, group in self._by_instance(fulls).items():
+            instance = self._instances[name]
+            handles.append((instance, instance.handle([full.partition(".")[2] for full in group]), group))
+        return handles
 
     def _signal_inputs(self) -> list[tuple[Instance, Any, list[str]]]:
         """Handles of the inputs with signals."""
