@@ -61,9 +61,8 @@ class Mechanism:
             pins.update(zip(connections.pins, solved.pins, strict=True))
             for bar, link in zip(group.bars, solved.links, strict=True):
                 links[bar.name] = link
-                if bar.points:
-                    for point, (s, t) in bar.points.items():
-                        pins[point] = link.beside(s, t)
+                for point, (s, t) in bar.points.items():
+                    pins[point] = link.beside(s, t)
                 if bar.mass is not None:
                     self.bodies[bar.name] = body_on(link, bar.mass)
             self.slides.update(zip(connections.guides, solved.slides, strict=True))
