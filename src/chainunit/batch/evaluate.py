@@ -366,8 +366,8 @@ class Grid:
 
     def compute(self, memory: Memory, workers: int) -> None:
         """Fill the memory with results and reasons."""
-        traced, (outer, inner), reduced = self._equations, self.size, self._reduced
-        if not outer:
+        traced, reduced = self._equations, self._reduced
+        if not self.size[0]:
             return
         entries = self._entries()
         if (kernel := self._kernel(entries)) is not None:
@@ -383,9 +383,7 @@ class Grid:
         else:
             states = memory
             if reduced:
-                states = Memory(
-                    np.empty((len(traced.results), outer, inner)), np.zeros((outer, inner), np.int16)
-                )
+                states = Memory(np.empty((len(traced.results), *self.size)), np.zeros(self.size, np.int16))
             arrays.by_numpy(traced.operations, entries, states.results, states.reason, traced.not_finite)
             if reduced:
                 self._reduce(states, memory)
