@@ -246,7 +246,7 @@ class InverseMachine(LinkageModel, MachineModel):
     def _direct_of(self, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> DirectMachine:
         """The direct model of the kind `base`, with further fields of its `parameters`, and `more` attributes."""
         port, stated = self.driver_port, fields_of(self.Parameters)
-        # as bases, the start wins over the machine: what both declare, is declared once more by the machine
+        # of two bases with one name the first wins, so that the fields of the machine are declared once more
         starts = [field for field in stated if field[0] in names_of(port.start)]
         inputs = fields_of(self.Inputs, without=names_of(ShaftMotion))
         outputs = fields_of(self.Outputs, without=("tau", *names_of(port.values)))
