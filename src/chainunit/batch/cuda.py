@@ -17,7 +17,7 @@ from ..core.printing.c_forms import c_file
 from ..core.printing.vector_code import VectorCode, header
 from .equations import Equations
 from .native import defines
-from .reductions import Reductions, first_rows
+from .reductions import Reductions, row_count
 
 _WARP, _BLOCK, _RESIDENT = 32, 64, 4
 """Number of threads of a warp and of a block, and of the blocks on a processor of the device. With more blocks the
@@ -75,7 +75,7 @@ def source(equations: Equations, code: VectorCode, reductions: Reductions) -> st
     sizes = {
         "BLOCK": _BLOCK,
         "RESIDENT": _RESIDENT,
-        "COUNTERS": first_rows(reductions)[-1] if has_counts else 1,
+        "COUNTERS": row_count(reductions) if has_counts else 1,
     }
     return "\n".join(
         [
@@ -104,7 +104,7 @@ class CudaKernel:
         reductions: Reductions,
         cupy: Any,
     ) -> None:
-        rows = first_rows(reductions)[-1]
+        rows = row_count(reductions)
         if any(column.bins > 1 for column in reductions) and rows > _MOST_COUNTERS:
             raise InputError(
                 f"reduce: {rows} results, bins of histograms included: the engine 'cuda' has room for "

@@ -366,8 +366,8 @@ class Grid:
 
     def compute(self, memory: Memory, workers: int) -> None:
         """Fill the memory with results and reasons."""
-        traced, (outer, inner), reduced = self._equations, self.size, self._reduced
-        if not outer:
+        traced, reduced = self._equations, self._reduced
+        if not self.size[0]:
             return
         entries = self._entries()
         if (kernel := self._kernel(entries)) is not None:
@@ -383,23 +383,23 @@ class Grid:
         else:
             states = memory
             if reduced:
-                states = Memory(
-                    np.empty((len(traced.results), outer, inner)), np.zeros((outer, inner), np.int16)
-                )
+                states = Memory(np.empty((len(traced.results), *self.size)), np.zeros(self.size, np.int16))
             arrays.by_numpy(traced.operations, entries, states.results, states.reason, traced.not_finite)
             if reduced:
                 self._reduce(states, memory)
         self._refuse(memory)
 
     def _reduce(self, states: Memory, memory: Memory) -> None:
-        """Reduce stored states."""
+        """Reduce the inner dimension of stored `states` into `memory`: a row with a state without results has the
+        largest reason of its states, and no results."""
         memory.reason[...] = np.max(states.reason, axis=1)
         rows = iter(memory.results)
         for column, request in self._reduced:
             with np.errstate(invalid="ignore"):
-                parts = by_array(request, states.results[column.place])
-            for part in parts:
-                next(rows)[...] = np.where(memory.reason == 0, part, np.nan)
+                reduced = by_array(request, states.results[column.place])
+            # several for a histogram, one for each bin
+            for result in reduced:
+                next(rows)[...] = np.where(memory.reason == 0, result, np.nan)
 
     def _entries(self) -> dict[tuple[int, int], Any]:
         sizes = self._equations.sizes

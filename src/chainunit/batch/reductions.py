@@ -181,9 +181,9 @@ def by_array(request: str | Beyond | Histogram, x: Any) -> Any:
     return REDUCTIONS[request].of_array(x)[None]
 
 
-def first_rows(reductions: Reductions) -> list[int]:
-    """The row of the first result of each reduction, and the number of all rows."""
-    return list(accumulate((column.bins for column in reductions), initial=0))
+def row_count(reductions: Reductions) -> int:
+    """The number of rows of results, with one for each bin of a histogram."""
+    return sum(column.bins for column in reductions)
 
 
 def loop_text(reductions: Reductions) -> Mapping[str, str]:
@@ -196,7 +196,8 @@ def loop_text(reductions: Reductions) -> Mapping[str, str]:
     rows of a histogram); a loop in parts PART and PART_COUNTS.
     """
     begin, take, parts, end = [], [], [], []
-    for k, (column, row) in enumerate(zip(reductions, first_rows(reductions), strict=False)):
+    first_rows = accumulate((column.bins for column in reductions), initial=0)
+    for k, (column, row) in enumerate(zip(reductions, first_rows, strict=False)):
         y = f"y[{column.place}]"
         if column.name == "histogram":
             begin.append(f"BINS(H{k},{row},{column.bins})")

@@ -122,20 +122,17 @@ def quotient(unit: str, by: str) -> str:
         return "W"
     powers: dict[str, int] = {}
     for sign, text in ((1, unit), (-1, by)):
-        for side, part in zip((sign, -sign), text.split("/"), strict=False):
-            for factor in part.strip("()").split("."):
-                name, power = re.fullmatch(r"([A-Za-z]+|1)(-?\d*)", factor).groups()  # type: ignore[union-attr]
-                powers[name] = powers.get(name, 0) + side * int(power or 1)
+        numerator, _, denominator = text.partition("/")
+        for part_sign, part in ((sign, numerator), (-sign, denominator)):
+            for name, power in re.findall(r"([A-Za-z]+|1)(-?\d*)", part):
+                powers[name] = powers.get(name, 0) + part_sign * int(power or 1)
     powers.pop("1", None)
-
-    def product(sign: int) -> list[str]:
-        return [
-            f"{name}{p if p > 1 else ''}" for name, p in ((n, sign * q) for n, q in powers.items()) if p > 0
-        ]
-
-    above, below = ".".join(product(1)) or "1", product(-1)
-    under = below[0] if len(below) == 1 else f"({'.'.join(below)})"
-    return f"{above}/{under}" if below else above
+    above = [f"{name}{p if p > 1 else ''}" for name, p in powers.items() if p > 0]
+    below = [f"{name}{-p if p < -1 else ''}" for name, p in powers.items() if p < 0]
+    numerator, denominator = ".".join(above) or "1", ".".join(below)
+    if len(below) > 1:
+        denominator = f"({denominator})"
+    return f"{numerator}/{denominator}" if below else numerator
 
 
 MOST: dict[str, float] = {

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from .integrators import MAX_STEPS
 from .model import Model, Requirement, Terminal
@@ -71,11 +71,10 @@ class Member:
 class SystemDescription:
     """What all values of a system share, from its description.
 
-    The description has the `name` and `title` of the model, the
-    `connections`, the inputs and outputs that are `left_out`, the free `terminals` by full name, the `extra` outputs
-    besides the variables of the first parts; the outputs in the order of their dependencies, all (`steps`), the
-    outputs for the derivatives (`rate_steps`) and for the constraints (`closed_steps`); and the order of the `start`,
-    in which no outputs stand for the states.
+    The description has the `name` and `title` of the model, the `connections`, the inputs and outputs that are
+    `left_out`, the free `terminals` by full name, the `extra` outputs besides the variables of the first parts; the
+    outputs in the order of their dependencies, all (`steps`), the outputs for the derivatives (`rate_steps`) and for
+    the constraints (`closed_steps`); and the order of the `start`, in which no outputs stand for the states.
     """
 
     def __init__(self, data: Mapping[str, Any], models: Mapping[str, Model]) -> None:
@@ -90,12 +89,9 @@ class SystemDescription:
         common = {
             f"{name}.{setting}": setting for name in self.models for setting in SOLVER if self.has_states
         }
-        settings = [
-            (_SOLVER, SystemSolver, group(SystemSolver, "internal integrator", default=SystemSolver()))
-        ]
-        self.Parameters = self._declared(
-            "Parameters", lambda model: model.Parameters, common, settings if self.has_states else ()
-        )
+        solver = group(SystemSolver, "internal integrator", default=SystemSolver())
+        settings = [(_SOLVER, SystemSolver, solver)] if self.has_states else []
+        self.Parameters = self._declared("Parameters", lambda model: model.Parameters, common, settings)
         inputs = left_out | set(self.sources)
         self.Inputs = self._declared("Inputs", lambda model: model.Inputs, inputs)
         self.States = self._declared("States", lambda model: model.States, ())
@@ -140,16 +136,13 @@ class SystemDescription:
         return declared_class("FurtherOutputs", (), fields) if fields else None
 
     def _member(self, name: str, model: Model, inputs: Iterable[str], common: Mapping[str, str]) -> Member:
-        def getter(full: str) -> Any:
-            return attrgetter(full)
-
         parameters = [f"{name}.{parameter}" for parameter in model.parameter_layout.names]
         taken = [f"{name}.{variable}" for variable in model.input_layout.names]
         return Member(
             name,
             model,
-            [getter(common.get(full, full)) for full in parameters],
-            [None if full in {*inputs} else getter(full) for full in taken],
+            [attrgetter(common.get(full, full)) for full in parameters],
+            [None if full in {*inputs} else attrgetter(full) for full in taken],
             [self.sources.get(full) for full in taken],
             {
                 output: (k, attrgetter(output))
@@ -232,6 +225,14 @@ class SystemDescription:
         return kept
 
 
+class _Evaluation(NamedTuple):
+    """A component at one point: its inputs, what its parts share, and the outputs of the computed parts by number."""
+
+    inputs: Any
+    shared: Any
+    parts: dict[int, Any]
+
+
 class SystemPoint:
     """A system at one point: the values of its connected outputs as far as they are known.
 
@@ -246,7 +247,7 @@ class SystemPoint:
         self.p = description.parameters(p)
         self._states = dict(states)
         self._known: dict[str, Any] = {}
-        self._final: dict[str, tuple[Any, Any, dict[int, Any]]] = {}
+        self._final: dict[str, _Evaluation] = {}
 
     def begin(self, name: str, states: Callable[[], Any]) -> None:
         """Give a component its states, which are computed when they are needed."""
@@ -284,36 +285,30 @@ class SystemPoint:
         return self._xp, self.p[name], self.inputs(name)[0], self.states(name)
 
     def advance(self, steps: Steps) -> None:
-        """Compute these outputs."""
+        """Compute the outputs of these steps that are not yet known, and keep them for the inputs that take them."""
         for name, outputs in steps:
             missing = [output for output in outputs if self._source(f"{name}.{output}") is None]
-            if missing:
-                self._known |= {
-                    f"{name}.{variable}": value for variable, value in self.outputs(name, missing)
-                }
+            for output, value in self.outputs(name, missing) if missing else ():
+                self._known[f"{name}.{output}"] = value
 
     def outputs(self, name: str, wanted: Iterable[str]) -> Iterator[tuple[str, Any]]:
-        """These outputs of a component, with the inputs that are known so far."""
-        member, sites = self._of.members[name], self._of.members[name].sites
-        parts = self._parts(name)
+        """These outputs of a component by name, with the inputs that are known so far."""
+        member, evaluation = self._of.members[name], self._evaluation(name)
+        u, shared, parts = evaluation.inputs, evaluation.shared, evaluation.parts
         for output in wanted:
-            k, get = sites[output]
-            if k not in parts[2]:
-                u, shared, computed = parts
+            k, get = member.sites[output]
+            if k not in parts:
                 equations = member.model.parts[k].equations
-                computed[k] = equations(self._xp, self.p[name], u, self.states(name), shared)
-            yield output, get(parts[2][k])
+                parts[k] = equations(self._xp, self.p[name], u, self.states(name), shared)
+            yield output, get(parts[k])
 
-    def _parts(self, name: str) -> tuple[Any, Any, dict[int, Any]]:
+    def _evaluation(self, name: str) -> _Evaluation:
+        """The evaluation of a component with the inputs that are known; it is kept once all of them are."""
         if name in self._final:
             return self._final[name]
         u, complete = self.inputs(name)
-        model = self._of.models[name]
-        parts: tuple[Any, Any, dict[int, Any]] = (
-            u,
-            model.shared(self._xp, self.p[name], u, self.states(name)),
-            {},
-        )
+        shared = self._of.models[name].shared(self._xp, self.p[name], u, self.states(name))
+        evaluation = _Evaluation(u, shared, {})
         if complete:
-            self._final[name] = parts
-        return parts
+            self._final[name] = evaluation
+        return evaluation

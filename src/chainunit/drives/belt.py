@@ -18,9 +18,11 @@ _SECTIONS = (("SPZ", 0.063, 72.0), ("SPA", 0.09, 260.0), ("SPB", 0.14, 1000.0), 
 _DIAMETER = 0.027
 """Diameter of a small pulley over the third root of its design torque [m/(N m)^(1/3)]."""
 _LARGER = 1.6
-"""Most a small pulley is larger than the usual one, so that a standard one fits its ratio."""
+"""Largest small pulley over the usual one, so that a standard pair fits the ratio."""
 _FINE = 0.315
 """Largest small pulley of the finer series [m]."""
+_ONE_SIZE = 1.13
+"""Largest small pulley over the usual one beyond `_FINE`: the range has a standard size in any case."""
 _NEAR = 0.02
 """Deviation of the ratio that is near enough for the smaller of two pairs."""
 
@@ -42,16 +44,19 @@ def belt_drive(power: float, w: float, ratio: float, factor: float) -> BeltDrive
     standard pulleys that are nearest to its `ratio`."""
     design = power * factor
     torque = design / w
-    section, least, _ = next(row for row in _SECTIONS if torque <= row[2])
-    wanted = max(least, _DIAMETER * torque ** (1.0 / 3.0))
-    small_sizes, large_sizes = (
-        [float(f"{10.0**decade * numeral:.4g}") for decade in (-2, -1, 0) for numeral in SERIES[name]]
-        for name in ("R40", "R20")
-    )
-    pairs = [
-        (small, nearest(small * ratio, large_sizes))
-        for small in small_sizes
-        if wanted * (1.0 - 1e-9) <= small <= max(min(_LARGER * wanted, _FINE), wanted * 1.13)
-    ]
-    small, large = min(pairs, key=lambda pair: (max(_NEAR, abs(pair[1] / pair[0] / ratio - 1.0)), pair[0]))
+    section, least = next((name, least) for name, least, most in _SECTIONS if torque <= most)
+    usual = max(least, _DIAMETER * torque ** (1.0 / 3.0))
+    largest = max(min(_LARGER * usual, _FINE), usual * _ONE_SIZE)
+    # each with its deviation of the ratio first: of pairs that are near enough, the one with the smaller pulley
+    pairs = []
+    for small in _diameters("R40"):
+        if usual * (1.0 - 1e-9) <= small <= largest:
+            large = nearest(small * ratio, _diameters("R20"))
+            pairs.append((max(_NEAR, abs(large / small / ratio - 1.0)), small, large))
+    _, small, large = min(pairs)
     return BeltDrive(design, section, small, large, 0.5 * small * w)
+
+
+def _diameters(series: str) -> list[float]:
+    """The diameters of standard pulleys, 10 mm to 10 m [m]."""
+    return [float(f"{10.0**decade * numeral:.4g}") for decade in (-2, -1, 0) for numeral in SERIES[series]]

@@ -45,18 +45,20 @@ class GearOutputs(PortSlopes, PortValues):
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> GearOutputs:
-    r, load = p.ratio, u.load
-    phi, w, a = u.phi / r, u.w / r, u.a / r
+    """The load port of the machine as the motor sees it: the motor's angle and speed are `ratio` times larger, its
+    torque so much smaller; a derivative by its angle, speed or acceleration divides by the ratio once more."""
+    ratio, load = p.ratio, u.load
+    phi, w, a = u.phi / ratio, u.w / ratio, u.a / ratio
     tau = load_inertia(load, phi) * a + load_torque(load, phi, w)
     return GearOutputs(
-        tau_bias=load.tau_bias / r,
-        J=load.J / (r * r),
-        dJ_dphi=load.dJ_dphi / (r * r * r),
-        phi0=load.phi0 * r,
-        w0=load.w0 * r,
-        tau_bias_dphi=load.tau_bias_dphi / (r * r),
-        tau_bias_dw=load.tau_bias_dw / (r * r),
-        tau=tau / r,
+        tau_bias=load.tau_bias / ratio,
+        J=load.J / (ratio * ratio),
+        dJ_dphi=load.dJ_dphi / (ratio * ratio * ratio),
+        phi0=load.phi0 * ratio,
+        w0=load.w0 * ratio,
+        tau_bias_dphi=load.tau_bias_dphi / (ratio * ratio),
+        tau_bias_dw=load.tau_bias_dw / (ratio * ratio),
+        tau=tau / ratio,
         power=tau * w,
         driven=SlowShaft(phi=phi, w=w, a=a, tau=tau),
     )

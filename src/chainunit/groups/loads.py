@@ -299,18 +299,19 @@ class GuideLosses(NamedTuple):
         friction, by_speed = self.guide.friction, turning is None
         for joint, slide in m.slides.items():
             k, loss = slide.s1, self.damping
-            grown = self._growing(m, joint, reactions[joint], growing[joint], by_speed)
-            for press, more in zip(self._presses(m, joint, reactions[joint]), grown, strict=True):
+            presses = self._presses(m, joint, reactions[joint])
+            slopes = self._press_slopes(m, joint, reactions[joint], growing[joint], by_speed)
+            for press, press_slope in zip(presses, slopes, strict=True):
                 k2, minus_per, ratio = _friction_terms(xp, press * press, k, w2, smooth2)
                 wider = k2 * w if by_speed else k * slide.s2 * w2
-                grows = (ratio * ratio * wider - press * more) * (minus_per / ratio)
+                grows = (ratio * ratio * wider - press * press_slope) * (minus_per / ratio)
                 slope = slope + k2 * (friction * grows)
                 loss = loss + friction * ratio
             rest = rest + (k * k * loss if by_speed else 2.0 * (k * slide.s2) * loss)
         return slope * w + (rest if by_speed else rest * w)
 
     def _presses(self, m: Moving, joint: Joint, reaction: Vec2) -> tuple[Any, ...]:
-        """The forces with which a block bears."""
+        """The forces with which a block bears [N]: at its two ends, or the one of a point."""
         n = m.slides[joint].d.turned()
         normal = reaction.dot(n)
         if joint not in self.lengths:
@@ -318,21 +319,22 @@ class GuideLosses(NamedTuple):
         arm = m.pins[joint[0]].p - m.links[joint[1]].pin.p
         return _ends(normal, _couple(reaction) - arm.cross(reaction), self.lengths[joint])
 
-    def _growing(
+    def _press_slopes(
         self, m: Moving, joint: Joint, reaction: Vec2, growing: Vec2, by_speed: bool
     ) -> tuple[Any, ...]:
-        """The derivatives of these forces. By q the line of the guide turns, and the arm of the force with it."""
+        """The derivatives of `_presses` by q, or by the speed; `growing` is the derivative of the reaction in a guide
+        that does not turn. By q the guide turns, and the reaction with it, and the arm of the reaction moves."""
         link, n = m.links[joint[1]], m.slides[joint].d.turned()
-        more = growing.dot(n)
+        normal_slope = growing.dot(n)
         if joint not in self.lengths:
-            return (more,)
+            return (normal_slope,)
         pin = m.pins[joint[0]]
-        arm, moment = pin.p - link.pin.p, _couple(growing)
-        moment = moment - arm.cross(n * more)
+        arm, moment_slope = pin.p - link.pin.p, _couple(growing)
+        moment_slope = moment_slope - arm.cross(n * normal_slope)
         if not by_speed:
             turned = reaction.turned() * link.t1
-            moment = moment - (pin.p1 - link.pin.p1).cross(reaction) - arm.cross(turned)
-        return _ends(more, moment, self.lengths[joint])
+            moment_slope = moment_slope - (pin.p1 - link.pin.p1).cross(reaction) - arm.cross(turned)
+        return _ends(normal_slope, moment_slope, self.lengths[joint])
 
 
 def _couple(reaction: Vec2) -> Any:
@@ -341,9 +343,9 @@ def _couple(reaction: Vec2) -> Any:
 
 
 def _ends(normal: Any, moment: Any, length: Any) -> tuple[Any, Any]:
-    """The forces at the ends of a block."""
-    half, more = 0.5 * normal, moment / length
-    return half + more, half - more
+    """The forces at the ends of a block, by the normal force and the moment about its middle."""
+    half, couple = 0.5 * normal, moment / length
+    return half + couple, half - couple
 
 
 def _friction_terms(xp: Any, square: Any, slip: Any, w2: Any, smooth2: Any) -> tuple[Any, Any, Any]:

@@ -189,56 +189,59 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
         for a machine whose outputs depend on states.
     """
     resting, model = _AtRest(machine, feed), machine.model
-    low, high = model.span
-    q = np.linspace(low, high, 361)
+    q = np.linspace(*model.span, 361)
     state = resting.state(q)
     size = _size(state, q)
-    bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
-    nothing, repeats = _NOTHING * size, True
-    if model.turns:
-        # the same place of another turn; no round angle, at which a torque may jump
-        odd = low + _ODD * np.arange(1, 8)
-        gap = resting.torque(odd + _TURN)[0] - resting.torque(odd)[0]
-        repeats = bool(np.all(np.abs(gap) <= 1e3 * nothing))
-        if repeats:
-            # no zero lies at the begin of the turn
-            first = int(np.argmax(np.abs(bias)))
-            low = float(q[first]) if abs(bias[first]) > nothing else low
-            high = low + _TURN
-        else:
-            low, high = low - 0.5 * _TURN, low + 0.5 * _TURN
+    nothing = _NOTHING * size
+    (low, high), repeats = _way(resting, q, np.broadcast_to(state.bias, q.shape), nothing)
+    around = model.turns and repeats
     curve = sampled(resting.torque, low, high)
     # a driver on its stop is pushed back by it
     crossings = _zeros(resting, curve, nothing, None if model.turns else (-1.0, 1.0))
     driven = resting.loads_without_potential(curve.x, nothing)
     places = np.array([x for zero in crossings for x in (zero.begin, zero.end)])
-    rest, work = _rest(resting, curve, places, not driven, model.turns and repeats)
-    closes = not (model.turns and repeats) or abs(work) <= _CLOSES * size * _TURN
-    rest = rest._replace(potential=rest.potential if closes else None)
-    level = _LEVEL * size * (high - low)
-    limits = nothing, _FLAT * size / (high - low), _LIGHT * float(np.max(inertia)), level
-    way = _Judged(low, high, not model.turns, *limits)
-    listed = [_equilibrium(resting, zero, rest, way) for zero in crossings]
-    if model.turns and repeats:
+    rest, work = _rest(resting, curve, places, not driven, around)
+    closes = abs(work) <= _CLOSES * size * (high - low)
+    if around and not closes:
+        rest = rest._replace(potential=None)
+    flat, level = _FLAT * size / (high - low), _LEVEL * size * (high - low)
+    way = _Judged(low, high, not model.turns, nothing, flat, _LIGHT * float(np.max(state.J)), level)
+    places_of_rest = [_equilibrium(resting, zero, rest, way) for zero in crossings]
+    if around:
         rest = _from_start(rest, model.span[0])
-        listed = [_folded(equilibrium) for equilibrium in listed]
-    at_peak, _ = largest(
-        lambda x: np.abs(resting.torque(x)[0])[None],
-        np.linspace(low, high, 361),
-        around=model.turns and repeats,
-    )
-    peak, peak_at = float(resting.torque(at_peak)[0][0]), float(at_peak[0])
-    if abs(peak) <= nothing:
-        peak, peak_at = 0.0, model.span[0]
-    summary = Holding(
-        peak=peak,
-        peak_at=peak_at % _TURN if model.turns and repeats else peak_at,
-        work=0.0 if abs(work) <= _CLOSES * size * (high - low) else work,
-        friction=float(np.max(rest.friction)),
-    )
-    return Equilibria(
-        tuple(sorted(listed, key=lambda equilibrium: equilibrium.place)), summary, rest, driven, repeats
-    )
+        places_of_rest = [_folded(equilibrium) for equilibrium in places_of_rest]
+    peak, peak_at = _peak(resting, way, around)
+    work, friction = 0.0 if closes else work, float(np.max(rest.friction))
+    summary = Holding(peak=peak, peak_at=peak_at, work=work, friction=friction)
+    ascending = sorted(places_of_rest, key=lambda equilibrium: equilibrium.place)
+    return Equilibria(tuple(ascending), summary, rest, driven, repeats)
+
+
+def _way(resting: _AtRest, q: Any, holding: Any, nothing: float) -> tuple[tuple[float, float], bool]:
+    """The ends of the way on which equilibria are sought, and whether the loads are the same after a turn. A turn of
+    such loads begins where the `holding` torque at the places `q` is largest, so that no zero lies at its begin."""
+    model = resting.machine.model
+    low, high = model.span
+    if not model.turns:
+        return (low, high), True
+    # no round angles, at which a torque may jump
+    odd = low + _ODD * np.arange(1, 8)
+    gap = resting.torque(odd + _TURN)[0] - resting.torque(odd)[0]
+    if not np.all(np.abs(gap) <= 1e3 * nothing):
+        return (low - 0.5 * _TURN, low + 0.5 * _TURN), False
+    first = int(np.argmax(np.abs(holding)))
+    low = float(q[first]) if abs(holding[first]) > nothing else low
+    return (low, low + _TURN), True
+
+
+def _peak(resting: _AtRest, way: _Judged, around: bool) -> tuple[float, float]:
+    """The holding torque that is largest in size [N m], and its place [rad]."""
+    q = np.linspace(way.low, way.high, 361)
+    at_peak, _ = largest(lambda x: np.abs(resting.torque(x)[0])[None], q, around=around)
+    peak, place = float(resting.torque(at_peak)[0][0]), float(at_peak[0])
+    if abs(peak) <= way.nothing:
+        peak, place = 0.0, resting.machine.model.span[0]
+    return peak, place % _TURN if around else place
 
 
 def _size(state: MachineState, q: Any) -> float:
@@ -293,9 +296,8 @@ def _rest(
         potential = energy + np.concatenate([[0.0], np.cumsum(parts)])
     elif around:
         potential[-1] = potential[0]
-    return Rest(x, bias, friction, inertia, potential - np.min(potential)), float(
-        potential[-1] - potential[0]
-    )
+    work = float(potential[-1] - potential[0])
+    return Rest(x, bias, friction, inertia, potential - np.min(potential)), work
 
 
 class _Judged(NamedTuple):

@@ -37,11 +37,11 @@ def covariance_rates(
     The first unknown is measured, with a noise of the density 1/`rate`; its rate has the `gradient` by all unknowns.
     The others decay by themselves with the rates `decay`. `density` are the densities of the noise that drives each.
     """
-    forced = [sum(a * p for a, p in zip(gradient, row, strict=True)) for row in P]
+    with_rate = [sum(a * p for a, p in zip(gradient, row, strict=True)) for row in P]
     rates = []
     for i, j in TRIANGLE:
         entry = -(P[i][0] * P[j][0] * rate) - (decay[i] + decay[j]) * P[i][j]
-        rates.append(entry + _driven(i, j, forced, density))
+        rates.append(entry + _driving_term(i, j, with_rate, density))
     return rates
 
 
@@ -58,21 +58,23 @@ def error_rates(
 
         dS/dt = (A - K C) S + S (A - K C)' + Q + K K'/rate
     """
-    forced = [sum(a * s for a, s in zip(gradient, row, strict=True)) for row in S]
+    with_rate = [sum(a * s for a, s in zip(gradient, row, strict=True)) for row in S]
     rates = []
     for i, j in TRIANGLE:
         corrected = gain[i] * S[0][j] + gain[j] * S[0][i] - gain[i] * gain[j] / rate
-        rates.append(_driven(i, j, forced, density) - corrected - (decay[i] + decay[j]) * S[i][j])
+        driving = _driving_term(i, j, with_rate, density)
+        rates.append(driving - corrected - (decay[i] + decay[j]) * S[i][j])
     return rates
 
 
-def _driven(i: int, j: int, forced: Sequence[Any], density: Sequence[Any]) -> Any:
-    """The part of an entry's rate by the rate of the first unknown and by the driving noise."""
+def _driving_term(i: int, j: int, with_rate: Sequence[Any], density: Sequence[Any]) -> Any:
+    """Entry (i, j) of A P + P A' + Q without the decay. `with_rate` has the covariance of each unknown with the rate
+    of the first one, the only rate that depends on other unknowns: so only the first row and column take it."""
     entry: Any = density[i] if i == j else 0.0
     if i == 0:
-        entry = entry + forced[j]
+        entry = entry + with_rate[j]
     if j == 0:
-        entry = entry + forced[i]
+        entry = entry + with_rate[i]
     return entry
 
 

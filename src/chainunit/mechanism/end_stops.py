@@ -57,20 +57,21 @@ def stop_action(xp: Any, law: EndStops, span: tuple[float, float], q: Any, w: An
     """The action of the stops at both ends of the `span` [m, rad] at place `q` [m, rad] and speed `w` [m/s, rad/s] of
     the driver.
 
-    A stop never pulls: where its damper would, it holds back the spring. So the spring alone is conservative, and
-    `lost` times `w` is never negative.
+    A stop never pulls on the driver: as the driver leaves it, its damper takes away at most the force of its spring.
+    So the spring alone is conservative, and `lost` times `w` is never negative.
     """
     low, high = span
     width = CONTACT * (high - low)
 
-    def one(depth: Any, speed: Any) -> StopAction:
+    def action_of_stop(depth: Any, speed: Any) -> StopAction:
+        # the force begins smoothly, over the width beyond the end of the range
         depth = depth - 0.5 * width
         spring = law.stiffness * positive(xp, depth, width)
         damper = law.damping * speed * step(xp, depth, width)
-        # one part of the spring's force, which is 1 without a damper
+        # force of spring and damper over that of the spring
         share = positive(xp, 1.0 + damper / (spring + law.stiffness * width), ROUNDED)
         energy = law.stiffness * positive_integral(xp, depth, width)
-        return StopAction(spring * share, energy, spring * (share - 1.0))
+        return StopAction(force=spring * share, energy=energy, lost=spring * (share - 1.0))
 
-    upper, lower = one(q - high, w), one(low - q, -w)
+    upper, lower = action_of_stop(q - high, w), action_of_stop(low - q, -w)
     return StopAction(upper.force - lower.force, upper.energy + lower.energy, upper.lost - lower.lost)

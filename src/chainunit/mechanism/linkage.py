@@ -19,16 +19,24 @@ from ..groups.joints import TURNS, Joint
 from .extremes import MotionExtreme
 
 
+class ConnectedJoint(NamedTuple):
+    """A joint with its `carrier`, the link on which the opposite reaction acts, None for the ground. `before` is the
+    carrier if an earlier group has it, else None."""
+
+    joint: Joint
+    carrier: str | None
+    before: str | None
+
+
 class Connections(NamedTuple):
-    """How a group hangs in its linkage: names of its links, of the pins that it adds, and its joints: each with the
-    link on which the opposite reaction acts, None for the ground, and again that link where it stands before the
-    group. `guides` are those of its joints that slide, `hinges` those that turn, each with the same link."""
+    """How a group hangs in its linkage: the names of its `links`, the `pins` that it adds, and its `joints`, of which
+    the `guides` slide and the `hinges` turn."""
 
     links: tuple[str, ...]
     pins: tuple[str, ...]
-    joints: tuple[tuple[Joint, str | None, str | None], ...]
+    joints: tuple[ConnectedJoint, ...]
     guides: tuple[Joint, ...]
-    hinges: tuple[tuple[Joint, str | None], ...]
+    hinges: tuple[ConnectedJoint, ...]
 
 
 class Topology(NamedTuple):
@@ -42,14 +50,14 @@ class Topology(NamedTuple):
     @property
     def joints(self) -> tuple[Joint, ...]:
         """Pin and link of each reaction."""
-        return tuple(joint for group in self.groups for joint, *_ in group.joints)
+        return tuple(connected.joint for group in self.groups for connected in group.joints)
 
     @property
     def links(self) -> dict[str, tuple[str, ...]]:
         """The pins and points on each link, to draw it; the pin that the link starts from stands first."""
         pins: dict[str, dict[str, None]] = {link: {} for group in self.groups for link in group.links}
         held = {*(joint for group in self.groups for joint in group.guides)}
-        held |= {joint for group in self.groups for joint, _ in group.hinges}
+        held |= {connected.joint for group in self.groups for connected in group.hinges}
         for pin, link in (*(joint for joint in self.joints if joint in held), *self.carries.items()):
             pins[link][pin] = None
         return {link: tuple(names) for link, names in pins.items()}
@@ -73,20 +81,20 @@ class Linkage:
         carries: dict[str, str] = {}
         groups, points = [], {}
         for group in (self.driver, *self.groups):
-            inner, bars, guides = group.pins, group.bars, group.guides
-            links = tuple(bar.name for bar in bars)
-            carries |= inner
+            links = tuple(bar.name for bar in group.bars)
+            carries |= group.pins
             joints, hinges = [], []
             for joint in group.joints:
-                name = joint.pin, joint.link
                 carrier = joint.carrier(carries)
-                joints.append((name, carrier, None if carrier in links else carrier))
+                before = None if carrier in links else carrier
+                joints.append(ConnectedJoint((joint.pin, joint.link), carrier, before))
                 if joint.form == TURNS:
-                    hinges.append((name, carrier))
-            for bar in bars:
+                    hinges.append(joints[-1])
+            for bar in group.bars:
                 carries |= dict.fromkeys(bar.points, bar.name)
                 points[bar.name] = tuple(bar.points)
-            groups.append(Connections(links, tuple(inner), tuple(joints), tuple(guides), tuple(hinges)))
+            pins, guides = tuple(group.pins), tuple(group.guides)
+            groups.append(Connections(links, pins, tuple(joints), guides, tuple(hinges)))
         return Topology(carries, tuple(groups), points)
 
     @property

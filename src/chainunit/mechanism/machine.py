@@ -61,13 +61,12 @@ class Mechanism:
             pins.update(zip(connections.pins, solved.pins, strict=True))
             for bar, link in zip(group.bars, solved.links, strict=True):
                 links[bar.name] = link
-                if bar.points:
-                    for point, (s, t) in bar.points.items():
-                        pins[point] = link.beside(s, t)
+                for point, (s, t) in bar.points.items():
+                    pins[point] = link.beside(s, t)
                 if bar.mass is not None:
                     self.bodies[bar.name] = body_on(link, bar.mass)
             self.slides.update(zip(connections.guides, solved.slides, strict=True))
-            for joint, carrier in connections.hinges:
+            for joint, carrier, _ in connections.hinges:
                 turn = links[joint[1]].t1
                 self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
 
@@ -107,8 +106,9 @@ class Mechanism:
             yield Wrench(connections.links[1], more, 0.0)
             yield Wrench(connections.links[0], -more, 0.0)
         for group, (_, connections) in zip(self._data, self._groups, strict=True):
-            for joint, (name, carrier, _) in zip(group.joints, connections.joints, strict=True):
-                for link, (force, moment) in joint.turning(self, carrier, reactions[name]):
+            for joint, connected in zip(group.joints, connections.joints, strict=True):
+                reaction = reactions[connected.joint]
+                for link, (force, moment) in joint.turning(self, connected.carrier, reaction):
                     yield Wrench(link, force, moment)
 
     def carrier(self, pin: str) -> str:
@@ -119,7 +119,7 @@ class Mechanism:
         """The derivatives of `turns` by q."""
         slopes = {}
         for _, connections in self._groups:
-            for joint, carrier in connections.hinges:
+            for joint, carrier, _ in connections.hinges:
                 t2 = self.links[joint[1]].t2
                 slopes[joint] = t2 if carrier is None else t2 - self.links[carrier].t2
         return slopes
@@ -136,10 +136,11 @@ class Mechanism:
         reactions: dict[Joint, Vec2] = {}
         for group, (solved, connections) in zip(reversed(self._data), reversed(self._groups), strict=True):
             forces, effort = solved.reactions([loads.get(name, NO_LOAD) for name in connections.links])
-            for joint, (name, _, before), force in zip(group.joints, connections.joints, forces, strict=True):
-                reactions[name] = force
-                if before is not None:
-                    add_wrenches(loads, [Wrench(before, *joint.opposite(self, before, force))])
+            for joint, connected, force in zip(group.joints, connections.joints, forces, strict=True):
+                reactions[connected.joint] = force
+                if connected.before is not None:
+                    opposite = joint.opposite(self, connected.before, force)
+                    add_wrenches(loads, [Wrench(connected.before, *opposite)])
         return effort, reactions
 
 

@@ -244,13 +244,12 @@ class InverseMachine(LinkageModel, MachineModel):
         return self._direct_of(DirectMachine, [more])
 
     def _direct_of(self, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> DirectMachine:
-        """The direct model of the kind `base`, with more `parameters` and attributes."""
-        outputs = fields_of(self.Outputs, without=("tau", *names_of(self.driver_port.values)))
-        # where the start declares the same name, the machine's own declaration counts
-        starts = [
-            field for field in fields_of(self.Parameters) if field[0] in names_of(self.driver_port.start)
-        ]
-        port = self.driver_port
+        """The direct model of the kind `base`, with further fields of its `parameters`, and `more` attributes."""
+        port, stated = self.driver_port, fields_of(self.Parameters)
+        # of two bases with one name the first wins, so that the fields of the machine are declared once more
+        starts = [field for field in stated if field[0] in names_of(port.start)]
+        inputs = fields_of(self.Inputs, without=names_of(ShaftMotion))
+        outputs = fields_of(self.Outputs, without=("tau", *names_of(port.values)))
         states = _of_driver(port.states, self.driver_noun)
         return base(
             name=self.direct_name,
@@ -266,9 +265,7 @@ class InverseMachine(LinkageModel, MachineModel):
                 "DirectParameters", (port.start, port.added, self.Parameters), [*starts, *parameters]
             ),
             States=declared_class("States", (states,), fields_of(self.States)) if self.States else states,
-            Inputs=declared_class(
-                "DirectInputs", (port.effort,), fields_of(self.Inputs, without=names_of(ShaftMotion))
-            ),
+            Inputs=declared_class("DirectInputs", (port.effort,), inputs),
             Outputs=declared_class("DirectOutputs", (), [*outputs, *fields_of(port.answer)]),
             **more,
         )

@@ -145,17 +145,19 @@ def inspect_motion(
     off : the time at which the motor is switched off [s]
     """
     driven = recording if off is None else recording.part(end=off)
+    least, largest = speeds
     faults = [
-        *_rows(recording, speeds[1]),
-        *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
+        *_rows(recording, largest),
+        *(_stands(recording, driven, least, ratio) or _marks(driven, speeds, ratio)),
         *_counted(recording),
     ]
-    other = _other_speed(driven, speeds[0], ratio) if faults and speeds[0] == speeds[1] else None
+    other = _other_speed(driven, least, ratio) if faults and least == largest else None
     if other is None:
         return faults
-    # at a wrong speed the rows look too few, and the machine seems to stand
-    fault = _speed_fault(recording, *other, speeds[0])
-    return [fault, *inspect_motion(recording, (other[1], other[1]), ratio, off)]
+    # at a wrong speed the rows look too few, and the machine seems to stand: the faults are those at the true one
+    column, true_speed = other
+    fault = _speed_fault(recording, column, true_speed, least)
+    return [fault, *inspect_motion(recording, (true_speed, true_speed), ratio, off)]
 
 
 def _other_speed(recording: Recording, stated: float, ratio: float) -> tuple[str, float] | None:
@@ -326,10 +328,8 @@ def inspect_steadiness(
     speeds = 2.0 * math.pi * np.round(lasts / np.median(lasts)) / lasts
     degree = min(DRIFT, (len(speeds) - 2) // 2)
     slow = np.polynomial.Polynomial.fit(middles, speeds, degree)(middles)
-    mean, spread = (
-        float(np.mean(speeds)),
-        math.sqrt(np.sum((speeds - slow) ** 2) / (len(speeds) - degree - 1)),
-    )
+    mean = float(np.mean(speeds))
+    spread = math.sqrt(np.sum((speeds - slow) ** 2) / (len(speeds) - degree - 1))
     # a mark stands in the first row behind it
     instant = recording.step / math.sqrt(6.0) / float(np.median(lasts)) if name == "mark" else 0.0
     if spread <= (WANDERS + 3.0 * instant) * mean:

@@ -90,9 +90,8 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
     stated = re.fullmatch(r'"?sep=(.)"?', lines[0][1].strip("\r\n"))
     lines = lines[1:] if stated else lines
     sample = [numbered for numbered in lines[: 2 * _SAMPLE] if numbered[1].strip()]
-    sample = sample[
-        : max(20, min(_SAMPLE, _SAMPLE * 1000 // max((len(line) for _, line in sample), default=1)))
-    ]
+    longest = max((len(line) for _, line in sample), default=1)
+    sample = sample[: max(20, min(_SAMPLE, _SAMPLE * 1000 // longest))]
     mark = stated[1] if stated and stated[1] in MARKS else _mark_of([line for _, line in sample])
     begin = _first_row(sample, mark)
     if begin < 0:
@@ -305,18 +304,19 @@ def _is_of_units(cells: Sequence[str], count: int) -> bool:
 def _body(
     file: Path, lines: Sequence[tuple[int, str]], mark: str, heads: Sequence[str], first: Sequence[str]
 ) -> tuple[list[list[str]], list[int], list[str]]:
-    """The rows of measurements with the numbers of their lines, and words on what was left out."""
+    """The rows of measurements, the numbers of their lines, and what was left out, in words."""
     width = len(heads)
     key = next((k for k, cell in enumerate(first[:width]) if _is_data(cell)), -1)
     if key < 0:
         raise InputError(f"{file}: no column with numbers has a head; write a head for each column")
     # a date and a clock between blanks are one cell under one head
     parted = mark == " " and len(first) == width + 1 and bool(DATE.fullmatch(first[key]))
-    rows, numbers, strange = list[list[str]](), list[int](), list[tuple[int, int, list[str]]]()
-    again = remarks = 0
+    rows, numbers, strange = list[list[str]](), list[int](), list[tuple[int, list[str]]]()
+    repeated = remarks = 0
     for number, line, cells in _cells(file, lines, mark):
         if parted and len(cells) > key + 1:
             cells[key : key + 2] = [f"{cells[key]} {cells[key + 1]}"]
+        # one test suffices for nearly all rows of a file
         if len(cells) != width or not cells[key][-1:].isdigit():
             if not any(cells):
                 continue
@@ -328,34 +328,36 @@ def _body(
             if len(cells) > width and not any(cells[width:]):
                 cells = cells[:width]
             if [cell.lower() for cell in cells] == [cell.lower() for cell in heads]:
-                again += 1
+                repeated += 1
                 continue
             if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
-                strange.append((len(rows), number, cells))
+                strange.append((number, cells))
                 continue
         elif "#" in cells[-1] and (last := _REMARK.sub("", f" {cells[-1]}").strip()) != cells[-1]:
             cells[-1], remarks = last, remarks + 1
         rows.append(cells)
         numbers.append(number)
-    # a row that is cut is the last one, and a footer has no number where the rows have one
-    end = max((number for _, number, _ in strange), default=0)
     wrong = [
         (number, cells)
-        for begin, number, cells in strange
-        if begin < len(rows)
-        or (key < len(cells) and _is_data(cells[key]) and not (number == end and len(cells) < width))
+        for number, cells in strange
+        if (rows and number < numbers[-1]) or not _may_end(cells, key, width, number == strange[-1][0])
     ]
     if strange and (wrong or len(strange) > _FOOTER or not rows):
-        number, cells = wrong[0] if wrong else strange[0][1:]
+        number, cells = (wrong or strange)[0]
         raise InputError(f"{file}, line {number}: {_words(cells, heads, mark)}")
-    left_out = [
-        f"{count} {noun}{'s' if count > 1 else ''}"
-        for count, noun in ((again, "repeated head"), (remarks, "comment"), (len(strange), "line"))
-        if count
-    ]
+    counts = ((repeated, "repeated head"), (remarks, "comment"))
+    left_out = [f"{count} {noun}{'s' if count > 1 else ''}" for count, noun in counts if count]
     if strange:
-        left_out[-1] += " at the end that " + ("is no row" if len(strange) == 1 else "are no rows")
+        noun, verb = ("line", "is no row") if len(strange) == 1 else ("lines", "are no rows")
+        left_out.append(f"{len(strange)} {noun} at the end that {verb}")
     return rows, numbers, left_out
+
+
+def _may_end(cells: Sequence[str], key: int, width: int, is_last: bool) -> bool:
+    """Whether a line that is no row may stand below all rows: a footer, without a number in the column `key`, or the
+    last row, which is cut."""
+    has_number = key < len(cells) and _is_data(cells[key])
+    return not has_number or (is_last and len(cells) < width)
 
 
 def _cells(file: Path, lines: Sequence[tuple[int, str]], mark: str) -> Iterator[tuple[int, str, list[str]]]:

@@ -86,21 +86,21 @@ class CompiledSimulation(Simulation):
     def __init__(
         self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
     ) -> None:
-        self._system = CompiledSystem(system)
+        self._compiled = CompiledSystem(system)
         self.time, self.signals = start_time, dict(signals or {})
-        self._graph = system
+        self._system = system
         self._check_signals()
         start = {full: float(at_time(signal, start_time)) for full, signal in self.signals.items()}
-        self._states = self._system.start(start)
+        self._states = self._compiled.start(start)
         self._saved = self.time, self._states
 
     def _check_signals(self) -> None:
         for full, signal in self.signals.items():
-            if full not in self._system.inputs:
+            if full not in self._compiled.inputs:
                 raise InputError(f"{full}: no such input of the system")
             if not is_evaluated(signal):
                 raise InputError(f"{full}: a compiled system takes numbers and profiles as signals")
-        self.signals = self._graph.in_units(self.signals, "input")
+        self.signals = self._system.in_units(self.signals, "input")
 
     @property
     def states(self) -> Any:
@@ -132,15 +132,11 @@ class CompiledSimulation(Simulation):
             chosen = np.append(chosen, len(times) - 1)
         signals = {full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()}
         rows = {**outputs, **signals}
-        declared = {v.name: v for v in self._system.model.input_layout.variables} | self._system.outputs
-        variables = {
-            full: (
-                "time",
-                rows[full][chosen],
-                {"units": declared[full].unit, "long_name": declared[full].description},
-            )
-            for full in kept
-        }
+        declared = {v.name: v for v in self._compiled.model.input_layout.variables} | self._compiled.outputs
+        variables = {}
+        for full in kept:
+            attributes = {"units": declared[full].unit, "long_name": declared[full].description}
+            variables[full] = "time", rows[full][chosen], attributes
         return xr.Dataset(variables, {"time": ("time", times[chosen], {"units": "s", "long_name": "time"})})
 
     def save(self) -> float:
@@ -204,16 +200,16 @@ def _advance(
         return []
     for simulation in simulations:
         simulation._check_signals()
-    system, signals = simulations[0]._system, [simulation.signals for simulation in simulations]
+    system, signals = simulations[0]._compiled, [simulation.signals for simulation in simulations]
     if any(
-        simulation._system.model is not system.model or simulation.signals.keys() != signals[0].keys()
+        simulation._compiled.model is not system.model or simulation.signals.keys() != signals[0].keys()
         for simulation in simulations
     ):
         raise InputError("simulations side by side must have one model, and signals of the same inputs")
     kept, guards = selected(options.names, [*system.outputs, *signals[0]]), options.guards
     needed = {*kept, *guards}
     outputs = [name for name in system.outputs if name in needed]
-    by_name = [system.model.parameter_layout.by_name(simulation._system.p) for simulation in simulations]
+    by_name = [system.model.parameter_layout.by_name(simulation._compiled.p) for simulation in simulations]
     varying = [name for name, value in by_name[0].items() if any(p[name] != value for p in by_name)]
     driven = [
         full
@@ -222,10 +218,8 @@ def _advance(
             hasattr(run_signals[full], "changes") or run_signals[full] != signal for run_signals in signals
         )
     ]
-    changes = max(
-        (len(getattr(run_signals[full], "changes", ())) for run_signals in signals for full in driven),
-        default=0,
-    )
+    profiles = [getattr(run_signals[full], "changes", ()) for run_signals in signals for full in driven]
+    changes = max(map(len, profiles), default=0)
     loop = Transients(
         system.model, outputs, varying=varying, driven=driven, guarded=list(guards), changes=changes
     )

@@ -65,10 +65,11 @@ def monolithic(
     inner = [c for c in corners(signals.values()) if times[0] < c < times[-1]]
     states = np.empty((len(x), len(times)))
     for low, high in pairwise([times[0], *inner, times[-1]]):
-        behind = float(np.nextafter(low, high))
+        # at a corner a signal that jumps still has its value of the piece before
+        first_time = float(np.nextafter(low, high))
 
-        def rates(t: float, x: Any, behind: float = behind) -> Any:
-            return equations.rates(max(t, behind), x)
+        def rates(t: float, x: Any, first_time: float = first_time) -> Any:
+            return equations.rates(max(t, first_time), x)
 
         solver = DOP853(rates, low, x, high, rtol=rtol, atol=equations.tolerances(rtol))
         states[:, times == low] = np.reshape(x, (-1, 1))
@@ -87,51 +88,55 @@ class _Equations:
     """The system as one ODE in the states of all models, at its parameters."""
 
     def __init__(self, system: System, signals: Mapping[str, Any]) -> None:
-        import casadi
-
         component = compiled(system)
         model = self._model = component.model
         values = system.values
-        self._outside = [
+        self._signals = [
             signals.get(v.name, values.get(v.name, v.quantity.start)) for v in model.input_layout.variables
         ]
         self._states = model.state_layout.variables if model.state_layout else ()
         self._outputs = model.parts[0].layout.variables
         self.states = [v.name for v in self._states]
-        p = self._p = model.with_derived(MATH, component.parameters)
-        symbols = [casadi.SX.sym(s, len(names)) for s, names in (("u", self._outside), ("x", self.states))]
+        self._p = model.with_derived(MATH, component.parameters)
+        rates, self._output_function = self._traced()
+
+        # the function reads and writes these arrays: its call with arrays of the caller costs four times as much
+        self._u = np.array([0.0 if callable(signal) else signal for signal in self._signals], float)
+        self._x, self._dxdt = np.zeros(len(self.states)), np.zeros(len(self.states))
+        self._changing = [(n, signal) for n, signal in enumerate(self._signals) if callable(signal)]
+        self._buffer: Any  # its methods take memoryviews, and are declared otherwise
+        self._buffer, self._evaluate = rates.buffer()
+        self._buffer.set_arg(0, self._u.data)
+        self._buffer.set_arg(1, self._x.data)
+        self._buffer.set_res(0, self._dxdt.data)
+
+    def _traced(self) -> list[Any]:
+        """The functions of casadi (inputs, states) that give the derivatives of the states, and the outputs."""
+        import casadi
+
+        model = self._model
+        symbols = [casadi.SX.sym("u", len(self._signals)), casadi.SX.sym("x", len(self.states))]
         u = model.input_layout.instance(casadi.vertsplit(symbols[0]))
         x = model.state_layout.instance(casadi.vertsplit(symbols[1])) if model.state_layout else None
-        rates = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
-        outputs = model.parts[0].layout.values(model.evaluate(casadi_(), p, u, x)[0])
-        self._rates, self._all = (
+        rates = model.derivatives(casadi_(), self._p, u, x) if model.state_layout else []
+        outputs = model.parts[0].layout.values(model.evaluate(casadi_(), self._p, u, x)[0])
+        return [
             casadi.Function(
                 name, symbols, [casadi.densify(casadi.cse(casadi.vertcat(*map(casadi.SX, rows))))]
             )
             for name, rows in (("rates", rates), ("outputs", outputs))
-        )
-
-        # the function reads and writes these arrays: its call with arrays of the caller costs four times as much
-        self._memory = [np.zeros(len(rows)) for rows in (self._outside, self.states, self.states)]
-        self._changing = [(n, signal) for n, signal in enumerate(self._outside) if callable(signal)]
-        self._memory[0][:] = [0.0 if callable(signal) else signal for signal in self._outside]
-        self._buffer: Any  # its methods take memoryviews, and are declared otherwise
-        self._buffer, self._evaluate = self._rates.buffer()
-        for n, rows in enumerate(self._memory[:2]):
-            self._buffer.set_arg(n, rows.data)
-        self._buffer.set_res(0, self._memory[2].data)
+        ]
 
     def _inputs(self, t: Any) -> list[Any]:
-        return [at_time(signal, t) for signal in self._outside]
+        return [at_time(signal, t) for signal in self._signals]
 
     def rates(self, t: float, x: Any) -> Any:
         """Derivatives of all states."""
-        u, states, rates = self._memory
         for n, signal in self._changing:
-            u[n] = signal(t)
-        states[:] = x
+            self._u[n] = signal(t)
+        self._x[:] = x
         self._evaluate()
-        return rates.copy()
+        return self._dxdt.copy()
 
     def tolerances(self, rtol: float) -> list[float]:
         """The absolute tolerance of each state."""
@@ -147,8 +152,8 @@ class _Equations:
         """All states and outputs; `states` have the shape (states, times)."""
         import xarray as xr
 
-        outside = [np.broadcast_to(u, times.shape) for u in self._inputs(times)]
-        outputs = np.asarray(self._all(np.array(outside).reshape(-1, len(times)), states))
+        inputs = [np.broadcast_to(u, times.shape) for u in self._inputs(times)]
+        outputs = np.asarray(self._output_function(np.array(inputs).reshape(-1, len(times)), states))
         rows = zip((*self._states, *self._outputs), (*states, *outputs), strict=True)
         variables = {
             v.name: ("time", row, {"units": v.unit, "long_name": v.description.partition(": ")[2]})

@@ -281,14 +281,11 @@ class FmuSimulation(Simulation):
 
     def _handles(self, fulls: Iterable[str]) -> list[tuple[Instance, Any, list[str]]]:
         """Instances, handles and full names, by component."""
-        return [
-            (
-                self._instances[name],
-                self._instances[name].handle([full.partition(".")[2] for full in group]),
-                group,
-            )
-            for name, group in self._by_instance(fulls).items()
-        ]
+        handles = []
+        for name, group in self._by_instance(fulls).items():
+            instance = self._instances[name]
+            handles.append((instance, instance.handle([full.partition(".")[2] for full in group]), group))
+        return handles
 
     def _signal_inputs(self) -> list[tuple[Instance, Any, list[str]]]:
         """Handles of the inputs with signals."""
@@ -412,7 +409,7 @@ class FmuSimulation(Simulation):
         return self._handles(rows.selected(names, there))
 
     def _guarded(self, guards: Mapping[str, float]) -> list[Guarded]:
-        """Handles and limits of the guards, by instance."""
+        """The guarded outputs of each instance with their limits; refuses a guard that is no output."""
         for full in guards:
             self.system.connector(full, "output")
         return [

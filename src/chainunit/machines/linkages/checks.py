@@ -160,15 +160,16 @@ Places = Mapping[str, Mapping[str, tuple[float, float]]]
 
 
 def usual_distance(link: str, points: Places, ends: set[tuple[str, ...]]) -> float:
-    """The distance from the origin of a link [m] beyond which neither a point nor the centroid of it is expected: ten
-    times the size of the linkage farther than its joints. `ends` are the points of all joints, by link and name; 0
-    for a linkage without a size."""
-    joined = {
-        name: [place for point, place in those.items() if (name, point) in ends]
-        for name, those in points.items()
+    """The largest distance from the origin of a link [m] at which its points and its centroid are expected: that of
+    its farthest joint, and ten times the size of the linkage. `ends` are the names (link, point) of the points at
+    joints. The size is the largest distance of two joints on one link; without a size, the result is 0."""
+    joints = {
+        name: [place for point, place in places.items() if (name, point) in ends]
+        for name, places in points.items()
     }
-    size = max((math.dist(a, b) for those in joined.values() for a in those for b in those), default=0.0)
-    return max((math.hypot(*place) for place in joined[link]), default=0.0) + 10.0 * size if size else 0.0
+    size = max((math.dist(a, b) for places in joints.values() for a in places for b in places), default=0.0)
+    farthest = max((math.hypot(*place) for place in joints[link]), default=0.0)
+    return farthest + 10.0 * size if size else 0.0
 
 
 _DENSITY = 8000.0

@@ -35,6 +35,8 @@ _AXES = {"x": "m", "y": "m", "angle": "rad"}
 _OWN = re.compile(r"\b(min|max|stroke)\(\s*(x|y|angle)\s*\)")
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
 """A number whose comma may stand between thousands."""
+Column = list[tuple[float, str | None]]
+"""A column of a table, each value with its unit."""
 _HEADING = re.compile(r"\s*([^\[(]*?)\s*(?:[\[(]\s*(.*?)\s*[\])])?\s*")
 
 
@@ -76,10 +78,8 @@ class LoadReader(EntryReader):
                     self.refused.discard(name)
         return curves
 
-    def columns(
-        self, key: str, table: Mapping[str, Any], over: str
-    ) -> tuple[list[tuple[float, str | None]], list[tuple[float, str | None]]]:
-        """The two columns of a table, each value with its unit."""
+    def columns(self, key: str, table: Mapping[str, Any], over: str) -> tuple[Column, Column]:
+        """The two columns of a table."""
         if "file" in table:
             if {"phi", "x", "value"} & table.keys():
                 raise InputError("has file and lists: the file gives both columns; take one of both out")
@@ -99,21 +99,19 @@ class LoadReader(EntryReader):
         linear = "joint" in self.table("driver")
         if over == "phi":
             unit = "m" if linear else "rad"
-            abscissas: list[tuple[float, str | None]] = [(self.number(key, x, unit), unit) for x in places]
+            abscissas: Column = [(self.number(key, x, unit), unit) for x in places]
         else:
             abscissas = self.like(places)
         return abscissas, self.like(values)
 
-    def like(self, entries: list[Any]) -> list[tuple[float, str | None]]:
+    def like(self, entries: list[Any]) -> Column:
         """Values of one unit, that of the first one."""
         first = self.with_unit(entries[0], None)
         if first[1] is None:
             return [self.with_unit(x, None) for x in entries]
         return [(self.number("", x, first[1]), first[1]) for x in entries]
 
-    def columns_of_file(
-        self, name: Any
-    ) -> tuple[list[tuple[float, str | None]], list[tuple[float, str | None]]]:
+    def columns_of_file(self, name: Any) -> tuple[Column, Column]:
         """The two columns of a CSV file beside the linkage file, with units in a heading ("way [mm], force [kN]")."""
         if not isinstance(name, str):
             raise InputError(f"file is {shown(name)}; must be the name of a CSV file with two columns")
@@ -122,13 +120,7 @@ class LoadReader(EntryReader):
         lines = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
         if len(lines) > MOST_POINTS + 1:
             raise InputError(f"{name}: has {len(lines)} rows; {_FEWER}")
-        mark = (
-            ";"
-            if any(";" in line for line in lines)
-            else "\t"
-            if any("\t" in line for line in lines)
-            else ","
-        )
+        mark = next((mark for mark in ";\t" if any(mark in line for line in lines)), ",")
         rows = cells_of(name, lines, mark)
         if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != 2), None):
             raise InputError(
@@ -151,7 +143,7 @@ class LoadReader(EntryReader):
                 f"{name}: {shown(commas[0])} is not clear, as its comma may stand between thousands or before "
                 "decimals; write all numbers with a decimal point and without marks between thousands"
             )
-        columns: list[list[tuple[float, str | None]]] = [[], []]
+        columns: tuple[Column, Column] = ([], [])
         for place, row in enumerate(rows, 1):
             for k, cell in enumerate(row):
                 value = _number(cell)
@@ -160,7 +152,7 @@ class LoadReader(EntryReader):
                     cited = f" {shown(cell)}" if cell.lstrip()[:1] in (*"+-.0123456789",) else ""
                     raise InputError(f"{name}: row {place} of numbers, column {k + 1}:{cited} is no number")
                 columns[k].append((within(value * scales[k], cell), column_units[k]))
-        return columns[0], columns[1]
+        return columns
 
     # extremes of the motion
 
@@ -183,18 +175,19 @@ class LoadReader(EntryReader):
         return units_by_name
 
     def count(self, *expressions: Expression) -> None:
-        """Count the points of the tables in the expressions of a load or of a parameter.
+        """Add the points of the tables in the expressions of a load or of a parameter to those of the file: a table
+        over phi counts once in all of them, a table over x as often as it is looked up.
 
         Raises
         ------
         InputError
-            in one line, where all of the file come to more than `MOST_POINTS` with them.
+            in one line, for the expressions with which the file first has more than `MOST_POINTS`.
         """
         before = self.looked_up
         over_phi = {name for parsed in expressions for name in parsed.names} & {*self.table_units}
-        names = [*over_phi, *(name for parsed in expressions for name in parsed.lookups)]
-        self.looked_up += sum(self.sizes.get(name, 0) for name in names)
-        self.looked_up += sum(points for parsed in expressions for points in parsed.points)
+        for parsed in expressions:
+            self.looked_up += sum(parsed.points) + sum(self.sizes.get(name, 0) for name in parsed.lookups)
+        self.looked_up += sum(self.sizes[name] for name in over_phi)
         if before <= MOST_POINTS < self.looked_up:
             raise InputError(
                 f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
@@ -217,8 +210,9 @@ class LoadReader(EntryReader):
         """
         begin = f"is {shown(text)}; in {name} "
         if "." not in name:
+            argument = name.partition("(")[2].removesuffix(")")
             raise InputError(
-                f"{begin}{name[4:-1]} is no place of the motion; write a point of a link and its axis, such as "
+                f"{begin}{argument} is no place of the motion; write a point of a link and its axis, such as "
                 "min(ram.C.y); of two numbers the lesser is min(a, b)"
             )
         _, link, point, axis = parts_of_extreme(name)

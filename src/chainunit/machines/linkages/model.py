@@ -136,10 +136,11 @@ class LinkageDescription(LinkageOutputs):
     # declarations
 
     def _parameters(self) -> Any:
+        """The declaration of the parameters: those of the file, bodies of links with quantities of their own, and the
+        common ones of all machines. The ratio of a driver that swings has one allowed value, see `_FIXED_RATIO`."""
         fields = [field_of(entry) for entry in self.data.get("parameters", ())]
         for link in self.data["links"]:
-            quantities = link.get("own", {})
-            if quantities:
+            if quantities := link.get("own", {}):
                 name, title = self.variable("link", link["name"]), f"link {link['name']}"
                 fields.append((name, LinkBody, group(LinkBody, title, default=LinkBody(**quantities))))
         guides = any(j.kind == PRISMATIC for j in self.structure.joints.values())
