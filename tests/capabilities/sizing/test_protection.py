@@ -878,7 +878,7 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
         disc=True,
         flywheel_words="0.300 kg m² (steel disc of 22.1 kg, 0.330 m in diameter)",
     )
-    drive = SizedDrive(best, False, "crank", None, protection=protection)
+    drive = SizedDrive(best, False, "crank", None, False, protection=protection)
     assert drive.sentence.startswith("Motor: M, ratio 50 (worm gear); ") and drive.sentence.endswith(ending)
 
 
@@ -916,7 +916,7 @@ def test_the_order_names_the_starter():
     }
     numbers = {"inverter_current": 45.4, "frequency": 50.3, "speed": 156.8}
     result = {"run": {"ramp": entry(2.0, "s")}, "starter": starter}
-    order = SizedDrive(None, False, "crank", None, inverter=OrderedInverter(InUnit(49.1, "A"), "a start"))
+    order = SizedDrive(None, False, "crank", None, False, inverter=OrderedInverter(InUnit(49.1, "A"), "a start"))
 
     def said(start):
         of_drive = DriveNumbers(**dict.fromkeys(Layout(DriveNumbers).names) | numbers)
