@@ -145,7 +145,7 @@ def usual_boost(p: Any, plate: Nameplate) -> float:
     rated current takes across the stator, if that is less. With more the flux exceeds the rated one at low frequency,
     and a large motor hunts and turns backwards in its start."""
     drop = math.sqrt(3.0) * p.stator.R * plate.rated_current / p.supply.V
-    return float(min(InverterControl().boost, drop))
+    return float(min(InverterControl().boost, round(drop, 3)))
 
 
 def with_inertia(tables: DriveTables, drive: Drive, added: float) -> Drive:

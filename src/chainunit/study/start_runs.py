@@ -32,8 +32,8 @@ _STEP = 1e-3
 OVERLOADED = 60.0
 """Time for which an inverter carries more than its rated current [s]."""
 BACKWARDS = 0.02
-"""Speed backwards in a start by an inverter, over the synchronous one, from which on the motor hunts: it does not
-follow the frequency."""
+"""Speed backwards in a start by an inverter after a speed forwards, over the synchronous one, from which on the motor
+hunts: it does not follow the frequency."""
 _AFTER = 0.25
 """Time for which a start is followed once the crank has its speed [s]: the motor overshoots and settles."""
 
@@ -71,7 +71,10 @@ class StartNumbers:
         kind="percent",
     )
     backwards: Value = quantity(
-        "1", "largest speed of the motor backwards, over the synchronous one", default=0.0, kind="percent"
+        "1",
+        "largest speed of the motor backwards once it has turned forwards, over the synchronous one",
+        default=0.0,
+        kind="percent",
     )
 
 
@@ -130,9 +133,11 @@ def _starts_from(
             time, speed = run["time"].values, run[name].values / ratio
             final = float(np.mean(speed[time >= time[-1] - operation.turn]))
             reached[k] = time_to_start(time, speed, final, operation.crank_speed)
-    return [
+    starts = [
         _numbers(rigs[k].drive, angles[k], runs[k], reached[k], peak_of, before) for k in range(len(rigs))
     ]
+    # a load that blocks a start may throw the motor back
+    return starts if event is None else [replace(start, backwards=0.0) for start in starts]
 
 
 def _read(rig: Rig) -> list[str]:
@@ -173,9 +178,11 @@ def _numbers(
 
 
 def speed_backwards(drive: Drive, run: xr.Dataset) -> float:
-    """The largest speed of an induction motor backwards in a run, over the synchronous one; 0 if it never turns
-    back."""
-    return max(0.0, -float(np.min(run["motor.w"].values)) / _synchronous(drive))
+    """The largest speed of an induction motor backwards in a run, over the synchronous one, once it has turned
+    forwards; 0 if it never turns back. A load that turns a motor back at first does not count."""
+    share = run["motor.w"].values / _synchronous(drive)
+    forwards = np.flatnonzero(share > BACKWARDS)
+    return max(0.0, -float(np.min(share[forwards[0] :]))) if forwards.size else 0.0
 
 
 def _synchronous(drive: Drive) -> float:

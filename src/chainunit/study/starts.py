@@ -115,8 +115,12 @@ class StartFindings(Findings):
             )
         hunting = max(self.starts, key=lambda start: start.backwards)
         if study.drive.follows and study.plate is not None and hunting.backwards > BACKWARDS:
-            usual = usual_boost(study.drive.fmu_parameters, study.plate.nameplate)
-            study.say(_HUNTS, START, backwards=hunting.backwards, angle=hunting.angle, boost=usual)
+            p = study.drive.fmu_parameters
+            usual, boost = usual_boost(p, study.plate.nameplate), float(p.inverter.boost)
+            least = f"to {number(usual, '1', 'percent')} for this motor"
+            if boost <= usual:
+                least = f"below {number(boost, '1', 'percent')}"
+            study.say(_HUNTS, START, backwards=hunting.backwards, angle=hunting.angle, least=least)
         if self.stuck:
             study.say(
                 _NO_START,
@@ -148,8 +152,8 @@ _HUNTS = warning(
     "start-hunts",
     "In the start by the inverter the motor turns backwards, at up to {backwards} of its synchronous speed, from "
     "{a driver} angle of {angle}. Too high a voltage at low frequency makes it hunt.",
-    remedy="Lower the boost (starter.inverter.boost), to {boost} for this motor, or lengthen run.ramp.",
-    sizes={("1", "percent"): "backwards boost", "rad": "angle"},
+    remedy="Lower the boost (starter.inverter.boost), {least}.",
+    sizes={("1", "percent"): "backwards", "rad": "angle"},
 )
 _NO_START = fault(
     "no-start",

@@ -20,7 +20,7 @@ _RELIEVED = ("rms_torque", "peak_torque", "temperature")
 
 def boosts(first: float, is_given: bool) -> list[float]:
     """The boosts to try, beginning with `first`; it alone where the file gives it."""
-    return [first] if is_given else [multiple * first for multiple in _MULTIPLES]
+    return [first] if is_given else [round(multiple * first, 6) for multiple in _MULTIPLES]
 
 
 def _with_boost(c: Candidate, boost: float) -> Candidate:
