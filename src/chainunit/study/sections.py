@@ -104,7 +104,7 @@ STARTS = ("direct", "star-delta", "soft", "inverter")
 
 SOFTER: Mapping[str, str] = {
     "direct": 'start softer (start = "soft" or "inverter")',
-    "star-delta": 'start softer (start = "soft" or "inverter")',
+    "star-delta": 'take more time in star (starter.star_delta.time), or start softer (start = "soft" or "inverter")',
     "soft": "lower the voltage or lengthen the ramp of the soft starter",
     "inverter": "lengthen run.ramp",
 }

@@ -428,7 +428,7 @@ WORSE = [
     (
         Criterion.START,
         {"relay_seconds": 2.9},
-        "its start takes a relay of class 20, that of the chosen one of class 10",
+        "its start takes a relay of class 20, the start of the chosen one of class 10",
     ),
     (Criterion.FLYWHEEL, {"flywheel": 0.5}, "needs a flywheel, the chosen one none"),
     (Criterion.POLES, {"poles": 6.0}, "6 poles, where 4 are to be had"),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from ...reading.text import number
-from ...study.relay import class_words
+from ...study.relay import HEAVIEST, class_words
 from .candidate import TOLERANCES, Candidate, Criterion, Standing
 from .parts import price_words
 from .table import PREFERENCE, PRICE
@@ -255,7 +255,7 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate], objective: str) -> st
     if rival.criterion is Criterion.GEAR:
         return f"takes one unit, where {name} takes {_units(rival)}"
     if rival.criterion is Criterion.START:
-        return f"its start takes a relay of {_class(best)}, that of {name} one of {_class(rival)}"
+        return f"its start takes a relay {_class(best)}, the start of {name} one {_class(rival)}"
     if rival.criterion is Criterion.FLYWHEEL:
         return f"needs no flywheel, where {name} needs one of {rival.flywheel_words}"
     return f"has {best.motor.nameplate.poles:g} poles, where {name} has {rival.motor.nameplate.poles:g}"
@@ -284,7 +284,7 @@ def _behind(c: Candidate, best: Candidate) -> str:
         Criterion.MARGIN: f"leaves less than the margin of {_margin(c)}",
         Criterion.FIELD: f"{_weakened(c)}",
         Criterion.GEAR: f"its ratio takes {_units(c)}",
-        Criterion.START: f"its start takes a relay of {_class(c)}, that of the chosen one of {_class(best)}",
+        Criterion.START: f"its start takes a relay {_class(c)}, the start of the chosen one {_class(best)}",
         Criterion.FLYWHEEL: "needs a flywheel, the chosen one none",
         Criterion.POLES: "{:g} poles, where {:g} are to be had".format(*poles),
     }.get(c.criterion or Criterion.POWER, "larger than needed")
@@ -310,4 +310,6 @@ def _mass(c: Candidate) -> str:
 
 
 def _class(c: Candidate) -> str:
-    return class_words(c.trial.tolerant_class) if c.trial.tolerant_class else "no class"
+    """The class of the relay for a start, in words that follow the noun."""
+    trip_class = c.trial.tolerant_class or 0
+    return class_words(trip_class) if trip_class > HEAVIEST else f"of class {trip_class}"
