@@ -119,7 +119,7 @@ class Sized(SizingFindings):
             **{name: {} for name in ("effects", "overloads", "disturbances")},
             alternatives=[],
         )
-        return SizedDrive(self.best, self.nearest is not None, "crank", None, protection=protection)
+        return SizedDrive(self.best, self.nearest is not None, "crank", None, False, protection=protection)
 
 
 def candidate(study, name, verdict, reason, **utilisations):

@@ -398,8 +398,8 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
         ("Warning: " + "word " * 20, "Warning: " + "word " * 13 + "..."),
     ],
 )
-def test_a_warning_takes_one_line_of_the_screen_and_ends_with_a_clause(text, line):
-    assert terminal.line_of(text, 79) == line
+def test_a_warning_is_cut_at_the_end_of_a_clause(text, line):
+    assert terminal.cut(text, 79) == line
 
 
 def test_markdown_has_the_lines_below_the_numbers_of_a_card():

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from chainunit.app import cli
@@ -30,7 +31,7 @@ from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
-from chainunit.study.start_runs import START_ANGLES, StartNumbers, starts_from_all
+from chainunit.study.start_runs import START_ANGLES, StartNumbers, speed_backwards, starts_from_all
 from chainunit.study.starts import StartFindings, _with_own_limit
 from chainunit.study.turn import TurnAnalysis, TurnFindings
 from chainunit.study.verdict import shown_speed
@@ -299,3 +300,57 @@ def test_a_setting_at_the_ram_by_hand():
 
     assert way == pytest.approx(abs(height(ram.dead) - height(ram.dead - angle)), rel=1e-4)
     assert ram.ram == "ram"
+
+
+TRIPLEX = """
+start = "inverter"
+event = []
+[machine]
+linkage = "triplex_pump.toml"
+[run]
+crank_speed = "250 rev/min"
+ramp = "5 s"
+[system]
+motor = "IE3 4-pole 30 kW, 200L"
+[gear]
+ratio = 6
+efficiency = 0.98
+"""
+
+
+@pytest.mark.second
+def test_a_large_motor_has_the_boost_of_its_stator_and_does_not_hunt(tmp_path):
+    """A triplex pump was ordered with a boost of 5 %: the motor turned back at 13.5 rad/s in its start, and took
+    183 A, in silence."""
+    source = str(Path(__file__).parent / "data" / "pump.toml")
+    pump = config.parse(TRIPLEX, source)
+    p, plate = drive_of(pump).parameters, pump.plate.nameplate
+    assert p.inverter.boost == pytest.approx(
+        p.stator.R * plate.rated_current / (400.0 / math.sqrt(3.0)), abs=5e-4
+    )
+    quiet = run_study(pump, tmp_path / "quiet")
+    hunting = run_study(
+        config.parse(f"{TRIPLEX}[starter.inverter]\nboost = 0.05\n", source), tmp_path / "hunting"
+    )
+    codes = [{remark.code for remark in study.warnings} for study in (quiet, hunting)]
+    assert "start-hunts" not in codes[0] and "start-hunts" in codes[1]
+    (said,) = [remark for remark in hunting.warnings if remark.code == "start-hunts"]
+    run = hunting.runs["start_up"]["motor.w"].values
+    assert said.quantities["backwards"].value >= -np.min(run) / plate.synchronous > 0.05
+    assert "to 2.70 % for this motor" in said.remedy and p.inverter.boost == 0.027
+    starts = [study.findings["starts"].starts for study in (quiet, hunting)]
+    assert max(start.backwards for start in starts[0]) == 0.0
+    assert max(start.current for start in starts[0]) < 0.6 * max(start.current for start in starts[1])
+
+
+def test_a_load_that_turns_the_motor_back_at_first_is_no_hunting():
+    """The counterweight of a beam pump turns the motor back for a tenth of a second."""
+    p = SimpleNamespace(pole_pairs=2, supply=SimpleNamespace(f=50.0))
+    drive, synchronous = SimpleNamespace(fmu_parameters=p), 50.0 * math.pi
+
+    def backwards(*shares):
+        return speed_backwards(drive, xr.Dataset({"motor.w": ("time", synchronous * np.array(shares))}))
+
+    assert backwards(0.0, -0.03, 0.0, 0.5, 1.0) == 0.0
+    assert backwards(0.0, -0.03, 0.1, -0.07, 1.0) == pytest.approx(0.07)
+    assert backwards(0.0, -0.03, -1.0) == 0.0

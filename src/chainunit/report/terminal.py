@@ -81,11 +81,13 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
 
 _LINES, _WARNINGS, _ROWS = 45, 5, 3
 """Lines of one screen, warnings on it, and rows up to which a table is cut to the room that is left."""
+_RAGGED = 20
+"""Letters of the longest word that does not fit at the end of the first line of a warning."""
 
 
 def screen(report: Report, console: Console, rest: str) -> None:
-    """Print one screen: judgements and the central blocks as far as there is room, warnings of one line each, and
-    where the rest is (`rest`)."""
+    """Print one screen: judgements and the central blocks as far as there is room, warnings of up to two lines each,
+    and where the rest is (`rest`)."""
     blocks = report.screen
     last = [
         _LAST[_role(block)] + sentence
@@ -96,7 +98,9 @@ def screen(report: Report, console: Console, rest: str) -> None:
     warnings = [sentence for sentence in last if sentence.startswith(_LAST["warning"])][:_WARNINGS]
     if len(last) > len(warnings):
         rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
-    end = [line_of(warning, console.width - 1) + "\n" for warning in warnings]
+    most = 2 * (console.width - 1) - _RAGGED
+    shown = [_with_units(cut(warning, most)) for warning in warnings]
+    end = [_printed(console, partial(console.print, text)).replace(_KEPT, " ") for text in shown]
     end.append(_printed(console, lambda: console.print(rest)))
     room = _LINES - sum(map(_lines, end))
     title = f"{report.title}\n" if report.title else ""
@@ -115,8 +119,8 @@ def screen(report: Report, console: Console, rest: str) -> None:
     console.file.write("".join(end))
 
 
-def line_of(text: str, width: int) -> str:
-    """A sentence in one line: if it is too long, its first clauses; a bracket is whole or left out."""
+def cut(text: str, width: int) -> str:
+    """A text of at most `width` letters: if it is too long, its first clauses; a bracket is whole or left out."""
     for trial in (text, _BRACKETS.sub("", text)):
         if len(trial) <= width:
             return trial

@@ -13,7 +13,7 @@ from ..core.engines import numpy_
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gear_ratios import GearUnit, gear_unit, typical_efficiency
 from ..drives.gearing import Transmission, motor_side
-from ..drives.induction_motor import Inverter
+from ..drives.induction_motor import Inverter, InverterControl
 from ..drives.nameplate import Nameplate
 from ..machines.machine import Machine
 from .cycle import Cycle
@@ -22,6 +22,8 @@ from .drive_tables import DriveTables
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""
+BOOST = "starter.inverter.boost"
+"""Key of the voltage boost at low frequency."""
 
 
 _NO_GEAR = 0.05
@@ -123,9 +125,11 @@ def _is_made(tables: DriveTables, offer: GearOffer) -> bool:
 
 def with_starter(tables: DriveTables, p: Any, plate: Nameplate) -> Any:
     """The parameters `p` of a motor that starts on line, with the starter of the study. An inverter compensates the
-    rated slip of the motor, unless the file gives its compensation."""
+    rated slip of the motor with the boost of `usual_boost`, unless the file gives them."""
     control = asdict(tables.starter.inverter)
     follows = tables.start == "inverter"
+    if follows and BOOST not in tables.given:
+        control["boost"] = usual_boost(p, plate)
     if follows and SLIP not in tables.given:
         slip_hz = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi)
         control["slip"] = slip_hz / plate.torque
@@ -134,6 +138,14 @@ def with_starter(tables: DriveTables, p: Any, plate: Nameplate) -> Any:
         preferred = tables.starter.star_delta.preferred
         p = replace(p, switching=replace(p.switching, preferred=preferred))
     return replace(p, soft_start=soft, inverter=Inverter(on=float(follows), **control))
+
+
+def usual_boost(p: Any, plate: Nameplate) -> float:
+    """The boost of an inverter for a motor with the parameters `p`: that of the declaration, or the voltage that the
+    rated current takes across the stator, if that is less. With more the flux exceeds the rated one at low frequency,
+    and a large motor hunts and turns backwards in its start."""
+    drop = math.sqrt(3.0) * p.stator.R * plate.rated_current / p.supply.V
+    return float(min(InverterControl().boost, round(drop, 3)))
 
 
 def with_inertia(tables: DriveTables, drive: Drive, added: float) -> Drive:

@@ -47,9 +47,7 @@ def inverter_need(study: StudyRecord) -> InverterNeed | None:
         return None
     named = (("start_up", study.start), *study.answers.items())
     currents = {name: a.current_peak for name, a in named if a and a.current_peak is not None}
-    until_trip: dict[str, float] = {}
-    for findings in study.findings.values():
-        until_trip |= findings.currents_until_trip(study)
+    until_trip = study.currents_until_trip
     peaks = {
         f"{study.title_of(name)}{', with the torque limiter' * (name in until_trip)}": until_trip.get(
             name, current

@@ -210,7 +210,8 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
             weaker = number(LESS_TORQUE, "1", "percent")
             text += f", less than the {weaker} by which IEC 60034-1 permits it to be weaker"
     else:
-        text += f"; {no_reserve(run, reserves[run])} ({study.title_of(run)})"
+        bare = ", without the recommended torque limiter" if run in study.currents_until_trip else ""
+        text += f"; {no_reserve(run, reserves[run])} ({study.title_of(run)}{bare})"
     if stalls := slowed(study):
         dips = ", ".join(
             f"{study.title_of(name)}: by {number(dip, '1', 'percent')}" for name, dip in stalls.items()

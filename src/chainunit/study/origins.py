@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .catalogue_drive import SLIP
+from .catalogue_drive import BOOST, SLIP
 from .config import FileContents
 from .parts import LENGTHS
 from .record import StudyRecord
 
-_CHOSEN = ("gear.efficiency", "starter.inverter.boost", SLIP)
+_CHOSEN = ("gear.efficiency", BOOST, SLIP)
 """Values that follow from a proposed drive where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
 
 

@@ -172,6 +172,14 @@ class StudyRecord:
         return "" if self.proposal is None else self.proposal.insufficient
 
     @property
+    def currents_until_trip(self) -> dict[str, float]:
+        """By overload that opens a recommended torque limiter, the largest current of the motor until then [A]."""
+        currents: dict[str, float] = {}
+        for findings in self.findings.values():
+            currents |= findings.currents_until_trip(self)
+        return currents
+
+    @property
     def not_known(self) -> frozenset[str]:
         """Names of the measures of steady running that cannot be read, as the motor is a foreign FMU."""
         if self.drive.foreign is None:

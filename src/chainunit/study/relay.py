@@ -68,10 +68,11 @@ def start_seconds(time: Any, current: Any, setting: float) -> float:
 def protecting_class(
     least: int, seconds: float, setting: float, before: float, stall_current: float, stall_time: float
 ) -> int:
-    """The trip class `least`, or another one that protects the motor with its rotor locked: the least that lets each
-    start through even if the motor takes `MORE_CURRENT`; or `QUICK` for the usual one, if that trips too late. The
-    hardest start heats a relay as `start_seconds` says. Other arguments as of `stall_trip`; the rotor of a warm motor
-    may be locked for the `stall_time` [s]."""
+    """The trip class of the relay of a motor whose starts need the class `least`: the least that lets each start
+    through even if the motor takes `MORE_CURRENT`, unless it trips too late with the rotor locked and the class
+    `least` does not; or `QUICK` in place of the usual class, if that trips too late. The hardest start heats a relay
+    as `start_seconds` says. Other arguments as of `stall_trip`; the rotor of a warm motor may be locked for the
+    `stall_time` [s]."""
 
     def protecting(number: int) -> bool:
         return protects(number, setting, before, stall_current, stall_time)
@@ -80,7 +81,10 @@ def protecting_class(
     if tolerant <= HEAVIEST and protecting(tolerant):
         return tolerant
     is_quick = least == LIGHT and seconds <= _NAMED[str(QUICK)].shortest
-    return QUICK if is_quick and not protecting(LIGHT) and protecting(QUICK) else least
+    if is_quick and not protecting(LIGHT) and protecting(QUICK):
+        return QUICK
+    # if neither protects a locked rotor, other means have to, and the relay shall let each start through
+    return tolerant if tolerant <= HEAVIEST and not protecting(least) else least
 
 
 def protects(number: int, setting: float, before: float, stall_current: float, stall_time: float) -> bool:

@@ -25,7 +25,7 @@ from .record import LOAD_CYCLE, StudyRecord
 from .registry import capabilities, parts_of_line
 from .remark import DECLARED, SEVERITIES, Remark, RemarkCode, fault, note, warning
 from .start_runs import speed_in_star
-from .starts import StartFindings
+from .starts import FULL_STAR, StartFindings
 from .verdict import START, STEADY, shown_speed
 from .window import CLOSED, DRIFT, STORED
 
@@ -362,9 +362,6 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         study.say(_NO_THERMAL, STEADY)
 
 
-_FULL_STAR = 0.8
-"""Share of the synchronous speed from which on a motor in star may be changed over to delta: below it the current
-jumps almost to the one of a start direct on line."""
 _STAR_TOO_SHORT = warning(
     "star-too-short",
     "In the start-up the motor has {share} of its synchronous speed after {time} in star. The current jumps from "
@@ -376,7 +373,7 @@ _STANDING = 0.1
 """Share of the synchronous speed up to which a motor in star has not broken its load away."""
 _STANDS_IN_STAR = warning(
     "stands-in-star",
-    "The load holds the motor in star {where}. The change to delta is a start direct on line, with {delta}.",
+    "The load holds the motor in star {where}{rest}. The change to delta is a start direct on line, with {delta}.",
     remedy="Let the machine start empty (empty_start = true), or take another start.",
     sizes={"A": "delta"},
 )
@@ -390,13 +387,19 @@ def _on_star(study: StudyRecord) -> None:
         return
     findings, times = StartFindings.found_in(study), run["time"].values
     current = np.abs(run[f"motor.{drive.motor.current}"].values)
-    starts = () if findings is None else findings.starts
+    starts, weak = ((), ()) if findings is None else (findings.starts, findings.weak_star)
     held = [start for start in starts if start.star_speed is not None and start.star_speed < _STANDING]
     if held:
         angles = ", ".join(number(start.angle, "rad") for start in held)
-        delta = max(start.current for start in held)
-        study.say(_STANDS_IN_STAR, START, where=f"from {angles}", delta=delta)
-    elif share < _FULL_STAR and times[-1] > drive.switched_until:
+        moving = [start.star_speed for start in weak if start not in held]
+        rest = ""
+        if moving:
+            rest = (
+                f", and from other angles it reaches {number(min(moving), '1', 'percent')} of its speed there"
+            )
+        delta = max(start.current for start in weak)
+        study.say(_STANDS_IN_STAR, START, where=f"from {angles}", rest=rest, delta=delta)
+    elif share < FULL_STAR and times[-1] > drive.switched_until:
         before, after = np.interp(time, times, current), peak(current[times >= drive.switched_until])
         study.say(_STAR_TOO_SHORT, START, time=time, share=share, star=float(before), delta=after)
 

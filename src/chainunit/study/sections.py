@@ -104,7 +104,7 @@ STARTS = ("direct", "star-delta", "soft", "inverter")
 
 SOFTER: Mapping[str, str] = {
     "direct": 'start softer (start = "soft" or "inverter")',
-    "star-delta": 'start softer (start = "soft" or "inverter")',
+    "star-delta": 'take more time in star (starter.star_delta.time), or start softer (start = "soft" or "inverter")',
     "soft": "lower the voltage or lengthen the ramp of the soft starter",
     "inverter": "lengthen run.ramp",
 }
@@ -205,7 +205,8 @@ SECTIONS: Mapping[str, FileSection] = {
         title="Starter",
         is_used=lambda config: config.of_catalogue and config.drive.start != "direct",
         follows={
-            "inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
+            "inverter.boost": "5 %, or the drop of the rated current across the stator if less; with [sizing] "
+            "two or three times as much, if the machine does not start with less",
             "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
         },
     ),

@@ -31,6 +31,9 @@ _STEP = 1e-3
 """Longest step of a start [s]: the first swings have the frequency of the supply, and a coarser one misses peaks."""
 OVERLOADED = 60.0
 """Time for which an inverter carries more than its rated current [s]."""
+BACKWARDS = 0.02
+"""Speed backwards in a start by an inverter after a speed forwards, over the synchronous one, from which on the motor
+hunts: it does not follow the frequency."""
 _AFTER = 0.25
 """Time for which a start is followed once the crank has its speed [s]: the motor overshoots and settles."""
 
@@ -65,6 +68,12 @@ class StartNumbers:
     star_speed: Value = quantity(
         "1",
         "speed of the motor at the end of its time in star, over the synchronous one; none for another start",
+        kind="percent",
+    )
+    backwards: Value = quantity(
+        "1",
+        "largest speed of the motor backwards once it has turned forwards, over the synchronous one",
+        default=0.0,
         kind="percent",
     )
 
@@ -124,9 +133,11 @@ def _starts_from(
             time, speed = run["time"].values, run[name].values / ratio
             final = float(np.mean(speed[time >= time[-1] - operation.turn]))
             reached[k] = time_to_start(time, speed, final, operation.crank_speed)
-    return [
+    starts = [
         _numbers(rigs[k].drive, angles[k], runs[k], reached[k], peak_of, before) for k in range(len(rigs))
     ]
+    # a load that blocks a start may throw the motor back
+    return starts if event is None else [replace(start, backwards=0.0) for start in starts]
 
 
 def _read(rig: Rig) -> list[str]:
@@ -162,7 +173,22 @@ def _numbers(
         heat=float(np.trapezoid(run["motor.heat"].values, time)),
         followed=float(time[-1]),
         star_speed=speed_in_star(drive, run),
+        backwards=speed_backwards(drive, run),
     )
+
+
+def speed_backwards(drive: Drive, run: xr.Dataset) -> float:
+    """The largest speed of an induction motor backwards in a run, over the synchronous one, once it has turned
+    forwards; 0 if it never turns back. A load that turns a motor back at first does not count."""
+    share = run["motor.w"].values / _synchronous(drive)
+    forwards = np.flatnonzero(share > BACKWARDS)
+    return max(0.0, -float(np.min(share[forwards[0] :]))) if forwards.size else 0.0
+
+
+def _synchronous(drive: Drive) -> float:
+    """The synchronous speed at the frequency of the supply [rad/s]."""
+    p = drive.fmu_parameters
+    return float(2.0 * math.pi * p.supply.f / p.pole_pairs)
 
 
 def speed_in_star(drive: Drive, run: xr.Dataset) -> float | None:
@@ -170,8 +196,9 @@ def speed_in_star(drive: Drive, run: xr.Dataset) -> float | None:
     another start."""
     if drive.star_delta is None:
         return None
-    synchronous = 2.0 * math.pi * drive.parameters.supply.f / drive.parameters.pole_pairs
-    return float(np.interp(drive.time_in_star, run["time"].values, run["motor.w"].values)) / synchronous
+    return float(np.interp(drive.time_in_star, run["time"].values, run["motor.w"].values)) / _synchronous(
+        drive
+    )
 
 
 def exceeded_for(time: np.ndarray, current: np.ndarray, longest: float) -> float:

@@ -12,18 +12,22 @@ from ..drives.gearing import START_FACTOR
 from ..reading.results import derived, part, result
 from ..reading.text import number
 from .analysis import Analysis, Findings, Work
+from .catalogue_drive import usual_boost
 from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
 from .remark import fault, warning
 from .rig import Rig
 from .sections import SOFTER
-from .start_runs import StartNumbers, longest_start, starts_from_all
+from .start_runs import BACKWARDS, StartNumbers, longest_start, starts_from_all
 from .torques import at_gear
 from .verdict import START
 
 LIMIT = "starter.inverter.limit"
 """Key of the current limit of the inverter."""
+FULL_STAR = 0.8
+"""Share of the synchronous speed from which on a motor in star may be changed over to delta: below it the current
+jumps almost to the one of a start direct on line."""
 _PATIENCE = 3.0
 """Time for which a start with a current limit is followed, over that without one."""
 
@@ -65,6 +69,13 @@ class StartFindings(Findings):
         return max(math.inf if s.start_time is None else s.relay_seconds or 0.0 for s in self.starts)
 
     @property
+    def weak_star(self) -> list[StartNumbers]:
+        """The starts whose change from star to delta comes below `FULL_STAR`, as hard as one direct on line."""
+        return [
+            start for start in self.starts if start.star_speed is not None and start.star_speed < FULL_STAR
+        ]
+
+    @property
     def stuck(self) -> list[StartNumbers]:
         """The starts in which the crank does not come to its speed."""
         return [start for start in self.starts if start.start_time is None]
@@ -102,6 +113,14 @@ class StartFindings(Findings):
                 running_in=running_words(study, self.running_in),
                 **numbers,
             )
+        hunting = max(self.starts, key=lambda start: start.backwards)
+        if study.drive.follows and study.plate is not None and hunting.backwards > BACKWARDS:
+            p = study.drive.fmu_parameters
+            usual, boost = usual_boost(p, study.plate.nameplate), float(p.inverter.boost)
+            least = f"to {number(usual, '1', 'percent')} for this motor"
+            if boost <= usual:
+                least = f"below {number(boost, '1', 'percent')}"
+            study.say(_HUNTS, START, backwards=hunting.backwards, angle=hunting.angle, least=least)
         if self.stuck:
             study.say(
                 _NO_START,
@@ -129,6 +148,13 @@ _OVER_RUNNING = warning(
     remedy="Choose the gear by this torque (gear.torque_limit, gear.start_factor), or {softer}.",
     sizes={"N.m": "torque running most", "rad": "angle", "1": "over"},
 )
+_HUNTS = warning(
+    "start-hunts",
+    "In the start by the inverter the motor turns backwards, at up to {backwards} of its synchronous speed, from "
+    "{a driver} angle of {angle}. Too high a voltage at low frequency makes it hunt.",
+    remedy="Lower the boost (starter.inverter.boost), {least}.",
+    sizes={("1", "percent"): "backwards", "rad": "angle"},
+)
 _NO_START = fault(
     "no-start",
     "The motor does not bring the {driver} to its speed from {where}.",
@@ -149,6 +175,12 @@ def _with_own_limit(
     drive = replace(drive, parameters=replace(drive.parameters, inverter=inverter))
     limited = starts_from_all(replace(rig, drive=drive, files=None), _PATIENCE * longest)
     return tuple(limited), limit
+
+
+def weak_in_star(study: StudyRecord) -> bool:
+    """Whether the change from star to delta comes too early in a start, see `StartFindings.weak_star`."""
+    starts = StartFindings.found_in(study)
+    return starts is not None and bool(starts.weak_star)
 
 
 def transient_words(study: StudyRecord) -> str:

@@ -151,6 +151,11 @@ def test_a_class_lets_a_motor_at_the_tolerance_of_its_current_start():
     )  # 1.44 x 2.7 = 3.9 s of the 4 s of class 10
     assert protecting_class(10, 3.0, 20.0, 16.0, 140.0, 12.0) == 20
     assert protecting_class(10, 3.0, 20.0, 16.0, 140.0, 6.0) == 10  # class 20 trips after 11.8 s
+    # neither class 10, after 5.9 s, nor class 20 protects the rotor: the start decides
+    assert protecting_class(10, 3.0, 20.0, 16.0, 140.0, 5.5) == 20
+    assert protecting_class(20, 6.0, 20.0, 16.0, 140.0, 5.5) == 30
+    # 7 s are 10.1 s with the tolerance: no class up to 30 holds
+    assert protecting_class(30, 7.0, 20.0, 16.0, 140.0, 5.5) == 30
 
 
 def test_an_overload_that_passes_trips_no_relay():

@@ -219,7 +219,7 @@ def test_the_tables_of_service_factors_are_those_of_the_page():
         ]
         assert [f"{factor:.1f}" for factor in factors] == belt[name]
     crusher = load(Path(__file__).parents[2] / "data" / "duties" / "jawdrive.toml")
-    assert crusher.plans["sizing"].belt_factor(20.0, "star-delta") == 1.4
+    assert crusher.plans["sizing"].belt_factor(20.0, is_on_line=False) == 1.4
     assert "V-belt for 154 kW" in page and "belt 5.3 for 154 kW" in page
 
 
@@ -351,8 +351,8 @@ def made(name, power=2200.0, poles=4.0, flywheel=0.0, used=0.5, **more):
     )
     drive = SimpleNamespace(added_inertia=flywheel, ratio=50.0, follows=False)
     checks = {"temperature": Check("heat", used, 1.0, "1"), "crank_speed": Check("speed", 0.95, 1.0, "1")}
-    measured = {name: more.pop(name) for name in ("start_class", "frequency") if name in more}
-    trial = TrialResult(checks, **({"start_class": 10} | measured))
+    measured = {name: more.pop(name) for name in ("relay_seconds", "frequency") if name in more}
+    trial = TrialResult(checks, **({"relay_seconds": 2.7} | measured))
     return Candidate(motor, drive, trial, **({"unit": gear_unit("helical", 50.0), "margin": 0.1} | more))
 
 
@@ -424,7 +424,12 @@ WORSE = [
     (Criterion.MARGIN, {"used": 0.95}, "leaves less than the margin of 10 %"),
     (Criterion.LARGER, {"power": 5500.0}, "larger than needed"),
     (Criterion.GEAR, {"unit": None}, "its ratio takes two gear units"),
-    (Criterion.START, {"start_class": 20}, "its start is of class 20, that of the chosen one of class 10"),
+    # 2.9 s are 4.18 s with the tolerance of the current, beyond the 4 s of class 10
+    (
+        Criterion.START,
+        {"relay_seconds": 2.9},
+        "its start takes a relay of class 20, the start of the chosen one of class 10",
+    ),
     (Criterion.FLYWHEEL, {"flywheel": 0.5}, "needs a flywheel, the chosen one none"),
     (Criterion.POLES, {"poles": 6.0}, "6 poles, where 4 are to be had"),
     (Criterion.POWER, {"power": 3000.0}, "larger than needed"),
@@ -604,9 +609,9 @@ def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
 def test_a_heavy_start_and_a_second_gear_are_named():
     trials = trials_of(parse(f"{HEAVY_MACHINE}[sizing]\n"), SimpleNamespace())
     assert [*sizing._needs(made("a"), trials)] == []
-    (relay,) = sizing._needs(made("a", start_class=20), trials)
+    (relay,) = sizing._needs(made("a", relay_seconds=4.1), trials)
     assert relay == "The start takes an overload relay of class 20; one of class 10 may trip in it."
-    (relay,) = sizing._needs(made("a", start_class=HEAVIER), trials)
+    (relay,) = sizing._needs(made("a", relay_seconds=6.5), trials)
     assert "heavier than class 30" in relay
     (gear,) = sizing._needs(made("a", unit=None), trials)
     assert gear.endswith("takes two gear units: a three-stage helical gear ends at about 250.")
@@ -737,7 +742,7 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.92 < bare.sizes["rms_torque"] < 0.97
     # the inverter: boost, current, and no class of a relay
     rated = best.motor.nameplate.rated_current
-    assert best.trial.start_class is None and best.drive.parameters.inverter.boost == 0.05
+    assert best.trial.start_class is None and best.drive.parameters.inverter.boost == 0.038
     assert best.trial.inverter_current == pytest.approx(max(rated, best.trial.start_current / 1.5))
     assert "inverter_current" not in best.checks
     w = best.drive.ratio * config.run.crank_speed
@@ -745,10 +750,10 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     # the frequency is that of the speed asked for, and the compensation of the slip of the mean torque
     assert w / math.pi < best.trial.frequency < (w / math.pi) * 1.03
     notes = " ".join(result.notes)
-    assert "needs a voltage boost of 5 %" in notes and "electronic motor protection" in notes
+    assert "needs a voltage boost of 3.8 %" in notes and "electronic motor protection" in notes
     assert "relay of" not in notes
     chosen = result.proposal(config.drive).tables
-    assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.05
+    assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.038
 
 
 PUMP_MOTORS = "IE3 4-pole 11 kW, 160M", "IE3 4-pole 15 kW, 160L"

@@ -878,7 +878,7 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
         disc=True,
         flywheel_words="0.300 kg m² (steel disc of 22.1 kg, 0.330 m in diameter)",
     )
-    drive = SizedDrive(best, False, "crank", None, protection=protection)
+    drive = SizedDrive(best, False, "crank", None, False, protection=protection)
     assert drive.sentence.startswith("Motor: M, ratio 50 (worm gear); ") and drive.sentence.endswith(ending)
 
 
@@ -916,11 +916,13 @@ def test_the_order_names_the_starter():
     }
     numbers = {"inverter_current": 45.4, "frequency": 50.3, "speed": 156.8}
     result = {"run": {"ramp": entry(2.0, "s")}, "starter": starter}
-    order = SizedDrive(None, False, "crank", None, inverter=OrderedInverter(InUnit(49.1, "A"), "a start"))
+    order = SizedDrive(
+        None, False, "crank", None, False, inverter=OrderedInverter(InUnit(49.1, "A"), "a start")
+    )
 
     def said(start):
         of_drive = DriveNumbers(**dict.fromkeys(Layout(DriveNumbers).names) | numbers)
-        lines = _starter(blocks.Source(result | {"start": start}), cited(order), cited(of_drive))
+        lines = _starter(blocks.Source(result | {"start": start}), order, cited(order), cited(of_drive))
         return "; ".join(map(terminal.plain_line, lines))
 
     assert said("soft") == "soft starter, 50 % voltage, 1 s"
@@ -931,6 +933,11 @@ def test_the_order_names_the_starter():
             f"star-delta starter, 3 s in star; motor winding {winding}, in delta at the {voltage:g} V of the supply "
             f"(one of {other}, "
         )
+    # a crusher whose feed holds the motor in star was ordered as if star helped
+    order = dataclasses.replace(order, needs_empty_start=True)
+    assert "3 s in star, with the machine empty in each start (empty_start = true); motor" in said(
+        "star-delta"
+    )
     inverter = (
         "inverter of at least 49.1 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
     )

@@ -254,31 +254,31 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
     assert study.plate is not None
     plate = study.plate.nameplate
 
+    inverter_tables = dataclasses.replace(tables, start="inverter")
+    fed = with_starter(inverter_tables, rig.drive.parameters, plate)
+
     def rigs(boost: float) -> Iterator[_Trial]:
-        inverter = dataclasses.replace(tables.starter.inverter, boost=boost)
-        starter = dataclasses.replace(tables.starter, inverter=inverter)
-        inverter_tables = dataclasses.replace(tables, start="inverter", starter=starter)
         for ramp in RAMPS:
             run = dataclasses.replace(rig.operation.run, ramp=ramp)
             operation = dataclasses.replace(rig.operation, run=run, starter_time=0.0)
-            p = with_starter(inverter_tables, rig.drive.parameters, plate)
+            p = dataclasses.replace(fed, inverter=dataclasses.replace(fed.inverter, boost=boost))
             drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
-            fed = dataclasses.replace(
+            slower = dataclasses.replace(
                 rig, operation=operation, drive=with_inertia(inverter_tables, drive, drive.added_inertia)
             )
-            yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, inverter_tables
+            yield slower, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}, inverter_tables
 
-    for boost in boosts(tables.starter.inverter.boost, "starter.inverter.boost" in tables.given):
+    for boost in boosts(fed.inverter.boost, "starter.inverter.boost" in tables.given):
         best = _gentlest(rigs(boost), study, chosen, setting.running, math.inf)
         if best is not None:
             break
     else:
         return Alternative(Way.INVERTER, WayNumbers.of(), {})
-    fed, starts, numbers = best
-    fed = dataclasses.replace(fed, fed_from=None)
-    running, shocks = _runs(study, fed, on_coupling)
+    quiet, starts, numbers = best
+    quiet = dataclasses.replace(quiet, fed_from=None)
+    running, shocks = _runs(study, quiet, on_coupling)
     result = _as_numbers(setting, running, starts, **numbers)
-    overloads = {name: on_coupling(fed.drive, run) for name, run in shocks.items()}
+    overloads = {name: on_coupling(quiet.drive, run) for name, run in shocks.items()}
     return _tried(study, Way.INVERTER, result, overloads, shocks)
 
 

@@ -16,6 +16,7 @@ from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.drive import Drive
 from ...study.limits import Check
+from ...study.relay import MORE_CURRENT, class_holding
 from ...study.torques import DutyPeak
 from .parts import OrderedPart, total_price
 
@@ -49,7 +50,8 @@ class DriveNumbers:
     """The numbers by which the order of preference compares drives."""
 
     start_class: Value = quantity(
-        "1", "trip class of the overload relay that holds in the start; 40: none up to class 30"
+        "1",
+        "trip class of the overload relay that holds in the start, at 20 % more current, too; 40: none up to 30",
     )
     inverter_current: Value = quantity(
         "A", "least rated current of the inverter by the runs of sizing, without the events of the study"
@@ -93,8 +95,8 @@ class TrialResult:
     """The results of a candidate's runs; nothing is known before them, and where one fails."""
 
     checks: Mapping[str, Check] = field(default_factory=dict)
-    start_class: int | None = None
-    """see `chainunit.study.relay`; None for an inverter, or where there is no start"""
+    relay_seconds: float | None = None
+    """the hardest start as time at 7.2 times the rated current [s]; None for an inverter, or without a start"""
     start_current: float | None = None
     """largest current of the motor in a start [A]; None without a start"""
     inverter_current: float | None = None
@@ -115,6 +117,17 @@ class TrialResult:
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
     failed_angle: float | None = None
     """crank angle from which it does not start [rad], though it does from the angle 0; else None"""
+
+    @property
+    def start_class(self) -> int | None:
+        """Trip class of the relay that holds in each start; None for an inverter, or without a start."""
+        return None if self.relay_seconds is None else class_holding(self.relay_seconds)
+
+    @property
+    def tolerant_class(self) -> int | None:
+        """The same with the tolerance of the motor's current."""
+        seconds = self.relay_seconds
+        return None if seconds is None else class_holding(MORE_CURRENT**2 * seconds)
 
 
 @result(frozen=False)
@@ -262,7 +275,7 @@ class Candidate:
     def numbers(self) -> DriveNumbers:
         """Numbers of the drive."""
         return DriveNumbers(
-            start_class=self.trial.start_class,
+            start_class=self.trial.tolerant_class,
             inverter_current=self.trial.inverter_current,
             frequency=self.trial.frequency,
             speed=self.trial.speed,

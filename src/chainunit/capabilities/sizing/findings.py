@@ -20,6 +20,7 @@ from ...study.drive_tables import DriveTables
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from ...study.remark import fault, note, warning
+from ...study.starts import weak_in_star
 from .alternatives import ChosenMotor, alternatives
 from .candidate import Candidate, Flywheel, Standing
 from .coupling import coupling_of, recommended_setting
@@ -199,6 +200,7 @@ class SizingFindings(Findings):
             bool(study.insufficient),
             study.driver_noun,
             study.verdict.caveat if study.verdict else None,
+            weak_in_star(study) and not study.config.empty_start,
             gear=ordered_gear(study, setting, self.plan, trial.inertia_factor),
             protection=drive_protection(
                 study, setting, self.alternatives, self.best.motor.nameplate.rated_current

@@ -6,10 +6,11 @@ import dataclasses
 from collections.abc import Callable, Iterator
 
 from ...reading.text import number
+from ...study.catalogue_drive import usual_boost
 from .candidate import Candidate
 
-BOOSTS = (0.05, 0.10, 0.15)
-"""Shares of the voltage at frequency zero that are tried, in this order."""
+_MULTIPLES = (1.0, 2.0, 3.0)
+"""Boosts that are tried over the usual one (`chainunit.study.catalogue_drive.usual_boost`), in this order."""
 HAIR = 1.1
 """Factor by which a candidate may exceed the share of a limit that the margin leaves, so that it is tried with the
 ratio above: a step of the finest series is 3 %, and the heat of a winding changes with the square of the torque."""
@@ -19,7 +20,7 @@ _RELIEVED = ("rms_torque", "peak_torque", "temperature")
 
 def boosts(first: float, is_given: bool) -> list[float]:
     """The boosts to try, beginning with `first`; it alone where the file gives it."""
-    return [first, *(boost for boost in BOOSTS if boost > first and not is_given)]
+    return [first] if is_given else [round(multiple * first, 6) for multiple in _MULTIPLES]
 
 
 def _with_boost(c: Candidate, boost: float) -> Candidate:
@@ -29,14 +30,16 @@ def _with_boost(c: Candidate, boost: float) -> Candidate:
 
 
 def least_boost(c: Candidate, judged: Callable[[Candidate], Candidate], is_given: bool) -> Candidate:
-    """The candidate, as `judged`, with the least boost with which it starts; where it starts with none, with the
-    first. A boost with which the run fails is none with which it starts; one that the file gives is kept."""
+    """The candidate, as `judged`, with the least boost with which it starts and does not turn backwards; where it
+    starts with none, with the first. A boost with which the run fails is none with which it starts; one that the file
+    gives is kept."""
     first_boost = float(c.drive.parameters.inverter.boost)
     first = judged(_with_boost(c, first_boost))
+    # more boost makes a motor that turns backwards hunt the more
     if first.starts or not c.drive.follows:
         return first
     others = (judged(_with_boost(c, boost)) for boost in boosts(first_boost, is_given)[1:])
-    return next((candidate for candidate in others if candidate.starts), first)
+    return next((other for other in others if other.starts and "backwards" not in other.checks), first)
 
 
 def misses_by_a_hair(c: Candidate) -> bool:
@@ -53,7 +56,8 @@ def inverter_needs(best: Candidate, is_given: bool) -> Iterator[str]:
     if best.starts and not is_given:
         text = f"The inverter needs a voltage boost of {_percent(boost)} at frequency zero (starter.inverter.boost)"
         less = f"; with less the motor does not start the machine from every {best.drive.driver_noun} angle"
-        yield f"{text}{less if boost > BOOSTS[0] else ''}."
+        usual = usual_boost(best.drive.parameters, best.motor.nameplate)
+        yield f"{text}{less if boost > usual else ''}."
     if best.weakened:
         yield (
             f"The motor runs at {number(trial.frequency, 'Hz')}, above its rated "

@@ -41,7 +41,7 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         b.Card(
             "Motor",
             ((best.designation, str(findings.best.verdict)),),
-            (*_data(s), *_starter(s, sized, best.numbers)),
+            (*_data(s), *_starter(s, drive, sized, best.numbers)),
         ),
         b.Card("Gear ratio", ((ratio, f"motor turns per {s.driver} turn"),), gear),
         b.Card(
@@ -168,13 +168,16 @@ def _belt(x: OrderedBelt | None) -> Iterator[Line]:
         )
 
 
-def _starter(s: b.Source, x: SizedDrive, numbers: DriveNumbers) -> Iterator[Line]:
+def _starter(s: b.Source, drive: SizedDrive, x: SizedDrive, numbers: DriveNumbers) -> Iterator[Line]:
     """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
     start = s.result["start"] if "starter" in s.result else "direct"
     if start == "soft":
         yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
     elif start == "star-delta":
-        yield s.line("star-delta starter, {=starter.star_delta.time} in star")
+        empty = (
+            ", with the machine empty in each start (empty_start = true)" if drive.needs_empty_start else ""
+        )
+        yield s.line(f"star-delta starter, {{=starter.star_delta.time}} in star{empty}")
         yield _winding(s)
     elif start == "inverter":
         starts = number(numbers.inverter_current).value is not None
@@ -280,7 +283,7 @@ def _best(s: b.Source, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Ite
     for k, item in enumerate(x.parts.items if x.parts is not None else ()):
         if k:
             order.append(line(f"{parts[k].kind} ", item.designation, *_how_to_order(drive, x, k)))
-    order += _starter(s, x, best.numbers)
+    order += _starter(s, drive, x, best.numbers)
     if order and not drive.insufficient:
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
     begin = "Insufficient: " if drive.insufficient else "Chosen: "

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from ...reading.text import number
+from ...study.relay import HEAVIEST, class_words
 from .candidate import TOLERANCES, Candidate, Criterion, Standing
 from .parts import price_words
 from .table import PREFERENCE, PRICE
@@ -37,7 +38,7 @@ ORDER: Mapping[Criterion, str] = {
     Criterion.LARGER: "the power is at most {larger} times (sizing.larger) that of the smallest motor that fits so",
     Criterion.FIELD: "an inverter runs the motor at no more than 1.1 times its rated frequency",
     Criterion.GEAR: "one gear unit has the ratio",
-    Criterion.START: "the start takes a relay of a lower trip class",
+    Criterion.START: "the start takes a relay of a lower trip class, at 20 % more current, too",
     Criterion.FLYWHEEL: "there is no flywheel",
     Criterion.POLES: "4 poles, then 6, then 2, then more than 6; a motor one step larger may have the better number",
     Criterion.POWER: "the power is smaller",
@@ -134,7 +135,7 @@ def _steps(
         (Criterion.PRICE, cheapest) if objective == PRICE else (Criterion.LARGER, most),
         (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
         (Criterion.GEAR, partial(_least, value=_second_unit)),
-        (Criterion.START, partial(_least, value=lambda c: c.trial.start_class or 0)),
+        (Criterion.START, partial(_least, value=lambda c: c.trial.tolerant_class or 0)),
         (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.added_inertia > 0.0))),
         # the better number of poles may cost one step of power
         (Criterion.POWER, partial(_powerful, most=STEP)),
@@ -254,7 +255,7 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate], objective: str) -> st
     if rival.criterion is Criterion.GEAR:
         return f"takes one unit, where {name} takes {_units(rival)}"
     if rival.criterion is Criterion.START:
-        return f"starts in {_class(best)}, where {name} starts in {_class(rival)}"
+        return f"its start takes a relay {_class(best)}, the start of {name} one {_class(rival)}"
     if rival.criterion is Criterion.FLYWHEEL:
         return f"needs no flywheel, where {name} needs one of {rival.flywheel_words}"
     return f"has {best.motor.nameplate.poles:g} poles, where {name} has {rival.motor.nameplate.poles:g}"
@@ -283,7 +284,7 @@ def _behind(c: Candidate, best: Candidate) -> str:
         Criterion.MARGIN: f"leaves less than the margin of {_margin(c)}",
         Criterion.FIELD: f"{_weakened(c)}",
         Criterion.GEAR: f"its ratio takes {_units(c)}",
-        Criterion.START: f"its start is of {_class(c)}, that of the chosen one of {_class(best)}",
+        Criterion.START: f"its start takes a relay {_class(c)}, the start of the chosen one {_class(best)}",
         Criterion.FLYWHEEL: "needs a flywheel, the chosen one none",
         Criterion.POLES: "{:g} poles, where {:g} are to be had".format(*poles),
     }.get(c.criterion or Criterion.POWER, "larger than needed")
@@ -309,4 +310,6 @@ def _mass(c: Candidate) -> str:
 
 
 def _class(c: Candidate) -> str:
-    return f"class {c.trial.start_class}" if c.trial.start_class else "no class"
+    """The class of the relay for a start, in words that follow the noun."""
+    trip_class = c.trial.tolerant_class or 0
+    return class_words(trip_class) if trip_class > HEAVIEST else f"of class {trip_class}"

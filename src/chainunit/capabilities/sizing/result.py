@@ -15,7 +15,7 @@ from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
 from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words, locked_rotor, protects
-from ...study.starts import StartFindings, transient_words
+from ...study.starts import StartFindings, transient_words, weak_in_star
 from ...study.verdict import STEADY
 from .candidate import Candidate, TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
@@ -125,7 +125,8 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
     plate, ratio = study.plate.nameplate, study.drive.ratio
     if study.drive.is_geared and (split := belt_before_gear(ratio)) is not None:
         ratio = split[0]
-    factor = plan.belt_factor(trial.inertia_factor, study.config.drive.start)
+    is_on_line = study.config.drive.start == "direct" or weak_in_star(study)
+    factor = plan.belt_factor(trial.inertia_factor, is_on_line)
     belt = belt_drive(plate.power, trial.speed or plate.speed, ratio, factor)
     power = number(plate.power, "W")
     return OrderedBelt(
@@ -226,6 +227,8 @@ class SizedDrive:
     """the noun of the link that the motor turns"""
     caveat: str | None
     """the caveat of the verdict on the model of the machine, if it has one"""
+    needs_empty_start: bool
+    """whether the motor starts in star and delta, and the feed keeps it from its speed in star"""
     gear: OrderedGear | None = part("the gear to order", titled=True, optional=True, default=None)
     protection: DriveProtection | MotorProtection | None = part(
         "settings of the protection", titled=True, optional=True, default=None
@@ -256,6 +259,8 @@ class SizedDrive:
             limiter = of_driver("torque limiter, trip torque at the {driver} ", self.driver)
             none = f"no torque limiter{aside(protection.why_none)}"
             parts += [limiter + number(torque, "N.m") if torque else none, protection.relay.setting_words]
+        if self.needs_empty_start:
+            parts.append("the machine has to start empty")
         return f"{'; '.join(parts)}{aside(self.caveat)}."
 
 

@@ -425,7 +425,7 @@ def _from_all_angles(trials: MotorTrials, candidates: list[Candidate]) -> None:
 def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
     """What has to be ordered beside the usual parts: a relay for a heavy start or the settings of the inverter, a
     second gear unit."""
-    relay_class = best.trial.start_class or 0
+    relay_class = best.trial.tolerant_class or 0
     if relay_class > LIGHT:
         relay = f"{'of ' if relay_class <= HEAVIEST else ''}{class_words(relay_class)}"
         yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."

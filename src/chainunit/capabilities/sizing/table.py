@@ -185,10 +185,10 @@ class SizingPlan:
         hours, starts = float(self.demands.hours), float(self.demands.starts_per_hour)
         return float(self.demands.service_factor) or gear_factor(self.load(inertia_factor), hours, starts)
 
-    def belt_factor(self, inertia_factor: float, start: str) -> float:
-        """The service factor of a belt, of a motor with that `start`."""
+    def belt_factor(self, inertia_factor: float, is_on_line: bool) -> float:
+        """The service factor of a belt, of a motor that starts at the full voltage of the line or more gently."""
         load, hours = self.load(inertia_factor), float(self.demands.hours)
-        factor = belt_factor(load, hours, is_on_line=start == "direct")
+        factor = belt_factor(load, hours, is_on_line=is_on_line)
         return float(self.demands.service_factor) or factor
 
     def service_words(self, inertia_factor: float) -> str:

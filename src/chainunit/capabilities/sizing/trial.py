@@ -25,14 +25,16 @@ from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
 from ...study.permitted_starts import permitted_starts, starting_data
 from ...study.readings import crank_angle, load_inertia, turns_made
-from ...study.relay import class_holding, start_seconds
+from ...study.relay import start_seconds
 from ...study.rig import Rig, join
 from ...study.start_runs import (
+    BACKWARDS,
     OVERLOADED,
     StartNumbers,
     exceeded_for,
     longest_of,
     longest_start,
+    speed_backwards,
     starts_from_all,
 )
 from ...study.start_up import speeds_up, until_settled
@@ -115,15 +117,23 @@ class Trial:
         return next((start.angle for start in self.starts if start.start_time is None), None)
 
     @cached_property
-    def start_class(self) -> int | None:
-        """Trip class of the relay that holds in each start; None for an inverter, or without a start."""
+    def relay_seconds(self) -> float | None:
+        """The hardest start as time at 7.2 times the rated current [s], see `chainunit.study.relay.start_seconds`;
+        None for an inverter, or without a start."""
         if self._first is None or self.start_time is None or self.drive.follows:
             return None
         rise = self._from_rest.sel(time=slice(None, max(self._first, self.drive.switched_until)))
         time, current = (rise[name].values for name in ("time", f"motor.{self.drive.motor.current}"))
         current = self.drive.relay_current(time, current)
-        first = class_holding(start_seconds(time, current, self.motor.nameplate.rated_current))
-        return max(first, *(start.start_class for start in self.starts), 0)
+        first = start_seconds(time, current, self.motor.nameplate.rated_current)
+        return max(first, *(start.relay_seconds for start in self.starts), 0.0)
+
+    @cached_property
+    def backwards(self) -> float:
+        """Largest speed backwards in a start by an inverter, over the synchronous one; 0 on the line."""
+        if not self.drive.follows:
+            return 0.0
+        return max(speed_backwards(self.drive, self.start), *(start.backwards for start in self.starts), 0.0)
 
     @cached_property
     def start_current(self) -> float | None:
@@ -271,7 +281,7 @@ class Trial:
         is_started = self.start_time is not None
         return TrialResult(
             checks=self.checks(),
-            start_class=self.start_class,
+            relay_seconds=self.relay_seconds,
             start_current=self.start_current,
             inverter_current=self.inverter_current,
             speed=self.speed if is_started else None,
@@ -317,6 +327,10 @@ class Trial:
         if math.isfinite(demands.fluctuation):
             checks["speed"] = Check(
                 "speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"
+            )
+        if self.backwards > BACKWARDS:
+            checks["backwards"] = Check(
+                "speed backwards in the start", self.backwards, BACKWARDS, "1", "percent"
             )
         if self.start_time is None:
             checks = {name: dataclasses.replace(check, value=None) for name, check in checks.items()}
