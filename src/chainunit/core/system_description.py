@@ -225,7 +225,7 @@ class SystemDescription:
         return kept
 
 
-class _Evaluation(NamedTuple):
+class _PartsAtPoint(NamedTuple):
     """A component at one point: its inputs, what its parts share, and the outputs of the computed parts by number."""
 
     inputs: Any
@@ -247,7 +247,7 @@ class SystemPoint:
         self.p = description.parameters(p)
         self._states = dict(states)
         self._known: dict[str, Any] = {}
-        self._final: dict[str, _Evaluation] = {}
+        self._final: dict[str, _PartsAtPoint] = {}
 
     def begin(self, name: str, states: Callable[[], Any]) -> None:
         """Give a component its states, which are computed when they are needed."""
@@ -302,13 +302,13 @@ class SystemPoint:
                 parts[k] = equations(self._xp, self.p[name], u, self.states(name), shared)
             yield output, get(parts[k])
 
-    def _evaluation(self, name: str) -> _Evaluation:
+    def _evaluation(self, name: str) -> _PartsAtPoint:
         """The evaluation of a component with the inputs that are known; it is kept once all of them are."""
         if name in self._final:
             return self._final[name]
         u, complete = self.inputs(name)
         shared = self._of.models[name].shared(self._xp, self.p[name], u, self.states(name))
-        evaluation = _Evaluation(u, shared, {})
+        evaluation = _PartsAtPoint(u, shared, {})
         if complete:
             self._final[name] = evaluation
         return evaluation
