@@ -17,7 +17,7 @@ def trials_of(config, duty):
 
 
 def duty_by(config, folder):
-    return duty_of(task_of(config), config.values, folder, None)
+    return duty_of(task_of(config), config.organs, config.values, folder, None)
 
 
 def sized_by(config, folder, progress=lambda *said: None, backend=None):

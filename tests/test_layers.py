@@ -46,6 +46,7 @@ HOMES = {
     "chainunit.motors": {"drives"},
     "chainunit.models": {"machines", "drives"},
     "chainunit.line": {"study"},
+    "chainunit.organs": {"study", "capabilities"},
     "chainunit.capabilities": {"capabilities"},
 }
 """By group of entry points, the layers that declare in it."""

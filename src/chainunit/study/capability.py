@@ -28,10 +28,8 @@ if TYPE_CHECKING:
     from .event_table import RandomEvent
     from .file_reading import FileReading
     from .proposal import DriveProposal
-    from .record import StudyRecord
     from .rig import Rig
-    from .rules import OtherModel, Rule
-    from .verdict import Verdict
+    from .rules import Rule
 
 
 @dataclass(frozen=True)
@@ -71,12 +69,6 @@ class StudyCapability:
     motor_table: ClassVar[str] = ""
     """the table of these that leaves the choice of the motor to it; at most one capability has such a table"""
 
-    choices: ClassVar[Mapping[str, Any]] = {}
-    """its keys before all tables, as pydantic fields"""
-
-    other_model: ClassVar[OtherModel | None] = None
-    """the key with which the runs of a machine have another model"""
-
     def rules(self) -> Iterable[Rule]:
         """The rules of its keys that do not go together with others."""
         return ()
@@ -94,24 +86,6 @@ class StudyCapability:
     def files(self, data: Mapping[str, Any]) -> Iterable[FileReference]:
         """The files that its tables of a study file name."""
         return ()
-
-    def machine(self, machine: Machine, values: Mapping[str, Any]) -> Machine:
-        """The machine as the study has it, by the values of the tables; with another model of its runs, if the
-        capability brings one."""
-        return machine
-
-    def turns(
-        self,
-        values: Mapping[str, Any],
-        machine: Machine,
-        crank_speed: float,
-        feeds: Iterable[Any],
-        folder: Path,
-        backend: Backend | None,
-    ) -> list[Cycle] | None:
-        """Turns of the machine at constant speed with each of the `feeds`, where its other model is run for them;
-        the tables have these `values`. The FMU is written to `folder`. None where `cycle` gives the turn."""
-        return None
 
     def faults(self, config: Config) -> Iterable[InputError]:
         """Refusals of a plan that does not fit the rest of the study."""
@@ -170,16 +144,6 @@ class StudyCapability:
         InputError
             for the keys that ask for them.
         """
-
-    def model_verdict(
-        self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]
-    ) -> Verdict | None:
-        """The verdict on the model of the machine, if the runs have another one; arguments are those of
-        `chainunit.study.verdict.rigid_links`."""
-        return None
-
-    def remark(self, study: StudyRecord) -> None:
-        """Add remarks on the model of the machine to a study."""
 
     def words(self, driver: str) -> Mapping[str, str]:
         """By name, the words on the numbers of its results, for a comparison of two; they name the `driver`."""

@@ -53,7 +53,7 @@ from .parts import (
     over_example,
     with_linkage,
 )
-from .registry import registered
+from .registry import organ_models, registered
 from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
@@ -157,6 +157,11 @@ class Config:
             if (permitted := part.permitted_temperature(self.plans[part.name])) is not None:
                 return permitted[0], permitted[1]
         return "run.winding_temperature", float(self.run.winding_temperature)
+
+    @property
+    def organs(self) -> Any:
+        """The model of the organs in its runs, a `chainunit.study.organs.OrganModel`."""
+        return organ_models()[self.file.choices["organ"]]
 
     @property
     def plate(self) -> CatalogueMotor | None:
@@ -357,11 +362,9 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
     faults.refuse()
     for name, table in of_study.items():
         of_study[name] = None if table is None else sections[name].completed(table, reading)
-    for capability in registered():
-        machine = capability.machine(machine, of_study)
     config = Config(
         title=checked.title,
-        machine=machine,
+        machine=organ_models()[checked.organ].machine(machine, of_study),
         motor=_motor(data, parts, checked, values["motor"], plate, source),
         drive=DriveTables(
             feed_forward=checked.feed_forward,

@@ -133,24 +133,6 @@ NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
 OF_CHAIN_UNIT = "is of the chain unit, and the machine is {machine}; leave it out"
 
 
-@dataclass(frozen=True)
-class OtherModel:
-    """A key with which the runs of a machine have another model than its turns without a run."""
-
-    on: Condition
-    words: str
-    """what is then another one, such as "organs are chains\""""
-    refusal: str
-    """why there are no quantities of a turn, and the remedy"""
-    remedy: str
-    """what to do where the usual model does not hold"""
-
-
-def other_models() -> list[OtherModel]:
-    """Those of all capabilities."""
-    return [part.other_model for part in registered() if part.other_model]
-
-
 def _of_parts() -> Iterator[Rule]:
     """Rules of the table [system], and of keys that need models of its parts."""
     yield Rule(
@@ -169,6 +151,7 @@ def _of_parts() -> Iterator[Rule]:
 def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
     yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
+    yield Rule("organ", ~has_sides(), OF_CHAIN_UNIT)
     for name in lengths(**filled(Ratios, {})):
         refusal = "given beside [ratios], which sets it; leave out one of the two"
         yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), refusal)

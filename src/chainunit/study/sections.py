@@ -18,7 +18,7 @@ from ..mechanism.models import MachineModel
 from ..system import NAMES
 from .entry_values import FileNames
 from .file_section import FileSection
-from .registry import registered
+from .registry import organ_models, registered
 
 
 @declaration
@@ -147,8 +147,12 @@ CHOICES: Mapping[str, Any] = {
 
 @cache
 def all_choices() -> dict[str, Any]:
-    """The keys before all tables, with the keys of the capabilities."""
-    return dict(CHOICES) | {name: choice for part in registered() for name, choice in part.choices.items()}
+    """The keys before all tables, with the model of the organs."""
+    models = organ_models()
+    usual, *_ = models
+    titles = ", or ".join(model.title for model in models.values())
+    organ = Field(usual, description=f"model of the organs: {titles}")
+    return dict(CHOICES) | {"organ": (Literal[tuple(models)], organ)}
 
 
 def _names_form(title: str, names: Sequence[str]) -> type[BaseModel]:

@@ -128,7 +128,7 @@ class SizingCapability(Capability):
         )
         motors = motors_on_offer(task, offered.motors)
         progress("the machine at constant speed", 0.0, 1.0)
-        duty = duty_of(task, config.values, folder, backend)
+        duty = duty_of(task, config.organs, config.values, folder, backend)
         return size(task, motors, duty, folder, progress, backend).proposal(tables)
 
     def permitted_temperature(self, plan: SizingPlan | None) -> tuple[str, float] | None:
