@@ -33,6 +33,20 @@ class Contents:
     """section of the base before which it stands; empty for one behind the turn at constant speed"""
 
 
+@dataclass(frozen=True)
+class Answer:
+    """The part of a capability in the answer of a study: its blocks, by their place."""
+
+    head: Iterable[Block] = ()
+    """before the verdicts on model and motor"""
+    judgements: Iterable[Block] = ()
+    """after these verdicts"""
+    end: Iterable[Block] = ()
+    """after the numbers of the drive"""
+    warnings: Iterable[Block] = ()
+    """beside the warnings of the study"""
+
+
 class AnyStudy(Protocol):
     """A study from Python, `chainunit.Study`, as a capability knows it."""
 
@@ -57,21 +71,9 @@ class Capability(StudyCapability):
         """The sentence on it in the question of a study; empty where it asks for nothing."""
         return ()
 
-    def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """Its blocks at the head of the answer of a study, before the verdicts on model and motor."""
-        return iter(())
-
-    def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """Its judgements on a study, behind these verdicts."""
-        return iter(())
-
-    def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """Its blocks in the answer of a study."""
-        return iter(())
-
-    def warnings(self, s: Source) -> Iterator[Block]:
-        """Its warnings beside the warnings of the study, to stand at the head of a report."""
-        return iter(())
+    def answer(self, s: Source, study: StudyRecord) -> Answer:
+        """Its part of the answer of a study."""
+        return Answer()
 
     def live_quantities(self, plan: Any, drive: Drive) -> Iterable[LiveQuantity]:
         """The quantities of its table that a reader of a live page may change; `plan` is its plan, or None."""

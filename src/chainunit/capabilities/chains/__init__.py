@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 
-from ...report.blocks import Block, Source
-from ...report.capability import Capability, Contents
+from ...report.blocks import Source
+from ...report.capability import Answer, Capability, Contents
 from ...study.analysis import Analysis
+from ...study.record import StudyRecord
 from ...study.rules import OF_CHAIN_UNIT, Rule, has_sides
 from .organs import CHAINS
 from .table import CHAIN
@@ -41,11 +42,11 @@ class ChainsCapability(Capability):
         title = "Chains and two bars"
         return {"chains": Contents(title, page.blocks, page.PICTURES.files, "chain", "constant_speed")}
 
-    def warnings(self, s: Source) -> Iterator[Block]:
+    def answer(self, s: Source, study: StudyRecord) -> Answer:
         """The speeds to avoid."""
         from .page import speeds_to_avoid
 
-        return speeds_to_avoid(s)
+        return Answer(warnings=speeds_to_avoid(s))
 
 
 CAPABILITY = ChainsCapability()

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pydantic import Field
 
 from ...core.errors import InputError, printable, refusal_prefix
 from ...core.quantities import variables
-from ...report.blocks import Block, Source, Text
-from ...report.capability import Capability, Contents
+from ...report.blocks import Source, Text
+from ...report.capability import Answer, Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, is_above_zero
@@ -120,12 +120,13 @@ class RandomOverloads(Capability):
         sentence = " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}."
         return s.line(sentence, event=study.config.plans[self.name].event.title)
 
-    def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+    def answer(self, s: Source, study: StudyRecord) -> Answer:
         """The largest quantile of the crank torque, and how often a run ends badly."""
-        if "monte_carlo" in study.findings:
-            from . import page
+        if "monte_carlo" not in study.findings:
+            return Answer()
+        from . import page
 
-            yield Text(page.summary(s, study))
+        return Answer(end=[Text(page.summary(s, study))])
 
 
 CAPABILITY = RandomOverloads()

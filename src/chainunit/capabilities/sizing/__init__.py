@@ -10,8 +10,8 @@ from pathlib import Path
 from ...core.errors import InputError
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
-from ...report.blocks import Block, Source
-from ...report.capability import Capability, Contents
+from ...report.blocks import Source
+from ...report.capability import Answer, Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, has_entries, is_one_of
@@ -147,11 +147,11 @@ class SizingCapability(Capability):
 
         return {self.name: Contents("The drive", page.blocks, before="runs")}
 
-    def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """The drive, and the share that it takes of its limits."""
+    def answer(self, s: Source, study: StudyRecord) -> Answer:
+        """The drive with the share that it takes of its limits, and the alarm if no motor fits."""
         from . import page
 
-        return page.answer(s, study)
+        return Answer(head=page.answer(s, study), judgements=page.judgements(study))
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The choice of a drive, with order numbers, of a study whose file gives its motor."""
@@ -160,12 +160,6 @@ class SizingCapability(Capability):
                 "whether another motor or gear serves better, and order numbers: the motor is that of the study "
                 "file, which has no table [sizing]"
             )
-
-    def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """The alarm where no motor fits."""
-        from . import page
-
-        return page.judgements(study)
 
 
 CAPABILITY = SizingCapability()
