@@ -34,7 +34,7 @@ class Contents:
 
 
 @dataclass(frozen=True)
-class Answer:
+class AnswerBlocks:
     """The part of a capability in the answer of a study: its blocks, by their place."""
 
     head: Iterable[Block] = ()
@@ -67,13 +67,9 @@ class Capability(StudyCapability):
         """The sections of a study's report on its findings, by name: that of the analysis."""
         return {}
 
-    def question(self, s: Source, study: StudyRecord) -> Line:
-        """The sentence on it in the question of a study; empty where it asks for nothing."""
-        return ()
-
-    def answer(self, s: Source, study: StudyRecord) -> Answer:
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
         """Its part of the answer of a study."""
-        return Answer()
+        return AnswerBlocks()
 
     def live_quantities(self, plan: Any, drive: Drive) -> Iterable[LiveQuantity]:
         """The quantities of its table that a reader of a live page may change; `plan` is its plan, or None."""

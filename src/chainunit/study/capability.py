@@ -25,10 +25,8 @@ if TYPE_CHECKING:
     from .config import Config
     from .cycle import Cycle
     from .drive import Drive
-    from .event_table import RandomEvent
     from .file_reading import FileReading
     from .proposal import DriveProposal
-    from .rig import Rig
     from .rules import Rule
 
 
@@ -106,14 +104,6 @@ class StudyCapability:
         """Permitted temperature of the winding of the motor that it chooses [K], after its name in the study file."""
         return None
 
-    def random_events(self, plan: Any) -> Mapping[str, RandomEvent]:
-        """By the key that states it, the events with ranges that its runs have."""
-        return {}
-
-    def longest_run(self, plan: Any) -> float:
-        """Time of the longest of its runs [s]."""
-        return 0.0
-
     def shaft_inertia(self, plan: Any) -> float:
         """Inertia that it adds to the motor's shaft [kg m2]."""
         return 0.0
@@ -126,28 +116,6 @@ class StudyCapability:
         """The drive with the parts of the system that the capability adds beside the line; the machine has this
         `feed` and `turn` in normal running."""
         return drive
-
-    def check_scheduler(self, plan: Any, scheduler: str) -> None:
-        """Refuse the address of a scheduler whose workers have nothing to do, or that does not answer.
-
-        Raises
-        ------
-        InputError
-            see `chainunit.work.runner.check_scheduler`.
-        """
-
-    def check_runs(self, plan: Any, rig: Rig) -> None:
-        """Refuse runs that the drive cannot make, before any is made.
-
-        Raises
-        ------
-        InputError
-            for the keys that ask for them.
-        """
-
-    def words(self, driver: str) -> Mapping[str, str]:
-        """By name, the words on the numbers of its results, for a comparison of two; they name the `driver`."""
-        return {}
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
         """Write into its `tables` of the study file with estimated numbers what follows from their errors."""

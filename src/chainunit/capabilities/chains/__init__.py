@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from ...report.blocks import Source
-from ...report.capability import Answer, Capability, Contents
+from ...report.capability import AnswerBlocks, Capability, Contents
 from ...study.analysis import Analysis
 from ...study.record import StudyRecord
 from ...study.rules import OF_CHAIN_UNIT, Rule, has_sides
@@ -42,11 +42,11 @@ class ChainsCapability(Capability):
         title = "Chains and two bars"
         return {"chains": Contents(title, page.blocks, page.PICTURES.files, "chain", "constant_speed")}
 
-    def answer(self, s: Source, study: StudyRecord) -> Answer:
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
         """The speeds to avoid."""
         from .page import speeds_to_avoid
 
-        return Answer(warnings=speeds_to_avoid(s))
+        return AnswerBlocks(warnings=speeds_to_avoid(s))
 
 
 CAPABILITY = ChainsCapability()

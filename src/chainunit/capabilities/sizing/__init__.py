@@ -11,7 +11,7 @@ from ...core.errors import InputError
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...report.blocks import Source
-from ...report.capability import Answer, Capability, Contents
+from ...report.capability import AnswerBlocks, Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, has_entries, is_one_of
@@ -147,11 +147,11 @@ class SizingCapability(Capability):
 
         return {self.name: Contents("The drive", page.blocks, before="runs")}
 
-    def answer(self, s: Source, study: StudyRecord) -> Answer:
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
         """The drive with the share that it takes of its limits, and the alarm if no motor fits."""
         from . import page
 
-        return Answer(head=page.answer(s, study), judgements=page.judgements(study))
+        return AnswerBlocks(head=page.answer(s, study), judgements=page.judgements(study))
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The choice of a drive, with order numbers, of a study whose file gives its motor."""

@@ -11,7 +11,7 @@ from ...core.quantities import quantity
 from ...mechanism.models import InverseMachine
 from ...reading.results import result
 from ...report.blocks import Source, Text
-from ...report.capability import Answer, Capability
+from ...report.capability import AnswerBlocks, Capability
 from ...study.analysis import Analysis, Findings, Work
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
@@ -74,16 +74,16 @@ class StaticInertiaCapability(Capability):
         """Both torques."""
         return (StaticInertiaAnalysis,)
 
-    def answer(self, s: Source, study: StudyRecord) -> Answer:
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
         """A line if they differ."""
         findings = StaticInertiaFindings.found_in(study)
         if findings is None or abs(findings.static - findings.machine) <= _ALIKE * findings.machine:
-            return Answer()
+            return AnswerBlocks()
         sentence = (
             "A constant-inertia calculation takes RMS {static_inertia.static} instead of "
             "{static_inertia.machine} at the {driver}."
         )
-        return Answer(end=[Text(s.line(sentence))])
+        return AnswerBlocks(end=[Text(s.line(sentence))])
 
 
 CAPABILITY = StaticInertiaCapability()
