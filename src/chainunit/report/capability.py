@@ -8,13 +8,11 @@ from typing import Any, Protocol, Self
 
 from ..study.capability import StudyCapability
 from ..study.config import Config
-from ..study.drive import Drive
 from ..study.record import StudyRecord
 from ..study.registry import capabilities as registered
 from ..work.progress import TaskProgress
 from .blocks import Block, Source
 from .lines import Line
-from .live.quantities import LiveQuantity
 from .reported_result import ReportedResult
 from .supplement import Supplement
 
@@ -70,10 +68,6 @@ class Capability(StudyCapability):
     def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
         """Its part of the answer of a study."""
         return AnswerBlocks()
-
-    def live_quantities(self, plan: Any, drive: Drive) -> Iterable[LiveQuantity]:
-        """The quantities of its table that a reader of a live page may change; `plan` is its plan, or None."""
-        return ()
 
     def on_sheet(self) -> tuple[str, ...]:
         """Names of its sections that belong on the sheet of a study, not in the annex alone."""

@@ -11,22 +11,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..core.errors import InputError
 from .file_section import FileSection
 
 if TYPE_CHECKING:
-    from ..fmu.backends import Backend
     from ..machines.machine import Machine
-    from ..work.progress import TaskProgress
     from .analysis import Analysis
     from .config import Config
     from .cycle import Cycle
     from .drive import Drive
     from .file_reading import FileReading
-    from .proposal import DriveProposal
     from .rules import Rule
 
 
@@ -64,8 +60,6 @@ class StudyCapability:
 
     tables: ClassVar[Mapping[str, FileSection]] = {}
     """its tables of the study file, by name"""
-    motor_table: ClassVar[str] = ""
-    """the table of these that leaves the choice of the motor to it; at most one capability has such a table"""
 
     def rules(self) -> Iterable[Rule]:
         """The rules of its keys that do not go together with others."""
@@ -92,25 +86,6 @@ class StudyCapability:
     def unused_values(self, machine: Machine, plan: Any) -> Iterable[str]:
         """Names of the values of its tables that have no meaning for that machine and plan."""
         return ()
-
-    def drive(
-        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
-    ) -> DriveProposal | None:
-        """The drive that it chooses; None for a study whose file gives one. The FMUs that it needs are written to
-        `folder`."""
-        return None
-
-    def permitted_temperature(self, plan: Any) -> tuple[str, float] | None:
-        """Permitted temperature of the winding of the motor that it chooses [K], after its name in the study file."""
-        return None
-
-    def shaft_inertia(self, plan: Any) -> float:
-        """Inertia that it adds to the motor's shaft [kg m2]."""
-        return 0.0
-
-    def not_with_foreign_motor(self, plan: Any) -> str:
-        """The reason and the remedy where its plan needs a motor of this package; empty where it does not."""
-        return ""
 
     def beside(self, plan: Any, drive: Drive, feed: Any, turn: Cycle) -> Drive:
         """The drive with the parts of the system that the capability adds beside the line; the machine has this

@@ -53,6 +53,7 @@ from .parts import (
     over_example,
     with_linkage,
 )
+from .proposal import motor_choice
 from .registry import organ_models, registered
 from .run_checks import endless, loads_beyond
 from .sections import (
@@ -153,9 +154,8 @@ class Config:
     def permitted_temperature(self) -> tuple[str, float]:
         """Permitted temperature of the winding if the steady turns go on for ever [K], after its name in the
         study file."""
-        for part in registered():
-            if (permitted := part.permitted_temperature(self.plans[part.name])) is not None:
-                return permitted[0], permitted[1]
+        if (choice := motor_choice(self.plans)) is not None:
+            return choice.permitted_temperature
         return "run.winding_temperature", float(self.run.winding_temperature)
 
     @property
@@ -327,7 +327,7 @@ _OF_PARTS = ("machine", "ratios", "motor")
 """Tables whose values follow from others, too: `Config` has them as machine and motor."""
 _OWN_TABLES = ("feed", "run", "coupling")
 """Tables whose values are fields of a `Config`."""
-_OF_DRIVE = ("gear", "starter")
+_OF_DRIVE = ("gear", "starter", "flywheel")
 """Tables whose values are fields of `Config.drive`."""
 
 

@@ -3,14 +3,47 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..drives.catalogue import CatalogueMotor
 from .drive import Drive
 from .drive_tables import DriveTables
 from .torques import DutyPeak
+
+if TYPE_CHECKING:
+    from ..fmu.backends import Backend
+    from ..work.progress import TaskProgress
+    from .config import Config
+
+
+class MotorChoice(ABC):
+    """The choice of the motor of a study: the plan of the capability that makes it."""
+
+    @property
+    @abstractmethod
+    def permitted_temperature(self) -> tuple[str, float]:
+        """Permitted temperature of the winding [K], after its name in the study file."""
+
+    @abstractmethod
+    def proposal(
+        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
+    ) -> DriveProposal:
+        """The drive. The FMUs that its search needs are written to `folder`.
+
+        Raises
+        ------
+        InputError
+            for a catalogue from which no motor can be chosen.
+        """
+
+
+def motor_choice(plans: Mapping[str, Any]) -> MotorChoice | None:
+    """The choice among the `plans` of a study; None for a file that gives its motor."""
+    return next((plan for plan in plans.values() if isinstance(plan, MotorChoice)), None)
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from .conditions import (
 from .foreign_machine import ForeignModel
 from .parts import FMU, Parts, parts_of
 from .registry import registered
+from .sections import choosing_tables
 
 
 @dataclass(frozen=True)
@@ -109,11 +110,7 @@ def motor_of_catalogue() -> Condition:
 
 def motor_is_chosen() -> Condition:
     """Whether the file leaves the choice of the motor to a capability."""
-    return _any([given(table) for table in _choosing_tables()])
-
-
-def _choosing_tables() -> list[str]:
-    return [part.motor_table for part in registered() if part.motor_table]
+    return _any([given(table) for table in choosing_tables()])
 
 
 def all_rules() -> tuple[Rule, ...]:
@@ -163,8 +160,10 @@ def _of_motors() -> Iterator[Rule]:
     deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
     refusal = "a motor of the type {type} has no input for the torque; leave it out"
     chosen, switched_on = motor_is_chosen(), is_one_of("feed_forward", True)
+    found = "sizing finds its own; leave out one of the two"
+    yield Rule("flywheel", chosen, found, has_entries("flywheel"))
     yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), refusal, switched_on)
-    keys = " or ".join([*(f"[{table}]" for table in _choosing_tables()), "system.motor"])
+    keys = " or ".join([*(f"[{table}]" for table in choosing_tables()), "system.motor"])
     for name in ("gear", "start", "starter", "catalogue"):
         refusal = f"is of a motor of the catalogue; add {keys}, or leave it out"
         yield Rule(name, ~(chosen | motor_of_catalogue()), refusal)

@@ -16,7 +16,7 @@ from ..drives.motor import Motor
 from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
-from .entry_values import FileNames
+from .entry_values import FileNames, numbers
 from .file_section import FileSection
 from .registry import organ_models, registered
 
@@ -77,6 +77,21 @@ class Coupling:
         default=0.05,
         min=0.0,
         max=0.5,
+    )
+
+
+@declaration
+class Flywheel:
+    """A flywheel on the motor's shaft, and the fluctuation for which the least one is searched."""
+
+    J: Value = quantity("kg.m2", "inertia of the flywheel, on the motor shaft", default=0.0, min=0.0, max=1e6)
+    fluctuation: Value = quantity(
+        "1",
+        "permitted fluctuation of the speed, (largest - least)/mean",
+        default=0.05,
+        min=1e-4,
+        max=1.0,
+        kind="percent",
     )
 
 
@@ -214,6 +229,17 @@ SECTIONS: Mapping[str, FileSection] = {
             "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
         },
     ),
+    "flywheel": FileSection(
+        Flywheel,
+        optional=True,
+        keys={
+            "compare": (
+                numbers(Flywheel, "J", "flywheel.compare", 12),
+                Field([], description="flywheels that are compared [kg m2]"),
+            )
+        },
+        title="Flywheel",
+    ),
 }
 """The tables of every study file beside those of its machine, its feed, its motor, of the parts of the line, and of
 the capabilities."""
@@ -230,6 +256,11 @@ def all_sections() -> dict[str, FileSection]:
             name: part_section for name, part_section in part_tables.items() if part_section.before == table
         } | {table: section}
     return tables | part_tables
+
+
+def choosing_tables() -> list[str]:
+    """The tables that leave the choice of the motor to a capability."""
+    return [name for name, section in all_sections().items() if section.chooses_motor]
 
 
 _KIND_OF_MOTOR = (

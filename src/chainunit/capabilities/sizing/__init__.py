@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from ...core.errors import InputError
-from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...report.blocks import Source
 from ...report.capability import AnswerBlocks, Capability, Contents
@@ -18,10 +16,8 @@ from ...study.conditions import given, has_entries, is_one_of
 from ...study.config import Config
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from ...study.rules import BESIDE_MOTOR, Rule, has_sides
-from ...work.progress import TaskProgress
 from .table import SIZING_KEYS, Sizing, SizingPlan
 
 _SUPPLY = (
@@ -35,7 +31,6 @@ class SizingCapability(Capability):
 
     name = "sizing"
     order = 20
-    motor_table = "sizing"
     tables = {  # noqa: RUF012
         "sizing": FileSection(
             Sizing,
@@ -46,6 +41,7 @@ class SizingCapability(Capability):
             keys=SIZING_KEYS,
             before="gear",
             title="Demands on the motor",
+            chooses_motor=True,
             apart=True,
             follows={
                 "fluctuation": "none",
@@ -107,33 +103,6 @@ class SizingCapability(Capability):
     def unused_values(self, machine: Machine, plan: SizingPlan | None) -> Iterable[str]:
         """A machine without sides has no one-sided feed."""
         return () if machine.model.sides else ("sizing.one_sided_share",)
-
-    def drive(
-        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
-    ) -> DriveProposal | None:
-        """The best of the motors that it tries."""
-        plan: SizingPlan | None = config.plans[self.name]
-        if plan is None:
-            return None
-        from ...drives.catalogue import offer
-        from .duty import duty_of
-        from .gear_rows import strong_enough
-        from .search import motors_on_offer, size
-        from .task import SizingTask
-
-        offered, tables = offer(*config.file.catalogues), config.drive
-        gears = strong_enough(offered.gears, float(plan.demands.gear_torque))
-        task = SizingTask(
-            plan, tables, config.machine, config.operation, config.events, gears, offered.couplings
-        )
-        motors = motors_on_offer(task, offered.motors)
-        progress("the machine at constant speed", 0.0, 1.0)
-        duty = duty_of(task, config.organs, config.values, folder, backend)
-        return size(task, motors, duty, folder, progress, backend).proposal(tables)
-
-    def permitted_temperature(self, plan: SizingPlan | None) -> tuple[str, float] | None:
-        """That of its table."""
-        return None if plan is None else ("sizing.temperature", float(plan.demands.temperature))
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The protection of the drive."""
