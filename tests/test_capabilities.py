@@ -19,6 +19,7 @@ import chainunit
 from chainunit.core.register import entries
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.registry import CAPABILITIES, _capability, capabilities
+from chainunit.study.sections import choosing_tables
 
 PACKAGE = Path(chainunit.__file__).parent
 NAMES = sorted(wheels.declared(wheels.PROJECT.read_text("utf-8"))[CAPABILITIES])
@@ -76,7 +77,7 @@ def test_the_entry_points_name_the_folders():
     }
     own_tests = {path.parent.name for path in (Path(__file__).parent / "capabilities").glob("*/test_*.py")}
     assert own_tests <= set(NAMES)
-    assert len([part for part in capabilities() if part.motor_table]) <= 1
+    assert choosing_tables() == ["sizing"]
 
 
 def test_a_folder_with_a_command_alone_is_no_capability_and_an_empty_one_is_an_error(tmp_path, monkeypatch):

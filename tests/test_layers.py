@@ -132,7 +132,7 @@ DOORS = {
     # the reader
     "study.study_file": {"changed_tables"},
     # the registry: capabilities have their hooks in the folder's own module, or in `capability`
-    "study.capability": {"faults", "drive", "take_estimates"},
+    "study.capability": {"faults", "take_estimates"},
     # the run of a study, from Python and as a task
     "study.provenance": {"provenance", "writers"},
     "study.choice": {"choose", "choose_for", "drive_of"},

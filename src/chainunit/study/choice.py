@@ -54,7 +54,7 @@ def choose_for(
     if source is None:
         chosen = motor_choice(plans)
         assert chosen is not None, "a file without a motor has a table that chooses one"
-        proposal = chosen.proposal(config, folder, progress, backend)
+        proposal = chosen.proposal(config.drive_request, folder, progress, backend)
         return Choice(_with_line(proposal.drive, plans, turn), proposal.tables, proposal)
     source.check(tables, plans)
     drive = _with_line(source.drive(tables, config.machine, turn), plans, turn)

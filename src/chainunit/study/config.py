@@ -53,7 +53,7 @@ from .parts import (
     over_example,
     with_linkage,
 )
-from .proposal import motor_choice
+from .proposal import DriveRequest, motor_choice
 from .registry import organ_models, registered
 from .run_checks import endless, loads_beyond
 from .sections import (
@@ -148,6 +148,19 @@ class Config:
         """What the runs of the drive have in common."""
         return OperatingConditions(
             self.run, self.feed, self.empty_start, self.drive.starter_time, self.coupling, self.simulation
+        )
+
+    @property
+    def drive_request(self) -> DriveRequest:
+        """The machine for a capability that chooses its motor."""
+        return DriveRequest(
+            self.machine,
+            self.organs,
+            self.operation,
+            self.events,
+            self.drive,
+            self.values,
+            self.file.catalogues,
         )
 
     @property

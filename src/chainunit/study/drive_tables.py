@@ -6,7 +6,7 @@ from collections.abc import Set
 from dataclasses import dataclass, field
 
 from ..drives.gearing import Transmission
-from .sections import Flywheel, Starter
+from .sections import FlywheelTable, Starter
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class DriveTables:
     start: str
     """one of `chainunit.study.sections.STARTS`"""
     starter: Starter
-    flywheel: Flywheel | None
+    flywheel: FlywheelTable | None
     given: Set[str] = field(compare=False)
     """names of all values that the file sets, such as "gear.ratio\""""
 

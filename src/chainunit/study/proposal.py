@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,8 +16,25 @@ from .torques import DutyPeak
 
 if TYPE_CHECKING:
     from ..fmu.backends import Backend
+    from ..machines.machine import Machine
     from ..work.progress import TaskProgress
-    from .config import Config
+    from .event import Event
+    from .operation import OperatingConditions
+
+
+@dataclass(frozen=True)
+class DriveRequest:
+    """A machine in its operation that needs a motor, and the tables of the study file on its drive."""
+
+    machine: Machine
+    organs: Any
+    """the model of its organs, a `chainunit.study.organs.OrganModel`"""
+    operation: OperatingConditions
+    events: Mapping[str, Event]
+    tables: DriveTables
+    values: Mapping[str, Any]
+    """values of the tables of the capabilities, by table"""
+    catalogues: Sequence[Path]
 
 
 class MotorChoice(ABC):
@@ -30,7 +47,7 @@ class MotorChoice(ABC):
 
     @abstractmethod
     def proposal(
-        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
+        self, request: DriveRequest, folder: Path, progress: TaskProgress, backend: Backend | None
     ) -> DriveProposal:
         """The drive. The FMUs that its search needs are written to `folder`.
 

@@ -81,7 +81,7 @@ class Coupling:
 
 
 @declaration
-class Flywheel:
+class FlywheelTable:
     """A flywheel on the motor's shaft, and the fluctuation for which the least one is searched."""
 
     J: Value = quantity("kg.m2", "inertia of the flywheel, on the motor shaft", default=0.0, min=0.0, max=1e6)
@@ -230,11 +230,11 @@ SECTIONS: Mapping[str, FileSection] = {
         },
     ),
     "flywheel": FileSection(
-        Flywheel,
+        FlywheelTable,
         optional=True,
         keys={
             "compare": (
-                numbers(Flywheel, "J", "flywheel.compare", 12),
+                numbers(FlywheelTable, "J", "flywheel.compare", 12),
                 Field([], description="flywheels that are compared [kg m2]"),
             )
         },

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.file_reading import FileReading
-from ...study.sections import Flywheel
+from ...study.sections import FlywheelTable
 
 
 @dataclass(frozen=True)
 class FlywheelPlan:
     """The flywheel of the study with the permitted fluctuation, and the inertias that are compared [kg m2]."""
 
-    table: Flywheel
+    table: FlywheelTable
     compared: tuple[float, ...]
 
 

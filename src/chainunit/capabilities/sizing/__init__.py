@@ -18,6 +18,7 @@ from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.record import StudyRecord
 from ...study.rules import BESIDE_MOTOR, Rule, has_sides
+from .choice import SizingChoice
 from .table import SIZING_KEYS, Sizing, SizingPlan
 
 _SUPPLY = (
@@ -77,7 +78,7 @@ class SizingCapability(Capability):
         # the table of another capability, if the program has it
         if "hours" in reading.data.get("usage", {}) and "hours" not in reading.data["sizing"]:
             demands = replace(demands, hours=reading.values["usage"].hours)
-        return SizingPlan(
+        return SizingChoice(
             demands,
             form.gear_kind,
             form.ratio_series,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, StrictBool
@@ -13,12 +12,8 @@ from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_ratios import UNITS
 from ...drives.gearing import Transmission
 from ...drives.service_factor import LOAD_CLASSES, LOAD_WORDS, belt_factor, gear_factor, load_class
-from ...fmu.backends import Backend
 from ...study.catalogue_drive import GearOffer
-from ...study.config import Config
 from ...study.entry_values import numbers
-from ...study.proposal import DriveProposal, MotorChoice
-from ...work.progress import TaskProgress
 
 
 @declaration
@@ -169,7 +164,7 @@ SIZING_KEYS: Mapping[str, Any] = {
 
 
 @dataclass(frozen=True)
-class SizingPlan(MotorChoice):
+class SizingPlan:
     """The demands on a motor of the catalogue, and the ratios of gears on offer, empty for a series of ratios."""
 
     demands: Sizing
@@ -207,31 +202,6 @@ class SizingPlan(MotorChoice):
             f"{LOAD_WORDS[self.load(inertia_factor)]} {by}, {hours} h a day, {starts} {noun} an hour; typical of "
             "makers (sizing.load_class, sizing.hours, sizing.service_factor)"
         )
-
-    @property
-    def permitted_temperature(self) -> tuple[str, float]:
-        """See `MotorChoice`."""
-        return "sizing.temperature", float(self.demands.temperature)
-
-    def proposal(
-        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
-    ) -> DriveProposal:
-        """The best of the motors that are tried."""
-        from ...drives.catalogue import offer
-        from .duty import duty_of
-        from .gear_rows import strong_enough
-        from .search import motors_on_offer, size
-        from .task import SizingTask
-
-        offered, tables = offer(*config.file.catalogues), config.drive
-        gears = strong_enough(offered.gears, float(self.demands.gear_torque))
-        task = SizingTask(
-            self, tables, config.machine, config.operation, config.events, gears, offered.couplings
-        )
-        motors = motors_on_offer(task, offered.motors)
-        progress("the machine at constant speed", 0.0, 1.0)
-        duty = duty_of(task, config.organs, config.values, folder, backend)
-        return size(task, motors, duty, folder, progress, backend).proposal(tables)
 
     @property
     def offer(self) -> GearOffer:

@@ -18,7 +18,7 @@ from ...study.event import Event
 from ...study.parts import LENGTHS
 from ...study.proposal import DriveProposal
 from ...study.registry import parts_of_line
-from ...study.sections import Flywheel, choosing_tables
+from ...study.sections import FlywheelTable, choosing_tables
 from ...study.study_file import changed_tables
 from ...study.verdict import Verdict
 from ..live_block import LiveMachine
@@ -63,7 +63,7 @@ def of_study(
     chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, model_names)]
     if runs:
         chosen += runs.quantities
-        J = variable_of(Flywheel, "J")
+        J = variable_of(FlywheelTable, "J")
         chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", role="added"))
     # names of other files are as in the study file, beside which the copy lies
     folder = Path(config.file.source).parent
