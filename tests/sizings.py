@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from chainunit.capabilities.sizing import CAPABILITY
 from chainunit.capabilities.sizing.duty import duty_of
 from chainunit.capabilities.sizing.motor_trials import MotorTrials
 from chainunit.capabilities.sizing.task import SizingTask
@@ -17,9 +16,9 @@ def trials_of(config, duty):
 
 
 def duty_by(config, folder):
-    return duty_of(task_of(config), config.values, folder, None)
+    return duty_of(task_of(config), config.organs, config.values, folder, None)
 
 
 def sized_by(config, folder, progress=lambda *said: None, backend=None):
     """The findings of sizing; see `chainunit.study.run.run_study`."""
-    return CAPABILITY.drive(config, folder, progress, backend).findings
+    return config.plans["sizing"].proposal(config.drive_request, folder, progress, backend).findings

@@ -51,10 +51,10 @@ def drive_of(study, folder):
 def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
     """Its FMU has all inertia on its shaft."""
     study = parse(KNIFE.replace("[gear]\n", "[gear]\nJ = 0.003\n"))
-    assert study.drive.gear.J == 0.003 and study.values["flywheel"].J > 0.0
+    assert study.drive.gear.J == 0.003 and study.drive.flywheel.J > 0.0
     drive, plate = drive_of(study, tmp_path), study.plate.model()[1].rotor
     assert (drive.parameters.rotor.J, drive.parameters.rotor.d) == (plate.J, plate.d)
-    whole = plate.J + 0.003 + study.values["flywheel"].J
+    whole = plate.J + 0.003 + study.drive.flywheel.J
     assert drive.fmu_parameters.rotor.J == drive.rotor_inertia == pytest.approx(whole, rel=1e-12)
     assert drive.fmu_parameters.rotor.d == plate.d
     assert drive.fmu_parameters.gear.loss == pytest.approx(1.0 / study.drive.gear.efficiency - 1.0)

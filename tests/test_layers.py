@@ -46,6 +46,7 @@ HOMES = {
     "chainunit.motors": {"drives"},
     "chainunit.models": {"machines", "drives"},
     "chainunit.line": {"study"},
+    "chainunit.organs": {"study", "capabilities"},
     "chainunit.capabilities": {"capabilities"},
 }
 """By group of entry points, the layers that declare in it."""
@@ -131,7 +132,7 @@ DOORS = {
     # the reader
     "study.study_file": {"changed_tables"},
     # the registry: capabilities have their hooks in the folder's own module, or in `capability`
-    "study.capability": {"faults", "drive", "take_estimates"},
+    "study.capability": {"faults", "take_estimates"},
     # the run of a study, from Python and as a task
     "study.provenance": {"provenance", "writers"},
     "study.choice": {"choose", "choose_for", "drive_of"},

@@ -58,7 +58,7 @@ def mill():
     config = parse(MILL)
     bars = cycle(config.machine, config.run.crank_speed, config.feed)
     drive = catalogue_drive(config.drive, config.machine, bars, config.plate)
-    drive = replace(drive, added_inertia=config.values["flywheel"].J)
+    drive = replace(drive, added_inertia=config.drive.flywheel.J)
     rig = Rig(config.operation, drive, None)
     with rig.from_rest() as simulation:
         start = start_up(rig, simulation, lambda time: None, {})

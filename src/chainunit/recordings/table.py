@@ -16,7 +16,8 @@ from ..reading.lists import Entry, leaves
 from ..reading.tables import instance
 from ..study.conditions import given
 from ..study.entry_values import filled_text
-from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen, other_models
+from ..study.organs import finer_models
+from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen
 from .measurands import COLUMNS as READABLE
 from .recording import Recording, read_signal, with_rms
 
@@ -75,7 +76,7 @@ def recording_rules(table: str) -> Iterator[Rule]:
         (MOTOR_FMU, "motor is an FMU"),
         (motor_is_chosen(), "motor is not known before it is chosen"),
         (given("driveline"), "driveline stands between motor and machine"),
-        *((other.on, other.words) for other in other_models()),
+        *((model.is_chosen, model.phrase) for model in finer_models()),
     ):
         yield Rule(
             table,

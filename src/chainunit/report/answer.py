@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 from ..core.descriptions import of_driver
 from ..core.quantities import finite
@@ -21,8 +22,8 @@ _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The drive where it was chosen, first in a sentence; the verdicts, the cards and the warnings."""
     yield from sentence(s)
-    for part in capabilities():
-        yield from part.head(s, study)
+    parts = [part.answer(s, study) for part in capabilities()]
+    yield from chain.from_iterable(part.head for part in parts)
     for subject in ("model", "motor"):
         verdict = s.result["verdict"][subject]
         if verdict is not None:
@@ -30,8 +31,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if slips := s.result["slips"]:
         items = tuple(s.words(f"slips.{i}.said") for i in range(len(slips)))
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
-    for part in capabilities():
-        yield from part.judgements(s, study)
+    yield from chain.from_iterable(part.judgements for part in parts)
     answers = s.result["answers"]
     if answers:
         reference = "steady" if "steady" in answers else next(iter(answers))
@@ -46,10 +46,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Cards(tuple(_cards(s, study, reference)))
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
-    for part in capabilities():
-        yield from part.answer(s, study)
+    yield from chain.from_iterable(part.end for part in parts)
     warnings: list[b.Block] = [b.Judgement("warning", warning) for warning in s.lines("warnings")]
-    warnings += (block for part in capabilities() for block in part.warnings(s))
+    warnings += chain.from_iterable(part.warnings for part in parts)
     yield from warnings
     yield from remark_tables(study.warnings, "warnings")
     if answers and not warnings:

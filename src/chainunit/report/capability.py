@@ -8,13 +8,11 @@ from typing import Any, Protocol, Self
 
 from ..study.capability import StudyCapability
 from ..study.config import Config
-from ..study.drive import Drive
 from ..study.record import StudyRecord
 from ..study.registry import capabilities as registered
 from ..work.progress import TaskProgress
 from .blocks import Block, Source
 from .lines import Line
-from .live.quantities import LiveQuantity
 from .reported_result import ReportedResult
 from .supplement import Supplement
 
@@ -31,6 +29,20 @@ class Contents:
     """name of its analysis, if the section has another name"""
     before: str = ""
     """section of the base before which it stands; empty for one behind the turn at constant speed"""
+
+
+@dataclass(frozen=True)
+class AnswerBlocks:
+    """The part of a capability in the answer of a study: its blocks, by their place."""
+
+    head: Iterable[Block] = ()
+    """before the verdicts on model and motor"""
+    judgements: Iterable[Block] = ()
+    """after these verdicts"""
+    end: Iterable[Block] = ()
+    """after the numbers of the drive"""
+    warnings: Iterable[Block] = ()
+    """beside the warnings of the study"""
 
 
 class AnyStudy(Protocol):
@@ -53,29 +65,9 @@ class Capability(StudyCapability):
         """The sections of a study's report on its findings, by name: that of the analysis."""
         return {}
 
-    def question(self, s: Source, study: StudyRecord) -> Line:
-        """The sentence on it in the question of a study; empty where it asks for nothing."""
-        return ()
-
-    def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """Its blocks at the head of the answer of a study, before the verdicts on model and motor."""
-        return iter(())
-
-    def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """Its judgements on a study, behind these verdicts."""
-        return iter(())
-
-    def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """Its blocks in the answer of a study."""
-        return iter(())
-
-    def warnings(self, s: Source) -> Iterator[Block]:
-        """Its warnings beside the warnings of the study, to stand at the head of a report."""
-        return iter(())
-
-    def live_quantities(self, plan: Any, drive: Drive) -> Iterable[LiveQuantity]:
-        """The quantities of its table that a reader of a live page may change; `plan` is its plan, or None."""
-        return ()
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+        """Its part of the answer of a study."""
+        return AnswerBlocks()
 
     def on_sheet(self) -> tuple[str, ...]:
         """Names of its sections that belong on the sheet of a study, not in the annex alone."""

@@ -10,6 +10,7 @@ from importlib import metadata
 from typing import Any
 
 from ..reading.text import shown_in
+from ..study.event_table import random_runs
 from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
 from ..study.result import as_dict
@@ -106,8 +107,10 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if names := study.overloads:
         titles = "; ".join(run_names.title(study, name) for name in names)
         question += line(f" Then come overloads, each by itself: {titles}.")
-    for part in capabilities():
-        question = line(question, part.question(s, study))
+    for plan in random_runs(study.config.plans):
+        if plan.table in study.findings:
+            sentence = f" Then come {{={plan.table}.runs}} overloads at random, each by itself: {{event}}."
+            question += s.line(sentence, event=plan.event.title)
     yield b.Text(question, form="long")
     is_chosen, feed = study.proposal is not None, study.config.feed
     parts = {"machine": study.drive.machine.p, "run": study.config.run}

@@ -8,15 +8,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ..core.errors import InputError, printable
 from ..core.files import atomic_file
 from ..models import MODELS
 from ..study.choice import check_motor
 from ..study.config import Config
+from ..study.event_table import random_runs
 from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
-from ..study.registry import registered
 from ..study.result import StudyData
 from ..study.run import run_study
 from ..work.progress import TaskProgress
+from ..work.runner import check_scheduler
 from . import pdf, print_figures, series
 from . import study as contents
 from .blocks import Report
@@ -27,8 +29,13 @@ from .task import Task, Writer
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
     check_motor(config.motor, config.drive, config.plans, config.file.catalogues)
     if scheduler is not None:
-        for part in registered():
-            part.check_scheduler(config.plans[part.name], scheduler)
+        for runs in random_runs(config.plans):
+            if not runs.runs:
+                raise InputError(
+                    f"scheduler {printable(scheduler)}: is for random overloads, and this study has none "
+                    f"({runs.table}.runs); leave it out"
+                )
+        check_scheduler(scheduler)
 
 
 def _compute(config: Config, folder: Path, progress: TaskProgress, **options: Any) -> StudyRecord:

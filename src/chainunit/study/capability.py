@@ -11,27 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..core.errors import InputError
 from .file_section import FileSection
 
 if TYPE_CHECKING:
-    from ..fmu.backends import Backend
     from ..machines.machine import Machine
-    from ..work.progress import TaskProgress
     from .analysis import Analysis
     from .config import Config
     from .cycle import Cycle
     from .drive import Drive
-    from .event_table import RandomEvent
     from .file_reading import FileReading
-    from .proposal import DriveProposal
-    from .record import StudyRecord
-    from .rig import Rig
-    from .rules import OtherModel, Rule
-    from .verdict import Verdict
+    from .rules import Rule
 
 
 @dataclass(frozen=True)
@@ -68,14 +60,6 @@ class StudyCapability:
 
     tables: ClassVar[Mapping[str, FileSection]] = {}
     """its tables of the study file, by name"""
-    motor_table: ClassVar[str] = ""
-    """the table of these that leaves the choice of the motor to it; at most one capability has such a table"""
-
-    choices: ClassVar[Mapping[str, Any]] = {}
-    """its keys before all tables, as pydantic fields"""
-
-    other_model: ClassVar[OtherModel | None] = None
-    """the key with which the runs of a machine have another model"""
 
     def rules(self) -> Iterable[Rule]:
         """The rules of its keys that do not go together with others."""
@@ -95,24 +79,6 @@ class StudyCapability:
         """The files that its tables of a study file name."""
         return ()
 
-    def machine(self, machine: Machine, values: Mapping[str, Any]) -> Machine:
-        """The machine as the study has it, by the values of the tables; with another model of its runs, if the
-        capability brings one."""
-        return machine
-
-    def turns(
-        self,
-        values: Mapping[str, Any],
-        machine: Machine,
-        crank_speed: float,
-        feeds: Iterable[Any],
-        folder: Path,
-        backend: Backend | None,
-    ) -> list[Cycle] | None:
-        """Turns of the machine at constant speed with each of the `feeds`, where its other model is run for them;
-        the tables have these `values`. The FMU is written to `folder`. None where `cycle` gives the turn."""
-        return None
-
     def faults(self, config: Config) -> Iterable[InputError]:
         """Refusals of a plan that does not fit the rest of the study."""
         return ()
@@ -121,69 +87,10 @@ class StudyCapability:
         """Names of the values of its tables that have no meaning for that machine and plan."""
         return ()
 
-    def drive(
-        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
-    ) -> DriveProposal | None:
-        """The drive that it chooses; None for a study whose file gives one. The FMUs that it needs are written to
-        `folder`."""
-        return None
-
-    def permitted_temperature(self, plan: Any) -> tuple[str, float] | None:
-        """Permitted temperature of the winding of the motor that it chooses [K], after its name in the study file."""
-        return None
-
-    def random_events(self, plan: Any) -> Mapping[str, RandomEvent]:
-        """By the key that states it, the events with ranges that its runs have."""
-        return {}
-
-    def longest_run(self, plan: Any) -> float:
-        """Time of the longest of its runs [s]."""
-        return 0.0
-
-    def shaft_inertia(self, plan: Any) -> float:
-        """Inertia that it adds to the motor's shaft [kg m2]."""
-        return 0.0
-
-    def not_with_foreign_motor(self, plan: Any) -> str:
-        """The reason and the remedy where its plan needs a motor of this package; empty where it does not."""
-        return ""
-
     def beside(self, plan: Any, drive: Drive, feed: Any, turn: Cycle) -> Drive:
         """The drive with the parts of the system that the capability adds beside the line; the machine has this
         `feed` and `turn` in normal running."""
         return drive
-
-    def check_scheduler(self, plan: Any, scheduler: str) -> None:
-        """Refuse the address of a scheduler whose workers have nothing to do, or that does not answer.
-
-        Raises
-        ------
-        InputError
-            see `chainunit.work.runner.check_scheduler`.
-        """
-
-    def check_runs(self, plan: Any, rig: Rig) -> None:
-        """Refuse runs that the drive cannot make, before any is made.
-
-        Raises
-        ------
-        InputError
-            for the keys that ask for them.
-        """
-
-    def model_verdict(
-        self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]
-    ) -> Verdict | None:
-        """The verdict on the model of the machine, if the runs have another one; arguments are those of
-        `chainunit.study.verdict.rigid_links`."""
-        return None
-
-    def remark(self, study: StudyRecord) -> None:
-        """Add remarks on the model of the machine to a study."""
-
-    def words(self, driver: str) -> Mapping[str, str]:
-        """By name, the words on the numbers of its results, for a comparison of two; they name the `driver`."""
-        return {}
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
         """Write into its `tables` of the study file with estimated numbers what follows from their errors."""

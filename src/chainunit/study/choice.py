@@ -18,7 +18,7 @@ from .cycle import Cycle, cycle
 from .drive import Drive
 from .drive_tables import DriveTables
 from .motor_sources import MotorSource
-from .proposal import DriveProposal
+from .proposal import DriveProposal, motor_choice
 from .registry import parts_of_line, registered
 
 
@@ -52,12 +52,12 @@ def choose_for(
     """The drive of a study, as `choose`, whose machine makes this `turn` in normal running."""
     tables, plans, source = config.drive, config.plans, config.motor
     if source is None:
-        proposals = (part.drive(config, folder, progress, backend) for part in registered())
-        proposal: DriveProposal = next(candidate for candidate in proposals if candidate is not None)
+        chosen = motor_choice(plans)
+        assert chosen is not None, "a file without a motor has a table that chooses one"
+        proposal = chosen.proposal(config.drive_request, folder, progress, backend)
         return Choice(_with_line(proposal.drive, plans, turn), proposal.tables, proposal)
     source.check(tables, plans)
-    added = sum(part.shaft_inertia(plans[part.name]) for part in registered())
-    drive = _with_line(source.drive(tables, config.machine, turn, added), plans, turn)
+    drive = _with_line(source.drive(tables, config.machine, turn), plans, turn)
     return Choice(*source.completed(drive, tables, turn))
 
 

@@ -53,7 +53,8 @@ from .parts import (
     over_example,
     with_linkage,
 )
-from .registry import registered
+from .proposal import DriveRequest, motor_choice
+from .registry import organ_models, registered
 from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
@@ -150,13 +151,30 @@ class Config:
         )
 
     @property
+    def drive_request(self) -> DriveRequest:
+        """The machine for a capability that chooses its motor."""
+        return DriveRequest(
+            self.machine,
+            self.organs,
+            self.operation,
+            self.events,
+            self.drive,
+            self.values,
+            self.file.catalogues,
+        )
+
+    @property
     def permitted_temperature(self) -> tuple[str, float]:
         """Permitted temperature of the winding if the steady turns go on for ever [K], after its name in the
         study file."""
-        for part in registered():
-            if (permitted := part.permitted_temperature(self.plans[part.name])) is not None:
-                return permitted[0], permitted[1]
+        if (choice := motor_choice(self.plans)) is not None:
+            return choice.permitted_temperature
         return "run.winding_temperature", float(self.run.winding_temperature)
+
+    @property
+    def organs(self) -> Any:
+        """The model of the organs in its runs, a `chainunit.study.organs.OrganModel`."""
+        return organ_models()[self.file.choices["organ"]]
 
     @property
     def plate(self) -> CatalogueMotor | None:
@@ -322,7 +340,7 @@ _OF_PARTS = ("machine", "ratios", "motor")
 """Tables whose values follow from others, too: `Config` has them as machine and motor."""
 _OWN_TABLES = ("feed", "run", "coupling")
 """Tables whose values are fields of a `Config`."""
-_OF_DRIVE = ("gear", "starter")
+_OF_DRIVE = ("gear", "starter", "flywheel")
 """Tables whose values are fields of `Config.drive`."""
 
 
@@ -357,11 +375,9 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
     faults.refuse()
     for name, table in of_study.items():
         of_study[name] = None if table is None else sections[name].completed(table, reading)
-    for capability in registered():
-        machine = capability.machine(machine, of_study)
     config = Config(
         title=checked.title,
-        machine=machine,
+        machine=organ_models()[checked.organ].machine(machine, of_study),
         motor=_motor(data, parts, checked, values["motor"], plate, source),
         drive=DriveTables(
             feed_forward=checked.feed_forward,

@@ -6,7 +6,7 @@ from collections.abc import Set
 from dataclasses import dataclass, field
 
 from ..drives.gearing import Transmission
-from .sections import Starter
+from .sections import FlywheelTable, Starter
 
 
 @dataclass(frozen=True)
@@ -18,8 +18,14 @@ class DriveTables:
     start: str
     """one of `chainunit.study.sections.STARTS`"""
     starter: Starter
+    flywheel: FlywheelTable | None
     given: Set[str] = field(compare=False)
     """names of all values that the file sets, such as "gear.ratio\""""
+
+    @property
+    def added_inertia(self) -> float:
+        """Inertia of the flywheel on the motor's shaft [kg m2]; 0 without one."""
+        return 0.0 if self.flywheel is None else float(self.flywheel.J)
 
     @property
     def starter_time(self) -> float:

@@ -18,7 +18,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel
@@ -31,6 +31,9 @@ from ..reading.lists import Entry, read_entries
 from ..reading.tables import given_values, instance, read_table, schema
 from .event import TYPES, AnySide, Event, on_side
 from .events import Jam
+
+if TYPE_CHECKING:
+    from .rig import Rig
 
 RESERVED = ("start_up", "settling", "steady", "constant", "unfinished")
 """Names that an event may not have, as other runs of a study have them."""
@@ -120,6 +123,39 @@ class RandomEvent:
             "p": fixed,
             "ranges": dict(self.ranges),
         }
+
+
+@dataclass(frozen=True)
+class RandomRuns:
+    """Runs in which an event comes at random: the plan of a capability that makes them. The `event` stands under the
+    `key` of the study file, the number of the `runs`, which follow it for `duration` [s], may be 0."""
+
+    key: str
+    event: RandomEvent
+    runs: int
+    duration: float
+
+    @property
+    def table(self) -> str:
+        """Name of their table of the study file."""
+        return self.key.partition(".")[0]
+
+    def check(self, rig: Rig) -> None:
+        """Refuse an event for which the drive has no inputs.
+
+        Raises
+        ------
+        InputError
+            for the type of the event.
+        """
+        for event in self.event.hardest() if self.runs else ():
+            if not rig.takes(event):
+                raise InputError(f'{self.key}.type = "{event.kind}": {event.without}')
+
+
+def random_runs(plans: Mapping[str, Any]) -> list[RandomRuns]:
+    """Those of the `plans` of a study."""
+    return [plan for plan in plans.values() if isinstance(plan, RandomRuns)]
 
 
 PLACED = ("crank_angle", "turns")

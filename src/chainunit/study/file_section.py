@@ -66,6 +66,9 @@ class FileSection:
     """keys that the table must have"""
     random_events: tuple[str, ...] = ()
     """keys that hold an event whose quantities may be ranges"""
+    chooses_motor: bool = False
+    """whether a file with the table leaves the choice of the motor to its capability, whose plan is a
+    `chainunit.study.proposal.MotorChoice`"""
     single_keys: tuple[str, ...] = ()
     """lists and tables in it whose faults say nothing of its other keys"""
     deciders: Mapping[str, str] = field(default_factory=dict)

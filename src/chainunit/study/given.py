@@ -10,8 +10,8 @@ from ..core.quantities import variables
 from ..reading.results import as_data
 from ..reading.text import entry
 from .config import FileContents
+from .event_table import random_runs
 from .record import StudyRecord
-from .registry import registered
 from .rules import all_rules
 from .sections import SystemTable, all_choices, all_sections
 
@@ -102,11 +102,7 @@ def _system(choices: Mapping[str, Any], *, is_chosen: bool) -> dict[str, Any]:
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     config = study.config
-    randoms = {
-        key: random_event
-        for part in registered()
-        for key, random_event in part.random_events(config.plans[part.name]).items()
-    }
+    randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():
         values = config.table(name)
         is_idle = section.with_findings and name not in study.findings

@@ -11,12 +11,9 @@ from . import verdict
 from .coupling import LESS_TORQUE
 from .event import Role
 from .limits import Check, given_motor, reaches
-from .organ_limits import has_empty_side, slack_and_mode
 from .readings import has_turn, less_than_a_turn
 from .record import StudyRecord
-from .registry import registered
 from .rig import worst_residual
-from .rules import other_models
 from .start_runs import longest_of
 from .starts import StartFindings
 from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
@@ -33,21 +30,7 @@ def model_verdict(study: StudyRecord) -> Verdict:
         return verdict.foreign_machine(speed, residuals, actual=mean)
     if not study.drive.machine.model.sides:
         return verdict.rigid_links(speed, residuals, actual=mean, driver=study.driver_noun)
-    for capability in registered():
-        if (judged := capability.model_verdict(study, speed, mean, residuals)) is not None:
-            return judged
-    empty = {name for name in study.overloads if config.events[name].empties}
-    slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
-    return verdict.two_bars(
-        speed,
-        resonance,
-        slack_speed,
-        study.pulls,
-        residuals,
-        empty={""} if has_empty_side(config.feed) else empty,
-        actual=mean,
-        finer="; ".join(other.remedy for other in other_models()),
-    )
+    return config.organs.verdict(study, speed, mean, residuals)
 
 
 def wrong_runs(study: StudyRecord) -> list[str]:

@@ -21,8 +21,8 @@ from .catalogue_drive import as_used, catalogue_drive, with_inertia
 from .cycle import Cycle
 from .drive import Drive
 from .drive_tables import DriveTables
+from .event_table import random_runs
 from .foreign_machine import declared_parameters
-from .registry import registered
 
 
 class MotorSource(ABC):
@@ -44,9 +44,9 @@ class MotorSource(ABC):
         return None
 
     @abstractmethod
-    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
-        """The machine with this motor and an `added` inertia on its shaft [kg m2]; `turn` is that of the machine in
-        normal running."""
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
+        """The machine with this motor and the flywheel on its shaft; `turn` is the turn of the machine in normal
+        running."""
 
     @abstractmethod
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
@@ -61,10 +61,17 @@ class OwnMotor(MotorSource):
     parameters: Any
     plate: None = None
 
-    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
         """See `MotorSource`."""
         follows, p = self.kind.follows(self.parameters), self.parameters
-        return Drive(self.kind, p, machine, follows, feed_forward=tables.feed_forward, added_inertia=added)
+        return Drive(
+            self.kind,
+            p,
+            machine,
+            follows,
+            feed_forward=tables.feed_forward,
+            added_inertia=tables.added_inertia,
+        )
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """The gains of the control are tuned to the inertia; gains that the file gives stay as they are."""
@@ -80,9 +87,9 @@ class NamedMotor(MotorSource):
     plate: CatalogueMotor
     kind: Motor = InductionMotor
 
-    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
         """See `MotorSource`."""
-        drive = with_inertia(tables, catalogue_drive(tables, machine, turn, self.plate), added)
+        drive = with_inertia(tables, catalogue_drive(tables, machine, turn, self.plate), tables.added_inertia)
         return replace(drive, feed_forward=tables.feed_forward)
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
@@ -116,14 +123,19 @@ class ForeignMotor(MotorSource):
         """See `MotorSource`; also refused is a quantity that only a motor of this package has."""
         inputs = self.component.connectors
         with refusal_prefix("system.motor: ", "system.motor"):
-            for part in registered():
-                if refusal := part.not_with_foreign_motor(plans[part.name]):
-                    raise InputError(f"{self.file}: {refusal}")
+            if tables.flywheel is not None:
+                raise InputError(f"{self.file}: its rotor takes no flywheel; leave [flywheel] out")
+            for plan in random_runs(plans):
+                if plan.runs:
+                    raise InputError(
+                        f"{self.file}: its current and torque are not known, of which random overloads tell the "
+                        f"quantiles; leave {plan.table}.runs out"
+                    )
             if tables.feed_forward and "tau_ff" not in inputs:
                 raise InputError(f"{self.file}: has no input tau_ff in N.m; leave feed_forward out")
 
-    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
-        """See `MotorSource`; a study with an added inertia is refused."""
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
+        """See `MotorSource`; a study with a flywheel is refused."""
         motor, fed = self.component, tables.feed_forward
         return Drive(FOREIGN, None, machine, "w_ref" in motor.connectors, feed_forward=fed, foreign=motor)
 

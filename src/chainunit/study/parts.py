@@ -32,8 +32,7 @@ from ..reading.tables import (
 from ..reading.toml_lines import lines_of
 from .file_section import FileSection
 from .foreign_machine import foreign_model
-from .registry import registered
-from .sections import SystemTable, all_choices, all_sections, sections_of
+from .sections import SystemTable, all_choices, all_sections, choosing_tables, sections_of
 
 
 def _as_text(value: Any) -> Any:
@@ -173,7 +172,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
 
 def motor_is_left(data: Mapping[str, Any]) -> bool:
     """Whether a file leaves the choice of the motor to a capability."""
-    return any(part.motor_table and part.motor_table in data for part in registered())
+    return any(table in data for table in choosing_tables())
 
 
 def _machine_model(table: Any, source: str) -> tuple[MachineModel, tuple[UnusualValue, ...]]:

@@ -3,14 +3,64 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..drives.catalogue import CatalogueMotor
 from .drive import Drive
 from .drive_tables import DriveTables
 from .torques import DutyPeak
+
+if TYPE_CHECKING:
+    from ..fmu.backends import Backend
+    from ..machines.machine import Machine
+    from ..work.progress import TaskProgress
+    from .event import Event
+    from .operation import OperatingConditions
+
+
+@dataclass(frozen=True)
+class DriveRequest:
+    """A machine in its operation that needs a motor, and the tables of the study file on its drive."""
+
+    machine: Machine
+    organs: Any
+    """the model of its organs, a `chainunit.study.organs.OrganModel`"""
+    operation: OperatingConditions
+    events: Mapping[str, Event]
+    tables: DriveTables
+    values: Mapping[str, Any]
+    """values of the tables of the capabilities, by table"""
+    catalogues: Sequence[Path]
+
+
+class MotorChoice(ABC):
+    """The choice of the motor of a study: the plan of the capability that makes it."""
+
+    @property
+    @abstractmethod
+    def permitted_temperature(self) -> tuple[str, float]:
+        """Permitted temperature of the winding [K], after its name in the study file."""
+
+    @abstractmethod
+    def proposal(
+        self, request: DriveRequest, folder: Path, progress: TaskProgress, backend: Backend | None
+    ) -> DriveProposal:
+        """The drive. The FMUs that its search needs are written to `folder`.
+
+        Raises
+        ------
+        InputError
+            for a catalogue from which no motor can be chosen.
+        """
+
+
+def motor_choice(plans: Mapping[str, Any]) -> MotorChoice | None:
+    """The choice among the `plans` of a study; None for a file that gives its motor."""
+    return next((plan for plan in plans.values() if isinstance(plan, MotorChoice)), None)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@ they stand above the study, in another package, or import from the study."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.machinery import PathFinder
@@ -26,6 +26,12 @@ def _in_order(things: Iterator[Any]) -> tuple[Any, ...]:
 def parts_of_line() -> tuple[Any, ...]:
     """All parts of the line from the motor to the machine, each a `chainunit.study.line.part.PartOfLine`."""
     return _in_order(iter(Register[Any]("chainunit.line").values()))
+
+
+@cache
+def organ_models() -> Mapping[str, Any]:
+    """All models of the organs by name in their order, each a `chainunit.study.organs.OrganModel`."""
+    return {model.name: model for model in _in_order(iter(Register[Any]("chainunit.organs").values()))}
 
 
 @cache

@@ -65,8 +65,7 @@ def conclude(study: StudyRecord) -> None:
     if study.answers:
         study.verdict = replace(model_verdict(study), step=config.run.step)
         study.remarks += study.verdict.details(study.titles)
-    for part in capabilities():
-        part.remark(study)
+    config.organs.remark(study)
     if STEADY in study.answers:
         _on_start(study)
         _on_star(study)

@@ -25,6 +25,7 @@ from .conditions import (
 from .foreign_machine import ForeignModel
 from .parts import FMU, Parts, parts_of
 from .registry import registered
+from .sections import choosing_tables
 
 
 @dataclass(frozen=True)
@@ -109,11 +110,7 @@ def motor_of_catalogue() -> Condition:
 
 def motor_is_chosen() -> Condition:
     """Whether the file leaves the choice of the motor to a capability."""
-    return _any([given(table) for table in _choosing_tables()])
-
-
-def _choosing_tables() -> list[str]:
-    return [part.motor_table for part in registered() if part.motor_table]
+    return _any([given(table) for table in choosing_tables()])
 
 
 def all_rules() -> tuple[Rule, ...]:
@@ -131,24 +128,6 @@ def _with_motors(names: tuple[str, ...]) -> tuple[Rule, ...]:
 BESIDE_MOTOR = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
 NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
 OF_CHAIN_UNIT = "is of the chain unit, and the machine is {machine}; leave it out"
-
-
-@dataclass(frozen=True)
-class OtherModel:
-    """A key with which the runs of a machine have another model than its turns without a run."""
-
-    on: Condition
-    words: str
-    """what is then another one, such as "organs are chains\""""
-    refusal: str
-    """why there are no quantities of a turn, and the remedy"""
-    remedy: str
-    """what to do where the usual model does not hold"""
-
-
-def other_models() -> list[OtherModel]:
-    """Those of all capabilities."""
-    return [part.other_model for part in registered() if part.other_model]
 
 
 def _of_parts() -> Iterator[Rule]:
@@ -169,6 +148,7 @@ def _of_parts() -> Iterator[Rule]:
 def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
     yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
+    yield Rule("organ", ~has_sides(), OF_CHAIN_UNIT)
     for name in lengths(**filled(Ratios, {})):
         refusal = "given beside [ratios], which sets it; leave out one of the two"
         yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), refusal)
@@ -180,8 +160,10 @@ def _of_motors() -> Iterator[Rule]:
     deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
     refusal = "a motor of the type {type} has no input for the torque; leave it out"
     chosen, switched_on = motor_is_chosen(), is_one_of("feed_forward", True)
+    found = "sizing finds its own; leave out one of the two"
+    yield Rule("flywheel", chosen, found, has_entries("flywheel"))
     yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), refusal, switched_on)
-    keys = " or ".join([*(f"[{table}]" for table in _choosing_tables()), "system.motor"])
+    keys = " or ".join([*(f"[{table}]" for table in choosing_tables()), "system.motor"])
     for name in ("gear", "start", "starter", "catalogue"):
         refusal = f"is of a motor of the catalogue; add {keys}, or leave it out"
         yield Rule(name, ~(chosen | motor_of_catalogue()), refusal)

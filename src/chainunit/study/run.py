@@ -25,13 +25,13 @@ from .choice import choose_for, with_parts_beside
 from .config import Config
 from .drive_fmus import export_coasting, export_drive
 from .event import Event
+from .event_table import random_runs
 from .event_torques import from_event_on
 from .load_cases import turns_by_load
 from .measures import read_answers, read_measure
 from .pulls import least_pulls
 from .readings import crank_angle
 from .record import Spread, StudyRecord
-from .registry import registered
 from .relay import class_holding, locked_rotor, protecting_class, start_seconds
 from .remarks import EVENT_LEFT_OUT, STATE_NOT_SAVED, WITHOUT_COMPILER, conclude
 from .rig import Rig
@@ -86,8 +86,8 @@ def run_study(
         if choice.proposal is not None:
             study.findings[choice.proposal.name] = choice.proposal.findings
         unmade = Rig(config.operation, drive, {})
-        for part in registered():
-            part.check_runs(config.plans[part.name], unmade)
+        for runs in random_runs(config.plans):
+            runs.check(unmade)
         _analyse(study, Work(unmade, progress), needs_runs=False)
         files, study.fmus = export_drive(
             drive, folder / "fmu", backend, lambda what: progress(what, 0.0, 1.0)

@@ -13,9 +13,8 @@ from ..mechanism.models import MachineModel
 from ..models import MOTORS
 from ..system.signals import Profile
 from .event import Event
-from .event_table import inputs_of
+from .event_table import inputs_of, random_runs
 from .operation import OperatingConditions
-from .registry import registered
 
 MOST_STEPS = 1e6
 """Most steps of a study."""
@@ -43,21 +42,14 @@ def loads_beyond(
     inputs = {v.name: v for v in model.input_layout.variables}
     normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).by_name(feed)
     hardest = [(f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(events.items(), 1)]
-    randoms = [(part, part.random_events(plans[part.name])) for part in registered()]
-    beside = {key: part for part, random_events in randoms for key in random_events}
-    hardest += [
-        (key, key, event)
-        for _, random_events in randoms
-        for key, random in random_events.items()
-        for event in random.hardest()
-    ]
+    randoms = random_runs(plans)
+    hardest += [(runs.key, runs.key, event) for runs in randoms for event in runs.event.hardest()]
+    unused = {runs.key for runs in randoms if not runs.runs}
     of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
     for where, key, event in hardest:
         needed = set(event.inputs(event.side))
         if not needed <= set(inputs):
-            part = beside.get(where)
-            asked = part is None or part.longest_run(plans[part.name])
-            if asked and known_motor and not needed <= {*inputs, *of_motors}:
+            if where not in unused and known_motor and not needed <= {*inputs, *of_motors}:
                 near = "".join(near_name(name, Layout(model.Feed).names) for name in needed)
                 yield InputError(
                     f"{where}: the {model.name} has no input {' or '.join(sorted(needed))}{near}; "
@@ -96,7 +88,7 @@ def endless(
     run, turn = operation.run, operation.turn
     seconds = operation.steady_begin + run.turns * turn
     seconds += sum(event.time_followed(turn) + 2.0 * turn for event in events.values())
-    steps = max(seconds, *(part.longest_run(plans[part.name]) for part in registered())) / run.step
+    steps = max(seconds, *(runs.duration for runs in random_runs(plans) if runs.runs), 0.0) / run.step
     if not steps <= MOST_STEPS:
         yield InputError(
             f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "

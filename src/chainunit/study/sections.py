@@ -16,9 +16,9 @@ from ..drives.motor import Motor
 from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
-from .entry_values import FileNames
+from .entry_values import FileNames, numbers
 from .file_section import FileSection
-from .registry import registered
+from .registry import organ_models, registered
 
 
 @declaration
@@ -77,6 +77,21 @@ class Coupling:
         default=0.05,
         min=0.0,
         max=0.5,
+    )
+
+
+@declaration
+class FlywheelTable:
+    """A flywheel on the motor's shaft, and the fluctuation for which the least one is searched."""
+
+    J: Value = quantity("kg.m2", "inertia of the flywheel, on the motor shaft", default=0.0, min=0.0, max=1e6)
+    fluctuation: Value = quantity(
+        "1",
+        "permitted fluctuation of the speed, (largest - least)/mean",
+        default=0.05,
+        min=1e-4,
+        max=1.0,
+        kind="percent",
     )
 
 
@@ -147,8 +162,12 @@ CHOICES: Mapping[str, Any] = {
 
 @cache
 def all_choices() -> dict[str, Any]:
-    """The keys before all tables, with the keys of the capabilities."""
-    return dict(CHOICES) | {name: choice for part in registered() for name, choice in part.choices.items()}
+    """The keys before all tables, with the model of the organs."""
+    models = organ_models()
+    usual, *_ = models
+    titles = ", or ".join(model.title for model in models.values())
+    organ = Field(usual, description=f"model of the organs: {titles}")
+    return dict(CHOICES) | {"organ": (Literal[tuple(models)], organ)}
 
 
 def _names_form(title: str, names: Sequence[str]) -> type[BaseModel]:
@@ -210,6 +229,17 @@ SECTIONS: Mapping[str, FileSection] = {
             "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
         },
     ),
+    "flywheel": FileSection(
+        FlywheelTable,
+        optional=True,
+        keys={
+            "compare": (
+                numbers(FlywheelTable, "J", "flywheel.compare", 12),
+                Field([], description="flywheels that are compared [kg m2]"),
+            )
+        },
+        title="Flywheel",
+    ),
 }
 """The tables of every study file beside those of its machine, its feed, its motor, of the parts of the line, and of
 the capabilities."""
@@ -226,6 +256,11 @@ def all_sections() -> dict[str, FileSection]:
             name: part_section for name, part_section in part_tables.items() if part_section.before == table
         } | {table: section}
     return tables | part_tables
+
+
+def choosing_tables() -> list[str]:
+    """The tables that leave the choice of the motor to a capability."""
+    return [name for name, section in all_sections().items() if section.chooses_motor]
 
 
 _KIND_OF_MOTOR = (

@@ -166,7 +166,7 @@ def draw(task, number):
 
 
 def point(task, drawn):
-    return monte_carlo.point(task.rig, drawn, task.plan.table.duration)
+    return monte_carlo.point(task.rig, drawn, task.plan.duration)
 
 
 def task_by(config):

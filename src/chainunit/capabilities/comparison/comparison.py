@@ -15,7 +15,6 @@ from ...reading.result_entries import as_mapping
 from ...reading.text import entry
 from ...study.line.shaft import ShaftAnswers
 from ...study.measures import Answers
-from ...study.registry import registered
 from ...study.sections import all_choices, all_sections
 from ...study.stored_result import StoredResult
 
@@ -171,10 +170,7 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
 
 def _words(driver: str) -> dict[str, str]:
     """By name, the words on the numbers of a result."""
-    descriptions = {name: text for part in registered() for name, text in part.words(driver).items()}
-    return descriptions | {
-        v.name: v.described(driver) for kind in (ShaftAnswers, Answers) for v in variables(kind)
-    }
+    return {v.name: v.described(driver) for kind in (ShaftAnswers, Answers) for v in variables(kind)}
 
 
 def _spoken(name: str, descriptions: Mapping[str, str]) -> str:

@@ -5,19 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from pydantic import Field
-
-from ...core.quantities import variable_of
 from ...report.capability import Capability, Contents
-from ...report.live.quantities import LiveQuantity
 from ...study.analysis import Analysis
-from ...study.conditions import has_entries
-from ...study.drive import Drive
-from ...study.entry_values import numbers
 from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
-from ...study.rules import Rule, motor_is_chosen
-from .table import FlywheelTable
+from ...study.sections import FlywheelTable
 
 
 @dataclass(frozen=True)
@@ -29,28 +20,10 @@ class FlywheelPlan:
 
 
 class FlywheelCapability(Capability):
-    """The capability, with the table [flywheel]."""
+    """The capability; the table [flywheel] is one of the drive."""
 
     name = "flywheels"
     order = 80
-    tables = {  # noqa: RUF012
-        "flywheel": FileSection(
-            FlywheelTable,
-            optional=True,
-            keys={
-                "compare": (
-                    numbers(FlywheelTable, "J", "flywheel.compare", 12),
-                    Field([], description="flywheels that are compared [kg m2]"),
-                )
-            },
-            title="Flywheel",
-        )
-    }
-
-    def rules(self) -> Iterable[Rule]:
-        """Sizing has flywheels of its own."""
-        reason = "sizing finds its own; leave out one of the two"
-        yield Rule("flywheel", motor_is_chosen(), reason, has_entries("flywheel"))
 
     def plan(self, reading: FileReading) -> FlywheelPlan | None:
         """The plan of the table."""
@@ -58,19 +31,6 @@ class FlywheelCapability(Capability):
             return None
         compared: list[float] = reading.form.flywheel.compare
         return FlywheelPlan(reading.values["flywheel"], tuple(sorted(set(compared))))
-
-    def shaft_inertia(self, plan: FlywheelPlan | None) -> float:
-        """That of the study's flywheel."""
-        return 0.0 if plan is None else float(plan.table.J)
-
-    def live_quantities(self, plan: FlywheelPlan | None, drive: Drive) -> Iterable[LiveQuantity]:
-        """The flywheel on the motor's shaft."""
-        J = variable_of(FlywheelTable, "J")
-        yield LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", role="added")
-
-    def not_with_foreign_motor(self, plan: FlywheelPlan | None) -> str:
-        """A flywheel is added to the rotor."""
-        return "" if plan is None else "its rotor takes no flywheel; leave [flywheel] out"
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The runs with each flywheel."""

@@ -27,7 +27,6 @@ from ...study.rig import Rig, worst_residual
 from ...study.start_up import start_up
 from ...study.turn import TurnFindings
 from ...study.verdict import CREEPS, RESIDUAL, STEADY
-from .table import FlywheelTable
 from .wheel import FlywheelAnswers, Wheel
 
 if TYPE_CHECKING:
@@ -127,7 +126,7 @@ class FlywheelAnalysis(Analysis):
             where a run fails; the earlier results are in the study.
         """
         config, plan, drive = study.config, study.config.plans["flywheels"], study.drive
-        table: FlywheelTable = plan.table
+        table = plan.table
         turn = TurnFindings.of_study(study).numbers
         findings = FlywheelFindings(
             own=table.J,

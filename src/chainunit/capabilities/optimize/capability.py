@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from ...report.capability import Capability
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
+from ...study.organs import finer_models
 from ...study.parts import motor_is_left
-from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, other_models
+from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule
 from .table import FIELDS, Optimize, read_wishes
 from .wishes import Wishes
 
@@ -34,7 +35,7 @@ class OptimizeCapability(Capability):
     def rules(self) -> Iterable[Rule]:
         """It needs a model of the machine, with two bars."""
         yield Rule("optimize", MACHINE_FMU, NEEDS_MODEL)
-        yield from (Rule("optimize", other.on, other.refusal) for other in other_models())
+        yield from (Rule("optimize", organs.is_chosen, organs.without_turn) for organs in finer_models())
 
     def plan(self, reading: FileReading) -> Wishes | None:
         """The wishes that the table states."""

@@ -21,7 +21,7 @@ class RandomAnalysis(Analysis):
     @staticmethod
     def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the study asks for runs."""
-        return bool(plans["random_overloads"].is_asked_for)
+        return bool(plans["random_overloads"].runs)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> MonteCarloResult:

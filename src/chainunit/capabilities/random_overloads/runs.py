@@ -118,7 +118,7 @@ class RandomTask:
             "feed": asdict(operation.feed),
             "run": asdict(operation.run),
             "event": plan.event.identity(),
-            "monte_carlo": {k: v for k, v in asdict(plan.table).items() if k != "runs"},
+            "monte_carlo": {"duration": plan.duration, "seed": plan.seed},
             "coupling": asdict(operation.coupling) if operation.coupling else None,
             "steady": self.steady,
             "fed_from": self.rig.fed_from,
@@ -215,7 +215,7 @@ def draw(plan: RandomPlan, operation: OperatingConditions, number: int) -> Draw:
     """The event of the run with that number. It is the same in every process, and in whatever order the runs
     are made."""
     event, coupling = plan.event, operation.coupling
-    random = np.random.default_rng([int(plan.table.seed), number])
+    random = np.random.default_rng([plan.seed, number])
     offset = random.uniform(0.0, operation.turn)
     values = event.draw(random)
     spread = random.standard_normal()
@@ -258,7 +258,7 @@ def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
     task = parcel.task
     chances = [draw(task.plan, task.rig.operation, number) for number in range(begin, end)]
     system = _system_of(parcel)
-    runs = system.runs([point(system.rig, chance, task.plan.table.duration) for chance in chances])
+    runs = system.runs([point(system.rig, chance, task.plan.duration) for chance in chances])
     results = [_result_of(task, chance, run) for chance, run in zip(chances, runs, strict=True)]
     return {name: [result[name] for result in results] for name in results[0]}
 
@@ -406,7 +406,7 @@ def job_of(task: RandomTask) -> Job:
     return Job(
         name="monte_carlo",
         title="overloads at random",
-        points=int(task.plan.table.runs),
+        points=task.plan.runs,
         batch=BATCH if task.is_compiled else COSIMULATED_BATCH,
         variables=result_variables(task.plan.event),
         work=make_runs,

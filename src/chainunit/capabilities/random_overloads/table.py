@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...core.quantities import Value, declaration, quantity
-from ...study.event_table import RandomEvent
+from ...study.event_table import RandomRuns
 
 
 @declaration
@@ -24,13 +24,7 @@ class MonteCarlo:
 
 
 @dataclass(frozen=True)
-class RandomPlan:
-    """Number, duration and seed of the runs, and their event."""
+class RandomPlan(RandomRuns):
+    """The runs, and the `seed` of their random numbers."""
 
-    table: MonteCarlo
-    event: RandomEvent
-
-    @property
-    def is_asked_for(self) -> bool:
-        """Whether there are runs."""
-        return bool(self.table.runs)
+    seed: int

@@ -5,23 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from ...core.errors import InputError
-from ...fmu.backends import Backend
 from ...machines.machine import Machine
-from ...report.blocks import Block, Source
-from ...report.capability import Capability, Contents
+from ...report.blocks import Source
+from ...report.capability import AnswerBlocks, Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, has_entries, is_one_of
 from ...study.config import Config
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from ...study.rules import BESIDE_MOTOR, Rule, has_sides
-from ...work.progress import TaskProgress
+from .choice import SizingChoice
 from .table import SIZING_KEYS, Sizing, SizingPlan
 
 _SUPPLY = (
@@ -35,7 +32,6 @@ class SizingCapability(Capability):
 
     name = "sizing"
     order = 20
-    motor_table = "sizing"
     tables = {  # noqa: RUF012
         "sizing": FileSection(
             Sizing,
@@ -46,6 +42,7 @@ class SizingCapability(Capability):
             keys=SIZING_KEYS,
             before="gear",
             title="Demands on the motor",
+            chooses_motor=True,
             apart=True,
             follows={
                 "fluctuation": "none",
@@ -81,7 +78,7 @@ class SizingCapability(Capability):
         # the table of another capability, if the program has it
         if "hours" in reading.data.get("usage", {}) and "hours" not in reading.data["sizing"]:
             demands = replace(demands, hours=reading.values["usage"].hours)
-        return SizingPlan(
+        return SizingChoice(
             demands,
             form.gear_kind,
             form.ratio_series,
@@ -108,33 +105,6 @@ class SizingCapability(Capability):
         """A machine without sides has no one-sided feed."""
         return () if machine.model.sides else ("sizing.one_sided_share",)
 
-    def drive(
-        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
-    ) -> DriveProposal | None:
-        """The best of the motors that it tries."""
-        plan: SizingPlan | None = config.plans[self.name]
-        if plan is None:
-            return None
-        from ...drives.catalogue import offer
-        from .duty import duty_of
-        from .gear_rows import strong_enough
-        from .search import motors_on_offer, size
-        from .task import SizingTask
-
-        offered, tables = offer(*config.file.catalogues), config.drive
-        gears = strong_enough(offered.gears, float(plan.demands.gear_torque))
-        task = SizingTask(
-            plan, tables, config.machine, config.operation, config.events, gears, offered.couplings
-        )
-        motors = motors_on_offer(task, offered.motors)
-        progress("the machine at constant speed", 0.0, 1.0)
-        duty = duty_of(task, config.values, folder, backend)
-        return size(task, motors, duty, folder, progress, backend).proposal(tables)
-
-    def permitted_temperature(self, plan: SizingPlan | None) -> tuple[str, float] | None:
-        """That of its table."""
-        return None if plan is None else ("sizing.temperature", float(plan.demands.temperature))
-
     def analyses(self) -> Iterable[type[Analysis]]:
         """The protection of the drive."""
         from .findings import ProtectionAnalysis
@@ -147,11 +117,11 @@ class SizingCapability(Capability):
 
         return {self.name: Contents("The drive", page.blocks, before="runs")}
 
-    def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """The drive, and the share that it takes of its limits."""
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+        """The drive with the share that it takes of its limits, and the alarm if no motor fits."""
         from . import page
 
-        return page.answer(s, study)
+        return AnswerBlocks(head=page.answer(s, study), judgements=page.judgements(study))
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The choice of a drive, with order numbers, of a study whose file gives its motor."""
@@ -160,12 +130,6 @@ class SizingCapability(Capability):
                 "whether another motor or gear serves better, and order numbers: the motor is that of the study "
                 "file, which has no table [sizing]"
             )
-
-    def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
-        """The alarm where no motor fits."""
-        from . import page
-
-        return page.judgements(study)
 
 
 CAPABILITY = SizingCapability()

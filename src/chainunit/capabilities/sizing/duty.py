@@ -17,8 +17,8 @@ from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import derived, part, result
 from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
 from ...study.load_cases import all_on_one
+from ...study.organs import ConstantSpeed, OrganModel
 from ...study.quantiles import HIGH
-from ...study.registry import registered
 from .table import Sizing
 from .task import SizingTask
 
@@ -67,9 +67,11 @@ class Duty:
         return {"larger_rms": self.heavier, "larger_peak": max(peaks)[1]} if peaks else None
 
 
-def duty_of(task: SizingTask, values: Mapping[str, Any], folder: Path, backend: Backend | None) -> Duty:
-    """The duty of a machine; an FMU of one that has to be run for it is written to `folder`. `values` are those of
-    the tables of the capabilities."""
+def duty_of(
+    task: SizingTask, organs: OrganModel, tables: Mapping[str, Any], folder: Path, backend: Backend | None
+) -> Duty:
+    """The duty of a machine with that model of its `organs`, whose values are in the `tables` of the study file; an
+    FMU of one that has to be run for it is written to `folder`."""
     machine, feed, w = task.machine, task.operation.feed, task.operation.crank_speed
     loads = {side: all_on_one(side, feed) for side in SIDES if side in machine.model.sides}
     normal = cycle(machine, w, feed)
@@ -77,10 +79,9 @@ def duty_of(task: SizingTask, values: Mapping[str, Any], folder: Path, backend: 
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
     # if both sides are alike it is the left one
     heavier = min(sizes, key=lambda size: -size[0])[1] if sizes else None
-    for capability in registered():
-        if turns := capability.turns(values, machine, w, (feed, *loads.values()), folder, backend):
-            normal, *others = turns
-            one_sided = dict(zip(loads, others, strict=True))
+    turns = ConstantSpeed(machine, w, (feed, *loads.values()), (normal, *one_sided.values()))
+    normal, *others = organs.turns(turns, tables, folder, backend)
+    one_sided = dict(zip(loads, others, strict=True))
     demands = task.plan.demands
     return Duty(
         normal, one_sided, heavier, cycle_numbers(demands, w, machine.ratio, normal, one_sided, heavier)

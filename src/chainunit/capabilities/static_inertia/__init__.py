@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy as np
 from ...core.quantities import quantity
 from ...mechanism.models import InverseMachine
 from ...reading.results import result
-from ...report.blocks import Block, Source, Text
-from ...report.capability import Capability
+from ...report.blocks import Source, Text
+from ...report.capability import AnswerBlocks, Capability
 from ...study.analysis import Analysis, Findings, Work
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
@@ -74,16 +74,16 @@ class StaticInertiaCapability(Capability):
         """Both torques."""
         return (StaticInertiaAnalysis,)
 
-    def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
         """A line if they differ."""
         findings = StaticInertiaFindings.found_in(study)
-        if findings is not None and abs(findings.static - findings.machine) > _ALIKE * findings.machine:
-            yield Text(
-                s.line(
-                    "A constant-inertia calculation takes RMS {static_inertia.static} instead of "
-                    "{static_inertia.machine} at the {driver}."
-                )
-            )
+        if findings is None or abs(findings.static - findings.machine) <= _ALIKE * findings.machine:
+            return AnswerBlocks()
+        sentence = (
+            "A constant-inertia calculation takes RMS {static_inertia.static} instead of "
+            "{static_inertia.machine} at the {driver}."
+        )
+        return AnswerBlocks(end=[Text(s.line(sentence))])
 
 
 CAPABILITY = StaticInertiaCapability()

@@ -8,7 +8,8 @@ from ...report.capability import Capability
 from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.rules import MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, Rule, motor_is_chosen, other_models
+from ...study.organs import finer_models
+from ...study.rules import MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, Rule, motor_is_chosen
 from .plan import SweepPlan
 from .reading import Sweepable, read_plan
 from .table import FIELDS, MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES, SWEPT, SweepTable
@@ -69,9 +70,9 @@ class SweepCapability(Capability):
         )
         reason = "need a model of the motor, which is an FMU; leave them out"
         yield Rule("sweep.measures", MOTOR_FMU, reason, has_entries("sweep.measures"))
-        for other in other_models():
-            reason = f"{other.refusal}, or give measures"
-            yield Rule("sweep.quantities", other.on, reason, has_entries("sweep.quantities"))
+        for organs in finer_models():
+            reason = f"{organs.without_turn}, or give measures"
+            yield Rule("sweep.quantities", organs.is_chosen, reason, has_entries("sweep.quantities"))
 
     def plan(self, reading: FileReading) -> SweepPlan | None:
         """The plan of the table; None for a machine that was refused."""

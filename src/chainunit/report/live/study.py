@@ -17,10 +17,10 @@ from ...study.drive_tables import DriveTables
 from ...study.event import Event
 from ...study.parts import LENGTHS
 from ...study.proposal import DriveProposal
-from ...study.registry import parts_of_line, registered
+from ...study.registry import parts_of_line
+from ...study.sections import FlywheelTable, choosing_tables
 from ...study.study_file import changed_tables
 from ...study.verdict import Verdict
-from ..capability import capabilities
 from ..live_block import LiveMachine
 from .machine import assembled, speed_of_crank
 from .quantities import LiveQuantity, of_machine
@@ -63,8 +63,8 @@ def of_study(
     chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, model_names)]
     if runs:
         chosen += runs.quantities
-        for part in capabilities():
-            chosen += part.live_quantities(config.plans[part.name], drive)
+        J = variable_of(FlywheelTable, "J")
+        chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", role="added"))
     # names of other files are as in the study file, beside which the copy lies
     folder = Path(config.file.source).parent
     copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)
@@ -115,8 +115,8 @@ def _with_drive(
 ) -> dict[str, Any]:
     """The tables of a study file with the chosen motor and its `start`, the parts of the line, and the events."""
     if proposal is not None:
-        for part in registered():
-            copied.pop(part.motor_table or "", None)
+        for table in choosing_tables():
+            copied.pop(table, None)
         copied.setdefault("system", {})["motor"] = proposal.motor.designation
         copied["start"] = start
         if drive.added_inertia:
