@@ -33,15 +33,18 @@ def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) ->
     """The drive with a load observer by that `table`, for a machine with this `feed` and `turn` in normal running."""
     p, speed = drive.fmu_parameters, turn.crank_speed * drive.ratio
     passed = np.asarray(turn.crank_torque) / drive.ratio
-    lost = lost_torque(np, drive.gear_loss, passed, speed)
-    torque = passed + lost + p.rotor.d * speed
+    torque = passed + lost_torque(np, p.gear.loss, passed, speed) + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
-    friction = p.rotor.d + float(np.mean(lost)) / speed
-    values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": friction}
-    values |= weights(signals) | tuning(table, feed, speed, rms(torque))
+    values = drive.machine.by_name | of_shaft(p) | weights(signals)
+    values |= tuning(table, feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}
     return replace(drive, observer=component, observed=wires)
+
+
+def of_shaft(p: Any) -> dict[str, float]:
+    """The parameters of the observer that are those of the shaft and the gear of a motor with the parameters `p`."""
+    return {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d, "gear.loss": p.gear.loss}
 
 
 def weights(signals: TerminalSignals) -> dict[str, float]:
