@@ -6,10 +6,10 @@ The signal gives the torque T on the motor's rotor. At the motor's shaft
     rotor.J dw/dt = T - offset - rotor.d w - P - gear.loss |P| sign(w)
     P = J(phi, feed)/ratio^2 dw/dt + tau_bias(phi, w, feed, force)/ratio
 
-with the torque P that the gear passes on (`chainunit.drives.gearing`), and the machine's J and tau_bias
-(`chainunit.machines.chain_unit`). An extended Kalman-Bucy filter estimates the
-speed, the loads and the offset from the measured speed. Its gradient is the exact derivative of the machine's torque,
-by dual numbers, as long as P keeps its sign; angle and motion of the links are computed once for all directions.
+with the torque P that the gear passes on (`chainunit.drives.gearing`) and the machine's J and tau_bias
+(`chainunit.machines.chain_unit`). An extended Kalman-Bucy filter estimates the speed, the loads and the offset from
+the measured speed. Its gradient is the exact derivative of the machine's torque, by dual numbers; the sign of P and
+the loss near rest count as constant. Angle and motion of the links are computed once for all directions.
 
 Two covariances are states. The one of the filter (`covariance`) counts on loads that may change by their `change` in
 a second; the gain follows from it. The other one (`quiet`) is that of the errors which this gain makes while the

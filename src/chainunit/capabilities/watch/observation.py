@@ -12,7 +12,6 @@ from ...core.quantities import Layout
 from ...drives.gearing import lost_torque
 from ...drives.terminal_signals import TerminalSignals, terminal_signals
 from ...machines.load_observer import LoadObserver
-from ...machines.machine import Machine
 from ...study.arrays import rms
 from ...study.capability import Estimates
 from ...study.cycle import Cycle
@@ -100,15 +99,16 @@ def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict
 
 
 def false_imbalance_of(
-    machine: Machine, usual: Any, crank_speed: float, estimates: Estimates
+    drive: Drive, usual: Any, crank_speed: float, estimates: Estimates
 ) -> dict[str, float]:
-    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine, with the
-    `usual` feed at that speed of the crank [rad/s]."""
+    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine of a `drive`,
+    with the `usual` feed at that speed of the crank [rad/s]."""
     values = estimates.values
     loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
     feed = Layout(type(usual)).from_names(loads, usual)
     machine_values = {name.removeprefix("machine."): x for name, x in values.items()}
-    parameters = machine.by_name | machine_values | usual_loads(feed)
+    parameters = drive.machine.by_name | machine_values | usual_loads(feed)
+    parameters |= {"gear.loss": drive.fmu_parameters.gear.loss}
     return false_imbalance(parameters, list(machine_values), estimates.covariance, crank_speed)
 
 
