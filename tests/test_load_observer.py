@@ -97,27 +97,27 @@ def behind_gear(**values):
 @pytest.mark.parametrize("phi", [3.0, 40.0, 95.0, 233.0])
 @pytest.mark.parametrize("speed", [150.0, -150.0])
 @pytest.mark.parametrize("current", [15.0, -15.0])
-def test_behind_a_gear_the_acceleration_is_that_of_the_motor(phi, speed, current):
+def test_behind_a_gear_the_motor_gives_the_acceleration(phi, speed, current):
     """The model of the motor turns the true loads: by its own equation, and with what the gear passes and loses."""
     loads, p = (36.0, 24.0, 300.0, 10.0), behind_gear()
     u = dict(zip(LOADS, loads, strict=True)) | {"phi": phi, "w": speed}
     machine = ChamberForces.evaluate(MATH, p, ChamberForces.input_layout.from_names(u))[0]
-    own = DcMotor.parameter_layout.from_names({"gear.loss": LOSS})
+    of_motor = DcMotor.parameter_layout.from_names({"gear.loss": LOSS})
     load = DcMotor.input_layout.from_names({"load.tau_bias": machine.tau_bias, "load.J": machine.J})
-    state = DcMotor.initial_states(MATH, own)
+    state = DcMotor.initial_states(MATH, of_motor)
     state = DcMotor.state_layout.from_names({"w": speed, "armature.i": current}, state)
-    motor = DcMotor.evaluate(MATH, own, load, state)[0]
+    motor = DcMotor.evaluate(MATH, of_motor, load, state)[0]
     b = balance(MATH, p, Inputs(phi=phi, w=speed, current=current), at(loads, speed))
     assert b.acceleration == pytest.approx(motor.a, rel=1e-12)
     passed = machine.tau_bias + machine.J * b.acceleration
     # a current in the direction of turning drives the machine, one against it is driven by the machine
     assert passed * current > 0.0
     lost = math.copysign(LOSS * passed, speed)
-    left = own.armature.k * current - own.rotor.d * speed - passed - lost
-    assert own.rotor.J * b.acceleration == pytest.approx(left, rel=1e-12)
+    left = of_motor.armature.k * current - of_motor.rotor.d * speed - passed - lost
+    assert of_motor.rotor.J * b.acceleration == pytest.approx(left, rel=1e-12)
     sign = math.copysign(1.0, speed * current)
     assert b.felt == pytest.approx(1.0 + sign * LOSS, rel=1e-12)
-    assert b.inertia == pytest.approx(own.rotor.J + b.felt * machine.J, rel=1e-12)
+    assert b.inertia == pytest.approx(of_motor.rotor.J + b.felt * machine.J, rel=1e-12)
 
 
 def acceleration_behind_gear(p, phi, torque, estimates):
@@ -176,8 +176,8 @@ def test_a_self_locking_gear_has_the_gradient_of_what_the_rotor_feels():
 
 @pytest.mark.parametrize("speed", [150.0, 0.3, 0.0, -80.0])
 @pytest.mark.parametrize("current", [0.9, -3.0])
-def test_without_a_loss_the_balance_is_that_of_one_shaft(speed, current):
-    """To the bit: rotor and machine are one body."""
+def test_without_a_loss_rotor_and_machine_are_one_body(speed, current):
+    """To the bit, with the equation of one shaft."""
     p, loads = Parameters(joint_damping=3.0), [36.0, 24.0, 300.0, 10.0]
     u, w, engine = Inputs(phi=40.0, w=150.0, current=current), speed / p.ratio, dual(MATH)
 

@@ -95,8 +95,8 @@ def lost_torque(xp: Any, loss: Any, torque: Any, w: Any) -> Any:
 
 
 def felt_share(xp: Any, loss: Any, torque: Any, w: Any) -> Any:
-    """What the rotor feels of the `torque` that the gear passes on [N m], over this torque: with `lost_torque` it is
-    1 + `loss` where the rotor drives, 1 - `loss` where the load drives. It is constant between changes of sign, and 1
+    """Torque that the rotor feels, the one that the gear passes on with its `lost_torque`, over this `torque` [N m]:
+    1 + `loss` while the rotor drives, 1 - `loss` while the load drives. It is constant between changes of sign, and 1
     at a torque of 0."""
     return 1.0 + loss * _direction(xp, w) * _sense(xp, torque, 1e-12)
 

@@ -94,8 +94,8 @@ def rotor_torque(p: Any, u: Any) -> Any:
 
 class Balance(NamedTuple):
     """The balance of the shaft with the estimated loads: its `inertia` [kg m2], its acceleration [rad/s2], the
-    `gradient` of this by the unknowns in the order of `UNKNOWNS`, the state of the machine, and what the rotor feels
-    of its torque, see `felt_share`."""
+    `gradient` of this by the unknowns in the order of `UNKNOWNS`, the state of the machine, and the share of its
+    torque that the rotor feels (`felt_share`)."""
 
     inertia: Any
     acceleration: Any

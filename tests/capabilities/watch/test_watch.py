@@ -147,12 +147,12 @@ def test_behind_a_gear_that_loses_much_equal_feeds_make_no_alarm(start, tmp_path
     recording = synthetic(drive, columns, run, Logger(rate=500.0, mark_angle=-0.1), rng)
     write_recording(recording, tmp_path / "geared.csv.gz")
     (tmp_path / "mine.toml").write_text(f'{text}[watch]\nfile = "geared.csv.gz"\n', "utf-8")
-    found = Study.from_file(tmp_path / "mine.toml").watch().record
-    assert found.is_described and not found.alarms
-    late = found.recording.time > 20.0
-    assert abs(np.mean(found.outputs["imbalance.feed"][late])) < 2.0
+    record = Study.from_file(tmp_path / "mine.toml").watch().record
+    assert record.is_described and not record.alarms
+    late = record.recording.time > 20.0
+    assert abs(np.mean(record.outputs["imbalance.feed"][late])) < 2.0
     for side in ("left", "right"):
-        assert np.mean(found.outputs[f"{side}.material_mass"][late]) == pytest.approx(30.0, abs=2.0)
+        assert np.mean(record.outputs[f"{side}.material_mass"][late]) == pytest.approx(30.0, abs=2.0)
 
 
 @pytest.mark.second
