@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import math
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from chainunit import InputError
 from chainunit.capabilities.watch.false_loads import ANGLES, false_loads
 from chainunit.core.engines import MATH, Dual, dual, numpy_, slope
 from chainunit.core.native.compilers import compiler
+from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.native.export import export
 from chainunit.machines import load_filter
 from chainunit.machines.chain_unit import ChamberForces, SideLoads
@@ -32,6 +34,7 @@ from chainunit.machines.load_observer import (
     rotor_torque,
     sizes,
 )
+from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.models import MODELS
 
 native = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -82,6 +85,124 @@ def test_the_gradient_is_the_derivative_of_the_machines_torque(phi, loads):
         assert b.gradient[k] == pytest.approx(slope, rel=1e-6, abs=1e-9 * abs(b.gradient[-1])), STATES[k]
 
 
+LOSS = 1.0 / 0.7 - 1.0
+"""The loss of a gear of 70 %."""
+
+
+def behind_gear(**values):
+    """Parameters of the observer behind that gear."""
+    return LoadObserver.parameter_layout.from_names({"gear.loss": LOSS, **values})
+
+
+@pytest.mark.parametrize("phi", [3.0, 40.0, 95.0, 233.0])
+@pytest.mark.parametrize("speed", [150.0, -150.0])
+@pytest.mark.parametrize("current", [15.0, -15.0])
+def test_behind_a_gear_the_motor_gives_the_acceleration(phi, speed, current):
+    """The model of the motor turns the true loads: by its own equation, and with what the gear passes and loses."""
+    loads, p = (36.0, 24.0, 300.0, 10.0), behind_gear()
+    u = dict(zip(LOADS, loads, strict=True)) | {"phi": phi, "w": speed}
+    machine = ChamberForces.evaluate(MATH, p, ChamberForces.input_layout.from_names(u))[0]
+    of_motor = DcMotor.parameter_layout.from_names({"gear.loss": LOSS})
+    load = DcMotor.input_layout.from_names({"load.tau_bias": machine.tau_bias, "load.J": machine.J})
+    state = DcMotor.initial_states(MATH, of_motor)
+    state = DcMotor.state_layout.from_names({"w": speed, "armature.i": current}, state)
+    motor = DcMotor.evaluate(MATH, of_motor, load, state)[0]
+    b = balance(MATH, p, Inputs(phi=phi, w=speed, current=current), at(loads, speed))
+    assert b.acceleration == pytest.approx(motor.a, rel=1e-12)
+    passed = machine.tau_bias + machine.J * b.acceleration
+    # a current in the direction of turning drives the machine, one against it is driven by the machine
+    assert passed * current > 0.0
+    lost = math.copysign(LOSS * passed, speed)
+    left = of_motor.armature.k * current - of_motor.rotor.d * speed - passed - lost
+    assert of_motor.rotor.J * b.acceleration == pytest.approx(left, rel=1e-12)
+    sign = math.copysign(1.0, speed * current)
+    assert b.felt == pytest.approx(1.0 + sign * LOSS, rel=1e-12)
+    assert b.inertia == pytest.approx(of_motor.rotor.J + b.felt * machine.J, rel=1e-12)
+
+
+def acceleration_behind_gear(p, phi, torque, estimates):
+    """Of both signs of the torque that the gear passes, the acceleration at which the torque has this sign."""
+    speed, *loads, offset = estimates
+    u = dict(zip(LOADS, loads, strict=True)) | {"phi": phi, "w": speed}
+    machine = ChamberForces.evaluate(MATH, p, ChamberForces.input_layout.from_names(u))[0]
+    driving, answers = torque - offset - p.rotor.d * speed, []
+    for sign in (1.0, -1.0):
+        felt = 1.0 + p.gear.loss * sign * math.copysign(1.0, speed)
+        a = (driving - felt * machine.tau_bias) / (p.rotor.J + felt * machine.J)
+        if sign * (machine.tau_bias + machine.J * a) > 0.0:
+            answers.append((a, felt))
+    (answer,) = answers
+    return answer
+
+
+@pytest.mark.parametrize("loads", [(36.0, 24.0, 300.0, 10.0), (5.0, 55.0, 0.0, 900.0)])
+@pytest.mark.parametrize("speed", [143.0, -143.0])
+def test_the_gradient_behind_a_gear(loads, speed):
+    """By central differences of the balance by hand, for a torque that drives and one that is driven."""
+    p, shares = behind_gear(joint_damping=3.0), set()
+    steps = np.array([0.5, 0.2, 0.2, 2.0, 2.0, 0.01])
+    for phi, current in itertools.product((3.0, 40.0, 95.0, 233.0), (6.0, -6.0)):
+        u, estimates = Inputs(phi=phi, w=150.0, current=current), np.array([speed, *loads, 0.05])
+        b = balance(MATH, p, u, at(loads, speed, 0.05))
+        torque = rotor_torque(p, u)
+        a, felt = acceleration_behind_gear(p, phi, torque, estimates)
+        assert b.acceleration == pytest.approx(a, rel=1e-12)
+        shares.add(round(felt, 6))
+        for k, width in enumerate(steps):
+            change = width * np.eye(6)[k]
+            ends = [
+                acceleration_behind_gear(p, phi, torque, estimates + s * change)[0]
+                for s in (1.0, -1.0, 2.0, -2.0)
+            ]
+            by_differences = (8.0 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12.0 * width)
+            assert b.gradient[k] == pytest.approx(by_differences, rel=1e-6, abs=1e-9 * abs(b.gradient[-1])), (
+                STATES[k]
+            )
+    assert shares == {round(1.0 + LOSS, 6), round(1.0 - LOSS, 6)}
+
+
+def test_a_self_locking_gear_has_the_gradient_of_what_the_rotor_feels():
+    """The load of such a gear is worth a negative inertia, of which a part counts."""
+    p = LoadObserver.parameter_layout.from_names({"gear.loss": 4.0, "ratio": 5.0})
+    loads, u = (36.0, 24.0, 300.0, 10.0), Inputs(phi=4.0, w=150.0, current=-6.0)
+    b = balance(MATH, p, u, at(loads))
+    assert b.inertia == pytest.approx(0.1 * p.rotor.J) and b.felt == -3.0
+    for k, width in enumerate([0.5, 0.2, 0.2, 2.0, 2.0, 0.01]):
+        changed = np.array([150.0, *loads, 0.0]) + np.outer([width, -width], np.eye(6)[k])
+        ends = [balance(MATH, p, u, at(x[1:5], x[0], x[5])).acceleration for x in changed]
+        expected = (ends[0] - ends[1]) / (2.0 * width)
+        assert b.gradient[k] == pytest.approx(expected, rel=1e-4, abs=1e-9 * abs(b.gradient[-1])), STATES[k]
+
+
+@pytest.mark.parametrize("speed", [150.0, 0.3, 0.0, -80.0])
+@pytest.mark.parametrize("current", [0.9, -3.0])
+def test_without_a_loss_rotor_and_machine_are_one_body(speed, current):
+    """To the bit, with the equation of one shaft."""
+    p, loads = Parameters(joint_damping=3.0), [36.0, 24.0, 300.0, 10.0]
+    u, w, engine = Inputs(phi=40.0, w=150.0, current=current), speed / p.ratio, dual(MATH)
+
+    def linkage(xp, values):
+        sides = (
+            SideLoads(material_mass=m, processing_force=f)
+            for m, f in zip(values[:2], values[2:], strict=True)
+        )
+        return ChamberForces.linkage(xp, p, machine_inputs(u, speed, *sides))
+
+    m = Mechanism(MATH, linkage(MATH, loads), u.phi / p.ratio, (), ChamberForces.topology)
+    s = MachineState(MATH, m, w)
+    inertia = p.rotor.J + s.J / (p.ratio * p.ratio)
+    a = (rotor_torque(p, u) - 0.05 - p.rotor.d * speed - s.bias / p.ratio) / inertia
+    turning = MachineState(engine, m, Dual(w, 1.0 / p.ratio))
+    gradient = [-(p.rotor.d + slope(turning.bias) / p.ratio) / inertia]
+    for k in range(4):
+        seeded = [Dual(v, 1.0) if i == k else v for i, v in enumerate(loads)]
+        one = MachineState(engine, m.with_bodies(linkage(engine, seeded)), w)
+        gradient.append(-(slope(one.bias) + slope(one.J) * (a / p.ratio)) / (p.ratio * inertia))
+    b = balance(MATH, p, u, at(loads, speed, 0.05))
+    assert (b.inertia, b.acceleration, b.felt) == (inertia, a, 1.0)
+    assert b.gradient == [*gradient, -1.0 / inertia]
+
+
 def test_the_signals():
     """A torque, an armature current, and an active power without the losses of the winding."""
     layout = LoadObserver.parameter_layout
@@ -93,10 +214,11 @@ def test_the_signals():
     assert rotor_torque(layout.from_names(by | power), u) == pytest.approx((500.0 - 12.0 * 9.0) * 2.0 / 314.0)
 
 
-def test_every_engine_gives_the_same():
+@pytest.mark.parametrize("loss", [0.0, LOSS])
+def test_every_engine_gives_the_same(loss):
     """Points of an array, and symbols, whose directional derivative is that of the rates."""
     phi = np.linspace(0.0, 314.0, 7)
-    x, p = at((33.0, 27.0, 50.0, 0.0)), Parameters()
+    x, p = at((33.0, 27.0, 50.0, 0.0)), LoadObserver.parameter_layout.from_names({"gear.loss": loss})
     rows = LoadObserver.derivatives(numpy_(), p, Inputs(phi=phi, w=151.0, current=0.7), x)
     outputs = LoadObserver.evaluate(numpy_(), p, Inputs(phi=phi, w=151.0, current=0.7), x)[0]
     layout = LoadObserver.parts[0].layout
@@ -455,6 +577,19 @@ def test_false_loads_of_the_feed_itself():
         false_loads(Parameters(), ["left.mass"], [[1.0]], 3.0)
     with pytest.raises(InputError, match=r"covariance: has the shape \(1, 1\), must be \(2, 2\)"):
         false_loads(Parameters(), ["left.web_mass", "right.web_mass"], [[1.0]], 3.0)
+
+
+def test_false_loads_behind_a_gear_whose_torque_changes_its_sign():
+    """A heavier web is like feed there, too: the gear passes the torque of both alike. The observer's balance, which
+    knows no web that is heavier, has the asked acceleration with these false loads."""
+    p = behind_gear()
+    angles = np.arange(ANGLES) * 2.0 * math.pi / ANGLES
+    a = 4.0 * np.sin(angles)
+    u = {"phi": angles * p.ratio, "w": 3.0 * p.ratio, "a": a * p.ratio} | dict.fromkeys(LOADS[:2], 30.0)
+    passed = ChamberForces.evaluate(numpy_(), p, ChamberForces.input_layout.from_names(u))[0].tau
+    assert np.min(passed) < 0.0 < np.max(passed)
+    false = false_loads(p, ["left.web_mass"], [[1.0]], 3.0, a)
+    np.testing.assert_allclose(false.by_parameter["left.web_mass"], [-1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6)
 
 
 @native

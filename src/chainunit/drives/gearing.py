@@ -94,8 +94,20 @@ def lost_torque(xp: Any, loss: Any, torque: Any, w: Any) -> Any:
     return loss * xp.abs(torque) * _direction(xp, w)
 
 
+def felt_share(xp: Any, loss: Any, torque: Any, w: Any) -> Any:
+    """Torque that the rotor feels, the one that the gear passes on with its `lost_torque`, over this `torque` [N m]:
+    1 + `loss` while the rotor drives, 1 - `loss` while the load drives. It is constant between changes of sign, and 1
+    at a torque of 0."""
+    return 1.0 + loss * _direction(xp, w) * _sense(xp, torque, 1e-12)
+
+
+def _sense(xp: Any, x: Any, least: float) -> Any:
+    """The sign of a number beyond `least`, in proportion to it below."""
+    return x / xp.maximum(xp.abs(x), least)
+
+
 def _direction(xp: Any, w: Any) -> Any:
-    return w / xp.maximum(xp.abs(w), W_REST)
+    return _sense(xp, w, W_REST)
 
 
 def geared_motion(xp: Any, load: LoadPort, phi: Any, w: Any, J: Any, tau: Any, loss: Any) -> tuple[Any, Any]:
@@ -116,12 +128,12 @@ def geared_acceleration(xp: Any, load: Any, inertia: Any, w: Any, J: Any, tau: A
     higher one of a rotor that turns backward.
     """
     part = loss * _direction(xp, w)
-    driving = (tau - (1.0 + part) * load) / _felt(xp, J, (1.0 + part) * inertia)
-    driven = (tau - (1.0 - part) * load) / _felt(xp, J, (1.0 - part) * inertia)
-    sense = w / xp.maximum(xp.abs(w), 1e-9)
-    return 0.5 * (driving + driven - sense * xp.abs(driving - driven))
+    driving = (tau - (1.0 + part) * load) / felt_inertia(xp, J, (1.0 + part) * inertia)
+    driven = (tau - (1.0 - part) * load) / felt_inertia(xp, J, (1.0 - part) * inertia)
+    return 0.5 * (driving + driven - _sense(xp, w, 1e-9) * xp.abs(driving - driven))
 
 
-def _felt(xp: Any, J: Any, inertia: Any) -> Any:
-    """Inertia of rotor and load; the load of a self-locking gear counts against that of the rotor, in part."""
+def felt_inertia(xp: Any, J: Any, inertia: Any) -> Any:
+    """Inertia of a rotor, `J`, and of its load as the rotor feels it, `inertia` (see `felt_share`), in one unit; the
+    load of a self-locking gear counts against the inertia of the rotor, in part."""
     return xp.maximum(J + inertia, _REST_OF_ROTOR * J)

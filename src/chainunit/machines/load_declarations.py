@@ -6,7 +6,7 @@ from typing import Any
 
 from ..core.quantities import Value, declaration, declared_class, group, quantity
 from ..core.solver import Solver
-from ..drives.motor import Rotor
+from ..drives.motor import GearOfMotor, Rotor
 from . import chain_unit
 from .load_filter import TRIANGLE, UNKNOWNS
 
@@ -117,6 +117,7 @@ class Parameters(chain_unit.Parameters):
         "1", "gear ratio, motor turns per crank turn", default=50.0, above=0.0, max=1e6, usual=(1.0, 500.0)
     )
     rotor: Rotor = group(Rotor, "rotor of the motor", default=Rotor())
+    gear: GearOfMotor = group(GearOfMotor, "gear", default=GearOfMotor())
     signal: SignalWeights = group(SignalWeights, "measured signal", default=SignalWeights())
     noise: Noise = group(Noise, "noise", default=Noise())
     feed: FeedCourse = group(FeedCourse, "feed of a side", default=FeedCourse())

@@ -3,11 +3,13 @@ processing force of each side.
 
 The signal gives the torque T on the motor's rotor. At the motor's shaft
 
-    (rotor.J + J(phi, feed)/ratio^2) dw/dt = T - offset - rotor.d w - tau_bias(phi, w, feed, force)/ratio
+    rotor.J dw/dt = T - offset - rotor.d w - P - gear.loss |P| sign(w)
+    P = J(phi, feed)/ratio^2 dw/dt + tau_bias(phi, w, feed, force)/ratio
 
-with the machine's J and tau_bias (`chainunit.machines.chain_unit`). An extended Kalman-Bucy filter estimates the
-speed, the loads and the offset from the measured speed. Its gradient is the exact derivative of the machine's torque,
-by dual numbers; angle and motion of the links are computed once for all directions.
+with the torque P that the gear passes on (`chainunit.drives.gearing`) and the machine's J and tau_bias
+(`chainunit.machines.chain_unit`). An extended Kalman-Bucy filter estimates the speed, the loads and the offset from
+the measured speed. Its gradient is the exact derivative of the machine's torque, by dual numbers; the sign of P and
+the loss near rest count as constant. Angle and motion of the links are computed once for all directions.
 
 Two covariances are states. The one of the filter (`covariance`) counts on loads that may change by their `change` in
 a second; the gain follows from it. The other one (`quiet`) is that of the errors which this gain makes while the
@@ -28,6 +30,7 @@ from typing import Any, NamedTuple
 from ..core.engines import Dual, dual, slope
 from ..core.model import FmuData, Model, Part
 from ..core.ports import measured_terminal
+from ..drives.gearing import felt_inertia, felt_share, geared_acceleration
 from ..mechanism.machine import MachineState, Mechanism
 from . import chain_unit
 from .chain_unit import ChamberForces, SideLoads
@@ -91,12 +94,14 @@ def rotor_torque(p: Any, u: Any) -> Any:
 
 class Balance(NamedTuple):
     """The balance of the shaft with the estimated loads: its `inertia` [kg m2], its acceleration [rad/s2], the
-    `gradient` of this by the unknowns in the order of `UNKNOWNS`, and the state of the machine."""
+    `gradient` of this by the unknowns in the order of `UNKNOWNS`, the state of the machine, and the share of its
+    torque that the rotor feels (`felt_share`)."""
 
     inertia: Any
     acceleration: Any
     gradient: list[Any]
     machine: MachineState
+    felt: Any
 
 
 def balance(xp: Any, p: Any, u: Any, x: Any) -> Balance:
@@ -118,18 +123,22 @@ def balance(xp: Any, p: Any, u: Any, x: Any) -> Balance:
 
     m = Mechanism(xp, linkage(xp, loads), u.phi / ratio, (), ChamberForces.topology)
     s = MachineState(xp, m, w)
-    inertia = p.rotor.J + s.J / (ratio * ratio)
+    load, load_inertia = s.bias / ratio, s.J / (ratio * ratio)
     driving = rotor_torque(p, u) - x.torque_offset - p.rotor.d * x.speed
-    a = (driving - s.bias / ratio) / inertia
+    a = geared_acceleration(xp, load, load_inertia, x.speed, p.rotor.J, driving, p.gear.loss)
+    felt = felt_share(xp, p.gear.loss, load_inertia * a + load, x.speed)
+    inertia = felt_inertia(xp, p.rotor.J, felt * load_inertia)
 
     engine = dual(xp)
     turning = MachineState(engine, m, Dual(w, 1.0 / ratio))
-    gradient = [-(p.rotor.d + slope(turning.bias) / ratio) / inertia]
+    gradient = [-(p.rotor.d + felt * slope(turning.bias) / ratio) / inertia]
+    rotor_at_crank = p.rotor.J * (ratio * ratio)
     for k in range(len(loads)):
         seeded = [Dual(v, 1.0) if i == k else v for i, v in enumerate(loads)]
         one = MachineState(engine, m.with_bodies(linkage(engine, seeded)), w)
-        gradient.append(-(slope(one.bias) + slope(one.J) * (a / ratio)) / (ratio * inertia))
-    return Balance(inertia, a, [*gradient, -1.0 / inertia], s)
+        at_crank = slope(felt_inertia(engine, rotor_at_crank, felt * one.J))
+        gradient.append(-(felt * slope(one.bias) + at_crank * (a / ratio)) / (ratio * inertia))
+    return Balance(inertia, a, [*gradient, -1.0 / inertia], s, felt)
 
 
 def sizes(p: Any) -> list[Any]:
@@ -234,12 +243,16 @@ def _disturbances(p: Any) -> list[Any]:
     return [0.0, 0.0, force, force, offset * offset]
 
 
+def _lever(p: Any, share: float = 1.0) -> Any:
+    """The largest lever of a processing force on the rotor [m], with the loss of the gear; or a `share` of it."""
+    return (1.0 + p.gear.loss) * (share * p.r * p.e / (p.h * p.ratio))
+
+
 def _plausible(p: Any, deviation: Any) -> Any:
     """The share of a deviation of the speed [rad/s] from which loads are learned: less and less beyond the speed that
     a jam takes within `ONSET`. A larger one is no load: the measured speed has jumped, as where the observer starts
     with another speed."""
-    lever = p.r * p.e / (p.h * p.ratio)
-    most = GATE * p.noise.w + 2.0 * lever * p.force.spread / p.rotor.J * ONSET
+    most = GATE * p.noise.w + 2.0 * _lever(p) * p.force.spread / p.rotor.J * ONSET
     square = (deviation / most) * (deviation / most)
     return 1.0 / (1.0 + square * square)
 
@@ -251,7 +264,7 @@ def _jump(xp: Any, p: Any, x: Any, b: Balance) -> Any:
     spreads = [FEED_JUMP * p.feed.spread] * 2 + [p.force.spread] * 2
     explained = [g * spread for g, spread in zip(b.gradient[1:5], spreads, strict=True)]
     # a part of the lever of B, so that the sum is not zero in a dead position
-    lever = 0.2 * p.r * p.e / (p.h * p.ratio) * p.force.spread / b.inertia
+    lever = _lever(p, 0.2) * p.force.spread / b.inertia
     jump = xp.minimum(beyond / (sum(e * e for e in explained) + lever * lever), 4.0) / ONSET
     return jump * _plausible(p, x.surprise)
 
@@ -333,8 +346,7 @@ def _start_states(xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
 def _internal_step(xp: Any, p: Any) -> Any:
     """Longest internal step: 2 ms, or the time in which the filter finds loads that have jumped by their spread,
     if this is shorter."""
-    lever = p.r * p.e / (p.h * p.ratio)
-    unknown = lever * (2.0 * p.force.spread + 2.0 * p.g * p.feed.spread) + p.offset.spread
+    unknown = _lever(p) * (2.0 * p.force.spread + 2.0 * p.g * p.feed.spread) + p.offset.spread
     jerk = unknown / (p.rotor.J * p.noise.w)
     # of the cubic pole of a speed that an unknown acceleration drives
     pole = xp.exp(xp.log(jerk * jerk * p.noise.rate) * (1.0 / 3.0))

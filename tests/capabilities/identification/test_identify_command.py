@@ -478,9 +478,11 @@ def test_a_deviation_of_a_temperature_is_a_difference():
     assert own["value"]["kind"] == "temperature"
 
 
-def test_the_observer_gets_the_errors_at_the_fitted_loads(tmp_path):
-    """An error of the friction makes false loads by the forces that there are."""
-    config = study_files.parse("[observer]\n[feed]\nright = { material_mass = 20, processing_force = 100 }\n")
+@pytest.mark.parametrize("loss", [0.0, 0.4])
+def test_the_observer_gets_the_errors_at_the_fitted_loads(loss, tmp_path):
+    """An error of the friction makes false loads by the forces that there are, and by the loss of the gear."""
+    feed = "[feed]\nright = { material_mass = 20, processing_force = 100 }\n"
+    config = study_files.parse(f"[observer]\n[motor]\ngear.loss = {loss}\n{feed}")
     values = {"machine.pin.friction": (0.12, 0.01), "feed.left.processing_force": (300.0, 1.0)}
     estimates = {
         name: identification.FittedNumber(Unknown.within(name, "1", 0.0, 1e3), x, x, s, x - s, x + s, True)
@@ -488,7 +490,7 @@ def test_the_observer_gets_the_errors_at_the_fitted_loads(tmp_path):
     }
     found = SimpleNamespace(config=config, estimates=estimates, covariance=np.diag([1e-4, 1.0]))
     written = identified_tables(found, tmp_path)["observer"]
-    known = {"pin.friction": 0.12, "feed.expected": 25.0, "force.expected": 200.0}
+    known = {"pin.friction": 0.12, "feed.expected": 25.0, "force.expected": 200.0, "gear.loss": loss}
     p = LoadObserver.parameter_layout.from_names(known)
     own = false_loads(p, ["pin.friction"], [[1e-4]], config.run.crank_speed)
     assert written["uncertainty"] == pytest.approx(own.imbalance, rel=1e-3)

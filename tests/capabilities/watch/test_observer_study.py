@@ -220,6 +220,29 @@ J = 0.01
     assert p.noise.torque == pytest.approx(0.02 * math.sqrt(np.mean(np.square(torque))))
 
 
+@pytest.mark.parametrize(
+    ("more", "loss"),
+    [
+        ('[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n[gear]\nefficiency = 0.7\nd = 0.002', 1.0 / 0.7 - 1.0),
+        ("[motor]\ngear.loss = 0.2", 0.2),
+    ],
+)
+def test_the_observer_knows_friction_and_gear_of_the_motor(more, loss):
+    """Apart, as the motor's FMU has them; the noise is in parts of the torque before the gear."""
+    drive = drive_of(f"[observer]\n{more}", None)
+    p, motor = drive.observer.parameters, drive.fmu_parameters
+    assert p.gear.loss == motor.gear.loss == pytest.approx(loss)
+    assert (p.rotor.J, p.rotor.d) == (motor.rotor.J, motor.rotor.d)
+    angle, speed = np.linspace(0.0, 2.0 * math.pi, 720, endpoint=False), 3.0 * drive.ratio
+    torque = drive.machine.outputs(angle * drive.ratio, speed, 0.0, config.parse("").feed).tau
+    assert np.min(torque) < 0.0
+    torque = np.where(torque > 0.0, 1.0 + loss, 1.0 - loss) * torque + motor.rotor.d * speed
+    share = drive_of("[observer]", None).observer.parameters
+    share = share.noise.torque / share.offset.spread
+    assert p.offset.spread == pytest.approx(0.15 * math.sqrt(np.mean(np.square(torque))), rel=1e-3)
+    assert p.noise.torque == pytest.approx(share * p.offset.spread)
+
+
 @pytest.mark.parametrize("on_inverter", [False, True])
 def test_the_power_of_an_induction_motor_tells_its_torque(on_inverter):
     """In steady running, at the slip of half of the rated torque."""

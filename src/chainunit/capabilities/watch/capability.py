@@ -110,12 +110,13 @@ class WatchCapability(Capability):
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
         """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that
         they make."""
+        from ...study.choice import drive_of
         from .observation import false_imbalance_of
 
         if "watch" in tables:
             tables["watch"]["identification"] = estimates.file
         if "observer" in tables:
-            imbalance = false_imbalance_of(config.machine, config.feed, config.run.crank_speed, estimates)
+            imbalance = false_imbalance_of(drive_of(config), config.feed, config.run.crank_speed, estimates)
             tables["observer"] |= {name: float(f"{x:.4g}") for name, x in imbalance.items()}
 
     def analyses(self) -> Iterable[type[Analysis]]:

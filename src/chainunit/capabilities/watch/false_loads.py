@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.engines import casadi_
 from ...core.errors import InputError
+from ...drives.gearing import felt_share
 from ...machines.load_declarations import Inputs
 from ...machines.load_filter import UNKNOWNS
 from ...machines.load_observer import LoadObserver, balance
@@ -93,8 +94,10 @@ def false_loads(
     assert LoadObserver.state_layout is not None
     start = LoadObserver.start(casadi_(), p, u)
     free = balance(casadi_(), p, u, start)
-    # with this offset the right machine has the acceleration
-    offset = free.inertia * (free.acceleration - a * p.ratio)
+    # with this offset the right machine has the acceleration; the gear may pass a torque of the other sign then
+    passed = (free.machine.bias + free.machine.J * a) / p.ratio
+    other = free.felt - felt_share(casadi_(), p.gear.loss, passed, u.w)
+    offset = free.inertia * (free.acceleration - a * p.ratio) + other * passed
     b = balance(
         casadi_(), parameters, u, LoadObserver.state_layout.from_names({"torque_offset": offset}, start)
     )

@@ -12,7 +12,6 @@ from ...core.quantities import Layout
 from ...drives.gearing import lost_torque
 from ...drives.terminal_signals import TerminalSignals, terminal_signals
 from ...machines.load_observer import LoadObserver
-from ...machines.machine import Machine
 from ...study.arrays import rms
 from ...study.capability import Estimates
 from ...study.cycle import Cycle
@@ -33,15 +32,18 @@ def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) ->
     """The drive with a load observer by that `table`, for a machine with this `feed` and `turn` in normal running."""
     p, speed = drive.fmu_parameters, turn.crank_speed * drive.ratio
     passed = np.asarray(turn.crank_torque) / drive.ratio
-    lost = lost_torque(np, drive.gear_loss, passed, speed)
-    torque = passed + lost + p.rotor.d * speed
+    torque = passed + lost_torque(np, p.gear.loss, passed, speed) + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
-    friction = p.rotor.d + float(np.mean(lost)) / speed
-    values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": friction}
-    values |= weights(signals) | tuning(table, feed, speed, rms(torque))
+    values = drive.machine.by_name | of_shaft(p) | weights(signals)
+    values |= tuning(table, feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}
     return replace(drive, observer=component, observed=wires)
+
+
+def of_shaft(p: Any) -> dict[str, float]:
+    """The parameters of the observer that are those of the shaft and the gear of a motor with the parameters `p`."""
+    return {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d, "gear.loss": p.gear.loss}
 
 
 def weights(signals: TerminalSignals) -> dict[str, float]:
@@ -97,15 +99,16 @@ def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict
 
 
 def false_imbalance_of(
-    machine: Machine, usual: Any, crank_speed: float, estimates: Estimates
+    drive: Drive, usual: Any, crank_speed: float, estimates: Estimates
 ) -> dict[str, float]:
-    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine, with the
-    `usual` feed at that speed of the crank [rad/s]."""
+    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine of a `drive`,
+    with the `usual` feed at that speed of the crank [rad/s]."""
     values = estimates.values
     loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
     feed = Layout(type(usual)).from_names(loads, usual)
     machine_values = {name.removeprefix("machine."): x for name, x in values.items()}
-    parameters = machine.by_name | machine_values | usual_loads(feed)
+    parameters = drive.machine.by_name | machine_values | usual_loads(feed)
+    parameters |= {"gear.loss": drive.fmu_parameters.gear.loss}
     return false_imbalance(parameters, list(machine_values), estimates.covariance, crank_speed)
 
 

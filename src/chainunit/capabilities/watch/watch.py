@@ -42,7 +42,7 @@ from ...study.drive import Drive
 from ...system.instance import Fmu, Instance
 from ...work.progress import TaskProgress, quiet
 from .crank_motion import crank_motion
-from .observation import false_imbalance, tuning, weights
+from .observation import false_imbalance, of_shaft, tuning, weights
 from .observer_table import ObserverTable
 from .reading import WatchPlan
 
@@ -326,8 +326,7 @@ def _parameters(
             raise InputError(
                 f"{recording.source}: the load of this motor is watched by {' and '.join(missing)}, too; record it"
             )
-        lost = abs(mean) * drive.gear_loss / (1.0 + drive.gear_loss)
-        values |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d + lost / w} | weights(signals)
+        values |= of_shaft(p) | weights(signals)
         values |= {"signal.zero": signals.per_current * _zero(learned_values, "motor.i")}
         torque = signals.per_current * rms(columns["motor.i"])
         torque += signals.per_power * rms(columns["motor.power"]) if signals.per_power else 0.0
