@@ -9,6 +9,7 @@ import math
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 from records import record_of
 from test_foreign_machine import MACHINE, SCRIPT
@@ -32,6 +33,7 @@ from chainunit.study.package import remarks_on_export
 from chainunit.study.parts import example
 from chainunit.study.remarks import conclude, lengths_of_example
 from chainunit.study.result import as_dict
+from chainunit.study.run import run_study
 
 KNIFE = example("knife")
 
@@ -333,3 +335,19 @@ def test_lengths_beside_those_of_the_example_are_named(tmp_path):
     file.write_text('[ratios]\nrho = 0.127\nl = "1.1 m"\n', "utf-8")
     for config in (load(file), load(None)):
         assert lengths_of_example(config.file.given, bool(config.machine.model.sides)) is None
+
+
+@pytest.mark.second
+def test_the_loss_of_the_gear_of_an_own_motor_is_in_its_report(tmp_path):
+    """With [motor] gear.loss the FMU lost it, and the report knew of none; by the balance of the rotor."""
+    study = run_study(parse("event = []\n[motor]\ngear.loss = 0.25\n"), tmp_path)
+    run, p = study.steady, study.drive.fmu_parameters
+    w, air_gap, load = (run[f"motor.{name}"].values for name in ("w", "air_gap_tau", "tau"))
+    power = (air_gap - p.rotor.d * w - load) * w
+    lost = np.trapezoid(power, run["time"]) / np.ptp(run["time"])
+    found = study.findings["gear_loss"]
+    assert found.loss.whole == pytest.approx(lost, rel=1e-4) and found.efficiency == pytest.approx(
+        0.8, rel=1e-12
+    )
+    (said,) = [remark for remark in study.notes if remark.code == "gear-loss"]
+    assert said.quantities["total"].value == found.loss.whole > 1.0

@@ -75,7 +75,7 @@ _LOSS = note(
 
 
 class GearAnalysis(Analysis):
-    """The loss of the gear, where the study knows one: with a motor of the catalogue."""
+    """The loss of the gear, where the study knows one."""
 
     name = "gear_loss"
     needs_runs, at_end = True, True
@@ -91,14 +91,13 @@ class GearAnalysis(Analysis):
         that lasts."""
         if STEADY not in study.answers:
             return None
-        gear = study.config.drive.gear
         window = study.window(Phase.STEADY, study.steady)
         squared = window.mean(lambda drive, run: run[drive.motor_speed].values ** 2)
         warm = [findings.gear_loss for findings in study.findings.values() if findings.gear_loss is not None]
         total, net = warm[0] if warm else window.mean(gear_loss), study.answers[STEADY].power_mean
         if net is None:
             return None
-        without_load = min(total, gear.d * squared)
+        without_load = min(total, study.drive.gear_friction * squared)
         return GearFindings(
             GearLoss(
                 whole=total,
@@ -108,5 +107,5 @@ class GearAnalysis(Analysis):
                 passed_power=window.mean(lambda drive, run: np.abs(shaft_power(drive, run))),
                 share=total / net if net > 0.0 else None,
             ),
-            float(gear.efficiency),
+            1.0 / (1.0 + study.drive.gear_loss),
         )

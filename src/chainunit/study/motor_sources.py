@@ -70,6 +70,7 @@ class OwnMotor(MotorSource):
             machine,
             follows,
             feed_forward=tables.feed_forward,
+            gear_loss=float(p.gear.loss),
             added_inertia=tables.added_inertia,
         )
 
