@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 import wheels
+from typer.main import get_command
 
 import chainunit
+from chainunit.app.cli import app
 from chainunit.core.register import entries
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.registry import CAPABILITIES, _capability, capabilities
@@ -37,7 +39,10 @@ side = "left"
 SMOKE = """
 import json, sys
 from pathlib import Path
+from typer import Context
+from typer.main import get_command
 from chainunit import Study
+from chainunit.app.cli import app
 from chainunit.core.errors import InputError
 from chainunit.fmu.export import export
 from chainunit.models import MODELS
@@ -56,7 +61,9 @@ for table in tables:
         refused[table] = str(error)
 result = Study.from_text((folder / "study.toml").read_text()).run(folder / "result")
 export(MODELS["ChamberForces"], folder / "ChamberForces.fmu")
-print(json.dumps({"properties": list(properties), "refused": refused}))
+group = get_command(app)
+commands, text = group.list_commands(None), group.get_help(Context(group))
+print(json.dumps({"properties": list(properties), "refused": refused, "commands": commands, "help": text}))
 """
 
 
@@ -65,6 +72,18 @@ chains sizing static_inertia energy sides blade random_overloads flywheels torsi
 watch sweep
 """.split()
 COMMANDS_ALONE = ["comparison", "handover", "linear", "vouching"]
+"""Folders that add commands alone, and nothing to a study."""
+COMMANDS = {
+    "comparison": ["compare"],
+    "handover": ["handover"],
+    "identification": ["identify"],
+    "linear": ["linearize"],
+    "optimize": ["optimize"],
+    "sweep": ["sweep"],
+    "vouching": ["certify", "key", "verify", "vouch"],
+    "watch": ["watch"],
+}
+"""Names of the commands of each folder that has any."""
 
 
 def test_the_entry_points_name_the_folders():
@@ -143,7 +162,8 @@ def test_a_type_checker_sees_the_methods_and_results_of_capabilities(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_rest_works_without(name, tmp_path):
-    """A study, an export and the schema; a table of the capability is refused as an unknown key."""
+    """A study, an export and the schema; a table of the capability is refused as an unknown key, and its commands are
+    gone. A folder with a command alone has no table."""
     copy = tmp_path / "src" / "chainunit"
     # with the compiled modules, which are valid as long as the dates of the files are
     shutil.copytree(PACKAGE, copy)
@@ -154,8 +174,9 @@ def test_the_rest_works_without(name, tmp_path):
     wheels.install_copy(copy.parent, "".join(others))
     shutil.copytree(Path(__file__).parents[1] / "fmu", tmp_path / "fmu")
     (tmp_path / "study.toml").write_text(STUDY)
-    own = next(part for part in capabilities() if part.name == name)
-    tables = list(own.tables)
+    parts = [part for part in capabilities() if part.name == name]
+    assert bool(parts) == (name not in COMMANDS_ALONE)
+    tables = [table for part in parts for table in part.tables]
     call = [sys.executable, "-c", SMOKE, str(tmp_path), *tables]
     env = os.environ | {"PYTHONPATH": str(copy.parent)}
     process = subprocess.run(call, env=env, capture_output=True, text=True, cwd=tmp_path)
@@ -163,6 +184,10 @@ def test_the_rest_works_without(name, tmp_path):
     said = json.loads(process.stdout.splitlines()[-1])
     assert not set(tables) & set(said["properties"])
     assert list(said["refused"]) == tables
+    gone = sorted(set(get_command(app).list_commands(None)) - set(said["commands"]))
+    assert gone == COMMANDS.get(name, [])
+    assert "chainunit study " in said["help"]
+    assert not any(f"chainunit {command} " in said["help"] for command in gone)
     assert all(f"{table}: unknown key" in words for table, words in said["refused"].items())
     result = ResultEntries(json.loads((tmp_path / "result" / "result.json").read_text()))
     assert result["status"] == "complete" and "jam_left" in result["answers"]

@@ -342,9 +342,10 @@ def test_the_loss_of_the_gear_of_an_own_motor_is_in_its_report(tmp_path):
     """With [motor] gear.loss the FMU lost it, and the report knew of none; by the balance of the rotor."""
     study = run_study(parse("event = []\n[motor]\ngear.loss = 0.25\n"), tmp_path)
     run, p = study.steady, study.drive.fmu_parameters
+    time = run["time"].values
     w, air_gap, load = (run[f"motor.{name}"].values for name in ("w", "air_gap_tau", "tau"))
     power = (air_gap - p.rotor.d * w - load) * w
-    lost = np.trapezoid(power, run["time"]) / np.ptp(run["time"])
+    lost = np.trapezoid(power, time) / np.ptp(time)
     found = study.findings["gear_loss"]
     assert found.loss.whole == pytest.approx(lost, rel=1e-4) and found.efficiency == pytest.approx(
         0.8, rel=1e-12

@@ -174,8 +174,8 @@ def test_the_inverter_is_ordered_by_all_starts_and_events():
             },
             findings={
                 "starts": StartFindings(starts, 1.0, math.inf, "steady"),
-                "sizing": SimpleNamespace(currents_until_trip=lambda study: dict(until_trip)),
             },
+            currents_until_trip=dict(until_trip),
             proposal=proposal,
             title_of=lambda name: name,
         )

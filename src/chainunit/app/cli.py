@@ -72,7 +72,7 @@ _GROUPS = {
         ),
     },
 }
-"""By heading of the help, the commands, each with a line and an example."""
+"""By heading of the help, the commands, each with a line and an example. The help shows those that are installed."""
 
 
 class _Commands(typer.core.TyperGroup):
@@ -104,9 +104,10 @@ class _Commands(typer.core.TyperGroup):
             if name not in listed and not command.hidden
         }
         for heading, group in (*_GROUPS.items(), *([("Others", others)] if others else [])):
+            installed = {name: rest for name, rest in group.items() if name in self.commands}
             with formatter.section(heading):
                 formatter.write_dl(
-                    [row for name, rest in group.items() for row in zip((name, ""), rest, strict=True)]
+                    [row for name, rest in installed.items() for row in zip((name, ""), rest, strict=True)]
                 )
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:

@@ -359,11 +359,12 @@ def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeyp
 
 @pytest.mark.slow
 def test_the_remedy_of_the_rejected_example_works(tmp_path):
-    """Its comment says that a soft starter makes a motor fit."""
+    """Its comment says that a soft starter with a ramp of 5 s makes a motor fit."""
     text = (Path(__file__).parents[3] / "examples/motor_rejected.toml").read_text("utf-8")
-    assert 'start = "direct"' in text and 'with start = "soft" a motor of 0.55 kW fits' in text
-    soft = parse(text.replace('start = "direct"', 'start = "soft"'))
-    result = sized_by(soft, tmp_path)
+    kind, ramp = 'start = "soft"', 'starter.soft_start.time = "5 s"'
+    assert f"with {kind} and\n# {ramp} a motor of 0.55 kW fits" in text
+    assert text.count('start = "direct"') == 1
+    result = sized_by(parse(text.replace('start = "direct"', f"{kind}\n{ramp}")), tmp_path)
     assert result.chosen_candidate is not None and result.chosen_candidate.motor.nameplate.power == 550.0
     assert all(u <= 1.0 for u in result.chosen_candidate.sizes.values())
 
