@@ -149,7 +149,7 @@ def beside_the_library(model: Model, folder: Path) -> dict[str, list[float]]:
 
 def own_functions(folder: Path) -> dict[str, dict[str, list[float]]]:
     """The costs of `beside_the_library` of each model, shown in a table."""
-    models = MODELS | {name: model_named(str(GALLERY / f"{name}.toml")) for name in LINKAGES}
+    models = dict(MODELS) | {name: model_named(str(GALLERY / f"{name}.toml")) for name in LINKAGES}
     table = Table("model", "what", "own, ns", "C library, ns", "ratio")
     costs = {}
     for name, model in models.items():

@@ -219,14 +219,33 @@ def held_in_star(angles, star_speed):
 def test_a_load_that_holds_the_motor_in_star_is_named(tmp_path):
     """A crusher stood for 8 s in star and then started direct; "more time in star" was the advice."""
     study = run_study(parse(STAR % "3 s"), tmp_path)
-    for speed, codes in ((-0.001, ["stands-in-star"]), (0.3, [])):
+    for speed, codes in (
+        (-0.001, ["stands-in-star"]),
+        (0.3, ["star-too-short"]),
+        (0.81, ["star-just-long-enough"]),
+        (0.95, []),
+    ):
         study.findings["starts"] = held_in_star((0.0, 225.0), speed)
         study.remarks.clear()
         _on_star(study)
         assert [remark.code for remark in study.remarks] == codes
         for remark in study.remarks:
-            assert remark.text.startswith("The load holds the motor in star from 0 deg, 225 deg.")
+            size = remark.quantities["share"]
+            if speed > 0.0:
+                assert size.value == speed and remark.text.startswith("In a start from 0 deg ")
+                assert "more time in star" in remark.remedy
+                continue
+            assert remark.text.startswith(
+                "The load holds the motor in star from 2 of 3 angles (0 deg, 225 deg), "
+            )
+            assert "the change to delta takes 825 A" in remark.text
             assert remark.quantities["delta"].value == 825.0 and "empty_start" in remark.remedy
+            assert size.value == 0.9
+    # every start is held: no other angle is named
+    study.findings["starts"] = held_in_star((0.0, 90.0, 225.0), 0.0)
+    study.remarks.clear()
+    _on_star(study)
+    assert "other angles" not in study.remarks[0].text
 
 
 @pytest.mark.second
@@ -255,6 +274,7 @@ def test_a_change_to_delta_at_half_the_speed_is_warned_of(tmp_path):
     (warning,) = [each for each in short.warnings if each.code == "star-too-short"]
     run, plate = short.runs["start_up"], short.plate.nameplate
     share = float(np.interp(0.05, run["time"], run["motor.w"])) / plate.synchronous
-    assert warning.quantities["share"].value == pytest.approx(share) and share < 0.8
+    slowest = min(start.star_speed for start in short.findings["starts"].starts)
+    assert warning.quantities["share"].value == pytest.approx(min(share, slowest)) and share < 0.8
     assert warning.quantities["delta"].value > 1.5 * plate.rated_current
     assert not [each for each in long.warnings if each.code == "star-too-short"]

@@ -377,11 +377,15 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
         ("Warning: short (in brackets).", "Warning: short (in brackets)."),
         (
             "Warning: Bars in compression, where a chain goes slack: start-up (web mean pull -325 N, wall -12 N).",
-            "Warning: Bars in compression, where a chain goes slack.",
+            "Warning: Bars in compression, where a chain goes slack: start-up.",
         ),
         (
             "Warning: No motor of the catalogue fits (2 of 2 were tried; see below): the motor of 1.1 kW is near.",
-            "Warning: No motor of the catalogue fits (2 of 2 were tried; see below).",
+            "Warning: No motor of the catalogue fits: the motor of 1.1 kW is near.",
+        ),
+        (
+            "Warning: No motor of the catalogue fits (2 of 2 were tried; see below): the nearest is one of 1.1 kW.",
+            "Warning: No motor of the catalogue fits: the nearest is one of 1.1 kW.",
         ),
         (
             "Warning: The speed does not return to its steady band within the time followed: the rocker is blocked.",

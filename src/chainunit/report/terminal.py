@@ -121,9 +121,10 @@ def screen(report: Report, console: Console, rest: str) -> None:
 
 def cut(text: str, width: int) -> str:
     """A text of at most `width` letters: if it is too long, its first clauses; a bracket is whole or left out."""
-    for trial in (text, _BRACKETS.sub("", text)):
-        if len(trial) <= width:
-            return trial
+    trials = text, _BRACKETS.sub("", text)
+    if whole := next((trial for trial in trials if len(trial) <= width), ""):
+        return whole
+    for trial in trials:
         brackets = [bracket.span() for bracket in _BRACKETS.finditer(trial)]
         ends = [place.start() for place in _CLAUSE_END.finditer(trial) if place.start() < width]
         if outside := [end for end in ends if not any(low <= end < high for low, high in brackets)]:

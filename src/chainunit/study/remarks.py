@@ -363,44 +363,56 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
 
 _STAR_TOO_SHORT = warning(
     "star-too-short",
-    "In the start-up the motor has {share} of its synchronous speed after {time} in star. The current jumps from "
-    "{star} to {delta}.",
+    "In a start from {angle} the change from star to delta comes at {share} of the synchronous speed, after {time}. "
+    "The current jumps almost to the one of a start direct on line, {delta}.",
     remedy="Take more time in star (starter.star_delta.time), less load, or another start.",
-    sizes={"s": "time", ("1", "percent"): "share", "A": "star delta"},
+    sizes={"s": "time", ("1", "percent"): "share", "A": "delta", "rad": "angle"},
+)
+_LITTLE_STAR = 0.9
+"""Share of the synchronous speed up to which a change to delta has little reserve: at 95 % of the voltage a motor has
+a tenth less torque."""
+_STAR_JUST_LONG = note(
+    "star-just-long-enough",
+    "In a start from {angle} the change from star to delta comes at {share} of the synchronous speed. If the voltage "
+    "dips or the motor is weaker, it comes below 80 %, and is as hard as a start direct on line.",
+    remedy="Take more time in star (starter.star_delta.time).",
+    sizes={("1", "percent"): "share", "rad": "angle"},
 )
 _STANDING = 0.1
 """Share of the synchronous speed up to which a motor in star has not broken its load away."""
 _STANDS_IN_STAR = warning(
     "stands-in-star",
-    "The load holds the motor in star {where}{rest}. The change to delta is a start direct on line, with {delta}.",
+    "The load holds the motor in star {where}, and the change to delta takes {delta}, as a start direct on line.",
+    "From the other angles it reaches {share} of its synchronous speed or more.",
     remedy="Let the machine start empty (empty_start = true), or take another start.",
-    sizes={"A": "delta"},
+    sizes={"A": "delta", ("1", "percent"): "share"},
 )
 
 
 def _on_star(study: StudyRecord) -> None:
-    """Warn of a motor that stands in star, and of a change from star to delta at too low a speed."""
+    """Warn of a motor that stands in star, and of a change from star to delta at too low a speed, in any start."""
     drive, time, run = study.drive, study.drive.time_in_star, study.runs["start_up"]
-    share = speed_in_star(drive, run)
-    if share is None or study.plate is None:
+    first = speed_in_star(drive, run)
+    if first is None or study.plate is None:
         return
     findings, times = StartFindings.found_in(study), run["time"].values
-    current = np.abs(run[f"motor.{drive.motor.current}"].values)
-    starts, weak = ((), ()) if findings is None else (findings.starts, findings.weak_star)
-    held = [start for start in starts if start.star_speed is not None and start.star_speed < _STANDING]
-    if held:
-        angles = ", ".join(number(start.angle, "rad") for start in held)
-        moving = [start.star_speed for start in weak if start not in held]
-        rest = ""
-        if moving:
-            rest = (
-                f", and from other angles it reaches {number(min(moving), '1', 'percent')} of its speed there"
-            )
-        delta = max(start.current for start in weak)
-        study.say(_STANDS_IN_STAR, START, where=f"from {angles}", rest=rest, delta=delta)
-    elif share < FULL_STAR and times[-1] > drive.switched_until:
-        before, after = np.interp(time, times, current), peak(current[times >= drive.switched_until])
-        study.say(_STAR_TOO_SHORT, START, time=time, share=share, star=float(before), delta=after)
+    starts = () if findings is None else findings.starts
+    speeds = [(first, 0.0), *((s.star_speed, s.angle) for s in starts if s.star_speed is not None)]
+    after = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.switched_until]
+    delta = float(max([*after, *(start.current for start in starts)], default=0.0))
+    if held := [angle for speed, angle in speeds[1:] if speed < _STANDING]:
+        angles = ", ".join(number(angle, "rad") for angle in held)
+        where = f"from {len(held)} of {len(starts)} angles ({angles})"
+        least = min((speed for speed, _ in speeds[1:] if speed >= _STANDING), default=None)
+        study.say(_STANDS_IN_STAR, START, where=where, share=least, delta=delta)
+        return
+    share, angle = min(speeds)
+    if times[-1] <= drive.switched_until or share >= _LITTLE_STAR:
+        return
+    if share < FULL_STAR:
+        study.say(_STAR_TOO_SHORT, START, time=time, share=share, angle=angle, delta=delta)
+    else:
+        study.say(_STAR_JUST_LONG, START, share=share, angle=angle)
 
 
 _HEAVY = warning(

@@ -935,8 +935,9 @@ def test_the_order_names_the_starter():
         )
     # a crusher whose feed holds the motor in star was ordered as if star helped
     order = dataclasses.replace(order, needs_empty_start=True)
-    assert "3 s in star, with the machine empty in each start (empty_start = true); motor" in said(
-        "star-delta"
+    assert (
+        "3 s in star, with the machine empty in each start (this order is for starts under the feed: set "
+        in said("star-delta")
     )
     inverter = (
         "inverter of at least 49.1 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"

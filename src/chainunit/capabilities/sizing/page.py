@@ -174,9 +174,10 @@ def _starter(s: b.Source, drive: SizedDrive, x: SizedDrive, numbers: DriveNumber
     if start == "soft":
         yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
     elif start == "star-delta":
-        empty = (
-            ", with the machine empty in each start (empty_start = true)" if drive.needs_empty_start else ""
-        )
+        empty = ""
+        if drive.needs_empty_start:
+            empty = ", with the machine empty in each start (this order is for starts under the feed: set "
+            empty += "empty_start = true and run again)"
         yield s.line(f"star-delta starter, {{=starter.star_delta.time}} in star{empty}")
         yield _winding(s)
     elif start == "inverter":

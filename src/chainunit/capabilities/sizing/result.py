@@ -136,7 +136,11 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
             title="V-belt, design power, for which its maker gives number and tension of the belts: "
             f"rated {power} of the motor times the service factor",
         ),
-        InUnit(factor, "1", title=f"service factor of the belt: {plan.service_words(trial.inertia_factor)}"),
+        InUnit(
+            factor,
+            "1",
+            title=f"service factor of the belt: {plan.belt_words(trial.inertia_factor, is_on_line)}",
+        ),
         InUnit(belt.speed, "m/s", title="belt speed"),
         InUnit(
             belt.large / belt.small,
@@ -260,7 +264,9 @@ class SizedDrive:
             none = f"no torque limiter{aside(protection.why_none)}"
             parts += [limiter + number(torque, "N.m") if torque else none, protection.relay.setting_words]
         if self.needs_empty_start:
-            parts.append("the machine has to start empty")
+            parts.append(
+                "the machine has to start empty: set empty_start = true and run again before ordering"
+            )
         return f"{'; '.join(parts)}{aside(self.caveat)}."
 
 

@@ -192,15 +192,25 @@ class SizingPlan:
         return float(self.demands.service_factor) or factor
 
     def service_words(self, inertia_factor: float) -> str:
-        """The source of the service factor in words; see `gear_factor`."""
+        """The source of the service factor of a gear in words; see `gear_factor`."""
+        starts = f"{float(self.demands.starts_per_hour):g}"
+        noun = "start" if starts == "1" else "starts"
+        return self._factor_words(inertia_factor, f"{starts} {noun} an hour; typical of makers")
+
+    def belt_words(self, inertia_factor: float, is_on_line: bool) -> str:
+        """The source of the service factor of a belt in words; see `belt_factor`."""
+        start = (
+            "started direct on line, or as hard" if is_on_line else "started in star and delta or more gently"
+        )
+        return self._factor_words(inertia_factor, f"{start}; DIN 7753-2")
+
+    def _factor_words(self, inertia_factor: float, rest: str) -> str:
         if self.demands.service_factor:
             return "of the file"
         by = "by the file" if self.load_class else f"by an inertia factor of {inertia_factor:.3g}"
-        hours, starts = (f"{float(x):g}" for x in (self.demands.hours, self.demands.starts_per_hour))
-        noun = "start" if starts == "1" else "starts"
+        load, hours = LOAD_WORDS[self.load(inertia_factor)], f"{float(self.demands.hours):g}"
         return (
-            f"{LOAD_WORDS[self.load(inertia_factor)]} {by}, {hours} h a day, {starts} {noun} an hour; typical of "
-            "makers (sizing.load_class, sizing.hours, sizing.service_factor)"
+            f"{load} {by}, {hours} h a day, {rest} (sizing.load_class, sizing.hours, sizing.service_factor)"
         )
 
     @property
