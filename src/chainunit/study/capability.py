@@ -87,6 +87,10 @@ class StudyCapability:
         """Names of the values of its tables that have no meaning for that machine and plan."""
         return ()
 
+    def not_with_foreign_motor(self, plan: Any) -> str:
+        """The reason and the remedy where its plan needs a motor of this package; empty where it does not."""
+        return ""
+
     def beside(self, plan: Any, drive: Drive, feed: Any, turn: Cycle) -> Drive:
         """The drive with the parts of the system that the capability adds beside the line; the machine has this
         `feed` and `turn` in normal running."""

@@ -21,8 +21,8 @@ from .catalogue_drive import as_used, catalogue_drive, with_inertia
 from .cycle import Cycle
 from .drive import Drive
 from .drive_tables import DriveTables
-from .event_table import random_runs
 from .foreign_machine import declared_parameters
+from .registry import registered
 
 
 class MotorSource(ABC):
@@ -126,12 +126,9 @@ class ForeignMotor(MotorSource):
         with refusal_prefix("system.motor: ", "system.motor"):
             if tables.flywheel is not None:
                 raise InputError(f"{self.file}: its rotor takes no flywheel; leave [flywheel] out")
-            for plan in random_runs(plans):
-                if plan.runs:
-                    raise InputError(
-                        f"{self.file}: its current and torque are not known, of which random overloads tell the "
-                        f"quantiles; leave {plan.table}.runs out"
-                    )
+            for part in registered():
+                if refusal := part.not_with_foreign_motor(plans[part.name]):
+                    raise InputError(f"{self.file}: {refusal}")
             if tables.feed_forward and "tau_ff" not in inputs:
                 raise InputError(f"{self.file}: has no input tau_ff in N.m; leave feed_forward out")
 
