@@ -19,7 +19,7 @@ digit, from 0 on."""
 
 def packed_bytes(content: bytes) -> str:
     """Bytes, packed."""
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+    return base64.b64encode(gzip.compress(content, 6, mtime=0)).decode()
 
 
 def packed(data: Any) -> str:

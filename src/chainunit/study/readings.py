@@ -103,6 +103,15 @@ def turns_made(drive: Drive, run: xr.Dataset) -> float:
     return float(angle[-1] - angle[0]) / (2.0 * math.pi)
 
 
+_ROUNDING = 1e-9
+"""Turns that a run which ends on a whole turn may miss by rounding."""
+
+
+def _turned(angle: Any) -> int:
+    """The number of whole turns in an `angle` from its first value on [rad], shape (time,)."""
+    return math.floor(float(np.max(angle / (2.0 * math.pi))) + _ROUNDING)
+
+
 def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
     """The part of the run from its first row until the crank has made the largest number of whole turns, at most
     `most`, both ends included; None where it makes less than one turn.
@@ -113,12 +122,10 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
 
     angle = crank_angle(drive, run)
     turned = (angle - angle[0]) / (2.0 * math.pi)
-    # a run that ends on a whole turn may miss it by rounding
-    rounding = 1e-9
-    turns = min(math.floor(float(np.max(turned)) + rounding), most)
+    turns = min(_turned(angle - angle[0]), most)
     if turns < 1:
         return None
-    last = int(np.argmax(turned >= turns - rounding))
+    last = int(np.argmax(turned >= turns - _ROUNDING))
     share = min(1.0, (turns - turned[last - 1]) / (turned[last] - turned[last - 1]))
 
     def closed(x: Any) -> Any:
@@ -133,7 +140,8 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
 
 def has_turn(drive: Drive, run: xr.Dataset) -> bool:
     """Whether the crank makes a whole turn in a run."""
-    return only_whole_turns(drive, run, 1) is not None
+    angle = crank_angle(drive, run)
+    return _turned(angle - angle[0]) >= 1
 
 
 def less_than_a_turn(drive: Drive, run: xr.Dataset) -> str:
