@@ -72,7 +72,7 @@ _GROUPS = {
         ),
     },
 }
-"""By heading of the help, the commands, each with a line and an example. The help shows those that are installed."""
+"""By heading of the help, the commands, each with a line and an example. The help shows the installed ones."""
 
 
 class _Commands(typer.core.TyperGroup):

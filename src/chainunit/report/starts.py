@@ -25,9 +25,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     transient = "" if study.drive.follows else f" The {transient_words(study)}: {{starts.transient}}."
     yield b.Text(s.line(worst + transient, running=running))
     at_gear = "torque at the gear" if study.drive.is_geared else f"torque at the {study.driver_noun}"
-    in_star = [("speed at the change to delta", lambda start: number(start.star_speed))]
-    if study.drive.star_delta is None:
-        in_star.clear()
+    in_star = ("speed at the change to delta", lambda start: number(start.star_speed))
     yield from table(
         cited(findings, "findings.starts").starts,
         (f"{study.driver_noun} angle", lambda start: number(start.angle)),
@@ -35,8 +33,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         ("with the transient", lambda start: number(start.gear_torque, none="not reached")),
         ("torque on a coupling", lambda start: number(start.coupling_torque, none="not reached")),
         ("start-up time", lambda start: number(start.start_time, none="not reached")),
-        ("motor current", lambda start: number(start.current)),
-        *in_star,
+        ("motor current, peak", lambda start: number(start.current)),
+        *([in_star] if study.drive.star_delta is not None else []),
         title=f"Starts from rest, from several {study.driver_noun} angles",
         form="long",
     )

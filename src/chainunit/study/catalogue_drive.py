@@ -141,7 +141,7 @@ def with_starter(tables: DriveTables, p: Any, plate: Nameplate) -> Any:
 
 
 def usual_boost(p: Any, plate: Nameplate) -> float:
-    """The boost of an inverter for a motor with the parameters `p`: that of the declaration, or the voltage that the
+    """The boost of an inverter for a motor with the parameters `p`: the declared one, or the voltage that the
     rated current takes across the stator, if that is less. With more the flux exceeds the rated one at low frequency,
     and a large motor hunts and turns backwards in its start."""
     drop = math.sqrt(3.0) * p.stator.R * plate.rated_current / p.supply.V

@@ -99,17 +99,22 @@ def crank_speed(drive: Drive, run: xr.Dataset) -> Any:
 
 def turns_made(drive: Drive, run: xr.Dataset) -> float:
     """Turns that the crank makes from the first to the last row of a run."""
+    return float(_turns(drive, run)[-1])
+
+
+def _turns(drive: Drive, run: xr.Dataset) -> Any:
+    """The turns of the crank since the first row of a run, shape (time,)."""
     angle = crank_angle(drive, run)
-    return float(angle[-1] - angle[0]) / (2.0 * math.pi)
+    return (angle - angle[0]) / (2.0 * math.pi)
 
 
 _ROUNDING = 1e-9
 """Turns that a run which ends on a whole turn may miss by rounding."""
 
 
-def _turned(angle: Any) -> int:
-    """The number of whole turns in an `angle` from its first value on [rad], shape (time,)."""
-    return math.floor(float(np.max(angle / (2.0 * math.pi))) + _ROUNDING)
+def _whole(turns: Any) -> int:
+    """The largest number of whole turns that the crank makes, by `_turns`."""
+    return math.floor(float(np.max(turns)) + _ROUNDING)
 
 
 def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
@@ -120,9 +125,8 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
     """
     import xarray as xr
 
-    angle = crank_angle(drive, run)
-    turned = (angle - angle[0]) / (2.0 * math.pi)
-    turns = min(_turned(angle - angle[0]), most)
+    turned = _turns(drive, run)
+    turns = min(_whole(turned), most)
     if turns < 1:
         return None
     last = int(np.argmax(turned >= turns - _ROUNDING))
@@ -140,8 +144,7 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
 
 def has_turn(drive: Drive, run: xr.Dataset) -> bool:
     """Whether the crank makes a whole turn in a run."""
-    angle = crank_angle(drive, run)
-    return _turned(angle - angle[0]) >= 1
+    return _whole(_turns(drive, run)) >= 1
 
 
 def less_than_a_turn(drive: Drive, run: xr.Dataset) -> str:

@@ -90,8 +90,6 @@ class StudyRecord:
     """the verdict on the model, once there are runs"""
     remarks: list[Remark] = field(default_factory=list)
     failure: RunError | None = None
-    _steady: tuple[Any, ...] | None = field(default=None, init=False, repr=False, compare=False)
-    """the last answer of `steady`, after the values on which it depends"""
 
     @property
     def warnings(self) -> list[Remark]:
@@ -200,15 +198,10 @@ class StudyRecord:
     def steady(self) -> xr.Dataset:
         """The steady turns that are evaluated, both ends included; where the crank does not make whole turns,
         the whole run from the time at which it should be steady."""
-        run, begin, turns = self.runs["start_up"], self.steady_begin, self.config.run.turns
-        basis = id(run), id(self.drive), begin, turns
-        # many readings take the same turns
-        if self._steady is None or self._steady[0] != basis:
-            steady = whole_turns(self.drive, run.sel(time=slice(begin, None)), turns)
-            # the run and the drive are kept, so that no other one gets their place in memory
-            self._steady = basis, steady, run, self.drive
-        turned: xr.Dataset = self._steady[1]
-        return turned
+        run = self.runs["start_up"]
+        if self.started is not None and self.started.run is run:
+            return self.started.turns
+        return whole_turns(self.drive, run.sel(time=slice(self.steady_begin, None)), self.config.run.turns)
 
     def window(
         self,

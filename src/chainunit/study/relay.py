@@ -57,6 +57,11 @@ def class_holding(seconds: float, least: int = LIGHT) -> int:
     return next((int(candidate.name) for candidate in usual if seconds <= candidate.shortest), HEAVIER)
 
 
+def tolerant_class(seconds: float, least: int = LIGHT) -> int:
+    """The trip class of `class_holding` for a motor that takes `MORE_CURRENT` in its start."""
+    return class_holding(MORE_CURRENT**2 * seconds, least)
+
+
 def start_seconds(time: Any, current: Any, setting: float) -> float:
     """The time [s] for which `MULTIPLE` times the `setting` [A] heats a relay as much as the `current` [A] over
     `time` [s], both of shape (n,), without its cooling: a cold relay surely holds up to the shortest time of its
@@ -77,7 +82,7 @@ def protecting_class(
     def protecting(number: int) -> bool:
         return protects(number, setting, before, stall_current, stall_time)
 
-    tolerant = class_holding(MORE_CURRENT**2 * seconds, least)
+    tolerant = tolerant_class(seconds, least)
     if tolerant <= HEAVIEST and protecting(tolerant):
         return tolerant
     is_quick = least == LIGHT and seconds <= _NAMED[str(QUICK)].shortest

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,11 +47,16 @@ class StartUp:
     stop: float
     rig: Rig
 
+    @cached_property
+    def turns(self) -> xr.Dataset:
+        """The turns of steady running that are evaluated, see `whole_turns`."""
+        run = self.run.sel(time=slice(self.steady_from, None))
+        return whole_turns(self.rig.drive, run, self.rig.operation.run.turns)
+
     @property
     def windows(self) -> tuple[Window, Window]:
         """The windows of steady running, in whole turns, and of the start before them."""
-        drive, operation = self.rig.drive, self.rig.operation
-        turns = whole_turns(drive, self.run.sel(time=slice(self.steady_from, None)), operation.run.turns)
+        drive, operation, turns = self.rig.drive, self.rig.operation, self.turns
         sides = drive.machine.loaded_sides(operation.feed)
         steady = Window(Phase.STEADY, turns, drive, sides, operation.crank_speed)
         before = self.run.sel(time=slice(None, float(turns["time"][0])))

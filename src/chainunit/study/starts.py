@@ -152,7 +152,7 @@ _HUNTS = warning(
     "start-hunts",
     "In the start by the inverter the motor turns backwards, at up to {backwards} of its synchronous speed, from "
     "{a driver} angle of {angle}. Too high a voltage at low frequency makes it hunt.",
-    remedy="Lower the boost (starter.inverter.boost), {least}.",
+    remedy="Lower the boost (starter.inverter.boost) {least}.",
     sizes={("1", "percent"): "backwards", "rad": "angle"},
 )
 _NO_START = fault(

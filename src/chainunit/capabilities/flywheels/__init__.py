@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Set
 
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.file_reading import FileReading
-from ...study.sections import FlywheelTable
-
-
-@dataclass(frozen=True)
-class FlywheelPlan:
-    """The flywheel of the study with the permitted fluctuation, and the inertias that are compared [kg m2]."""
-
-    table: FlywheelTable
-    compared: tuple[float, ...]
 
 
 class FlywheelCapability(Capability):
@@ -25,12 +15,9 @@ class FlywheelCapability(Capability):
     name = "flywheels"
     order = 80
 
-    def plan(self, reading: FileReading) -> FlywheelPlan | None:
-        """The plan of the table."""
-        if "flywheel" not in reading.data:
-            return None
-        compared: list[float] = reading.form.flywheel.compare
-        return FlywheelPlan(reading.values["flywheel"], tuple(sorted(set(compared))))
+    def plan(self, reading: FileReading) -> Set[float] | None:
+        """The inertias of the flywheels that are compared [kg m2]; None without the table."""
+        return frozenset(reading.form.flywheel.compare) if "flywheel" in reading.data else None
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The runs with each flywheel."""

@@ -125,8 +125,8 @@ class FlywheelAnalysis(Analysis):
         RunError
             where a run fails; the earlier results are in the study.
         """
-        config, plan, drive = study.config, study.config.plans["flywheels"], study.drive
-        table = plan.table
+        config, drive, table = study.config, study.drive, study.config.drive.flywheel
+        assert table is not None
         turn = TurnFindings.of_study(study).numbers
         findings = FlywheelFindings(
             own=table.J,
@@ -137,7 +137,7 @@ class FlywheelAnalysis(Analysis):
             mean_torque=turn.torque_mean / drive.ratio,
         )
         study.findings[FlywheelAnalysis.name] = findings
-        sizes = sorted({table.J, *plan.compared})
+        sizes = sorted({table.J, *config.plans["flywheels"]})
 
         def run(flywheel: float) -> Wheel:
             finished = float(len(findings.wheels))

@@ -16,7 +16,7 @@ from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.drive import Drive
 from ...study.limits import Check
-from ...study.relay import MORE_CURRENT, class_holding
+from ...study.relay import class_holding, tolerant_class
 from ...study.torques import DutyPeak
 from .parts import OrderedPart, total_price
 
@@ -126,8 +126,7 @@ class TrialResult:
     @property
     def tolerant_class(self) -> int | None:
         """The same with the tolerance of the motor's current."""
-        seconds = self.relay_seconds
-        return None if seconds is None else class_holding(MORE_CURRENT**2 * seconds)
+        return None if self.relay_seconds is None else tolerant_class(self.relay_seconds)
 
 
 @result(frozen=False)

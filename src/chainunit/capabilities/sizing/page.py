@@ -25,6 +25,10 @@ _SEVERITY: dict[Standing | None, b.Severity] = {
     Standing.BARELY: "partly",
 }
 _TRIP_TORQUE = "torque limiter, trip torque at the {driver}"
+_EMPTY_START = (
+    ", with the machine empty in each start (this order is for starts under the feed: set empty_start = true and run "
+    "again)"
+)
 
 
 def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -174,10 +178,7 @@ def _starter(s: b.Source, drive: SizedDrive, x: SizedDrive, numbers: DriveNumber
     if start == "soft":
         yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
     elif start == "star-delta":
-        empty = ""
-        if drive.needs_empty_start:
-            empty = ", with the machine empty in each start (this order is for starts under the feed: set "
-            empty += "empty_start = true and run again)"
+        empty = _EMPTY_START if drive.needs_empty_start else ""
         yield s.line(f"star-delta starter, {{=starter.star_delta.time}} in star{empty}")
         yield _winding(s)
     elif start == "inverter":

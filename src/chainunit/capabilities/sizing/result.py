@@ -14,7 +14,7 @@ from ...reading.text import aside, number
 from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
-from ...study.relay import HEAVIEST, MORE_CURRENT, class_holding, class_words, locked_rotor, protects
+from ...study.relay import HEAVIEST, MORE_CURRENT, class_words, locked_rotor, protects, tolerant_class
 from ...study.starts import StartFindings, transient_words, weak_in_star
 from ...study.verdict import STEADY
 from .candidate import Candidate, TrialResult
@@ -373,7 +373,7 @@ def _tolerance(study: StudyRecord) -> str | None:
     starts = StartFindings.found_in(study)
     if starts is None or starts.stuck or study.relay_class > HEAVIEST:
         return None
-    holding = class_holding(MORE_CURRENT**2 * starts.relay_seconds, study.relay_class)
+    holding = tolerant_class(starts.relay_seconds, study.relay_class)
     phrase, late = f"one {class_words(holding)} holds", ""
     if holding <= HEAVIEST:
         phrase, late = f"one of {class_words(holding)} holds", ", but trips too late with the rotor locked"

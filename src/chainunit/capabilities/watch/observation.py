@@ -42,7 +42,7 @@ def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) ->
 
 
 def of_shaft(p: Any) -> dict[str, float]:
-    """The parameters of the observer that are those of the shaft and the gear of a motor with the parameters `p`."""
+    """The parameters of the observer for shaft and gear, by the parameters `p` of the motor."""
     return {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d, "gear.loss": p.gear.loss}
 
 
