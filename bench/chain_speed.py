@@ -42,8 +42,10 @@ DEMANDED, FASTER = 200.0, 20.0
 ERROR = 1e-4
 WALLS, WEBS = 6, 2
 
+INTEGRATION = "static int slope_at("
+"""The first function of the runtime's integration."""
 COUNTED = {
-    "static int slope(": "long evaluations, projections;\n\nstatic int slope(",
+    INTEGRATION: f"long evaluations, projections;\n\n{INTEGRATION}",
     "    kernels.derivatives(": "    ++evaluations;\n    kernels.derivatives(",
     "    kernels.closed(": "    ++projections;\n    kernels.closed(",
 }
@@ -58,7 +60,7 @@ def from_c(file: Path, folder: Path, seconds: float = 10.0):
             if name.startswith("sources/"):
                 archive.extract(name, folder)
     runtime = (sources / "runtime.c").read_text()
-    at = runtime.index("static int slope(")
+    at = runtime.index(INTEGRATION)
     head, tail = runtime[:at], runtime[at:]
     for old, new in COUNTED.items():
         assert old in tail, old

@@ -2,20 +2,24 @@
 # Models in JavaScript
 #
 # The size of a model's text, packed by zlib too, the time to write it, and that of all outputs at one state in node;
-# and the time of a jam of the packaged drive over 4 s with a row every millisecond in node.
+# and the time of a jam of the packaged drive over 4 s with a row every millisecond: in node, and by each way of Python.
 
 # %%
 from __future__ import annotations
 
 import sys
+import tempfile
 import time
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from figures import least
 from rich.console import Console
 from rich.table import Table
 
+from chainunit.batch import transients
 from chainunit.core.model import Model
 from chainunit.core.printing.javascript import model_text, program
 from chainunit.core.symbolic_trace import trace
@@ -23,7 +27,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.models import MODELS, model_named
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.system import Profile, compiled
+from chainunit.system import CompiledSimulation, CoSimulation, Profile, Simulation, System, compiled, export
 
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "tests"))
@@ -87,6 +91,32 @@ def jam() -> None:
         f"DC motor on the chain unit: 4 s of a jam with 4001 rows in {to_rows:.0f} ms in node with steps that end at "
         f"rows, in {between:.0f} ms with rows between them."
     )
+    ways = from_python(drive, drive.loads(config.feed) | signals)
+    print("From Python: " + ", ".join(f"{way} {1e3 * spent:.0f} ms" for way, spent in ways.items()))
+
+
+def from_python(drive: Drive, signals: dict[str, Any]) -> dict[str, float]:
+    """The least time of the jam by each way [s]."""
+
+    def timed(kind: type[Simulation], system: System, rounds: int) -> float:
+        with kind(system, signals) as simulation:
+            simulation.save()
+
+            def whole() -> None:
+                simulation.restore()
+                simulation.run(4.0, 1e-3, names=["motor.w", "machine.tau"])
+
+            return least(whole, rounds).wall
+
+    ways = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for backend, rounds in (("python", 2), ("native", 5)):
+            system, _ = export(drive.graph, Path(folder) / backend, backend)
+            ways[f"FMUs, {backend}"] = timed(CoSimulation, system, rounds)
+    ways["one system, native"] = timed(CompiledSimulation, drive.graph, 5)
+    transients.compiler = lambda: None
+    ways["one system, Python"] = timed(CompiledSimulation, drive.graph, 2)
+    return ways
 
 
 def main() -> None:

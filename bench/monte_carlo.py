@@ -61,7 +61,7 @@ def loop_alone(task: monte_carlo.RandomTask, runs: int = 256) -> float:
     block = task.block()
     plan, operation = task.plan, task.rig.operation
     drawn = [monte_carlo.draw(plan, operation, k) for k in range(runs)]
-    points = [monte_carlo.point(block.rig, each, plan.table.duration) for each in drawn]
+    points = [monte_carlo.point(block.rig, each, plan.duration) for each in drawn]
     spent = 0.0
     real = block.loop.run
 
@@ -135,7 +135,7 @@ def many(runs: int, folder: Path) -> None:
     print(
         f"largest memory: {own:.0f} MB, of a worker {workers:.0f} MB; store: {size / 1e6:.0f} MB in {count} files"
     )
-    print({name: f"{each['q99'].value:.4g}" for name, each in result.quantiles().items() if "q99" in each})
+    print({name: f"{each['q99'].value:.4g}" for name, each in result.quantiles.items() if "q99" in each})
 
 
 def main() -> None:

@@ -169,7 +169,8 @@ def step_rows(f: Any) -> str:
         ("the same FMU through fmpy (limit: the next row)", f"native FMU through fmpy, {whole}"),
         ("an empty native FMU through fmpy", "an empty native FMU through fmpy, set + step + get"),
         ("the Python FMU through fmpy (limit: the next row)", f"python FMU through fmpy, {whole}"),
-        ("the equations in Python, one point", "kernel, all outputs, math, one point"),
+        ("its printed equations alone, one point", "kernel, all outputs, printed Python, one point"),
+        ("the equations as they are written, in Python, one point", "kernel, all outputs, math, one point"),
         ("the equations with numpy, per point of 10,000", "kernel, all outputs, numpy, per point of 10,000"),
     ]
     return table(["call", "us"], ([text, f"{us[key]:.3g}"] for text, key in rows))

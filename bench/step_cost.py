@@ -15,7 +15,10 @@ import subprocess
 import tempfile
 import timeit
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 from figures import parser, save
@@ -26,10 +29,14 @@ from chainunit import ChainUnitMachine
 from chainunit.core import engines
 from chainunit.core.integrators import rk4
 from chainunit.core.model import Model, Part
+from chainunit.core.printing.python_functions import function_text
 from chainunit.core.quantities import Value, declaration, quantity
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
+from chainunit.fmu.model_instance import Settable
 from chainunit.fmu.native import export as native
+from chainunit.fmu.pack import interface_of
+from chainunit.fmu.printed_model import printed_model
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS, model_named
 from chainunit.system.instance import Fmu, Instance
@@ -160,6 +167,18 @@ def own_functions(folder: Path) -> dict[str, dict[str, list[float]]]:
     return costs
 
 
+def printed_outputs() -> Callable[[], tuple[float, ...]]:
+    """The function of all outputs as a Python FMU has it, called with the start values."""
+    module = ModuleType("printed")
+    module.__package__ = "chainunit"
+    exec(printed_model(interface_of(ChamberForces, None)), vars(module))
+    names: dict[str, Any] = {}
+    exec(function_text("def values(p, u, x):", module.STATEMENTS, module.OUTPUTS), vars(module), names)
+    starts = [Settable(*row).start for row in module.SETTABLE]
+    p, u = starts[: module.PARAMETERS], starts[module.PARAMETERS :]
+    return lambda: names["values"](p, u, ())
+
+
 def main() -> None:
     options, sizes = parser().parse_args(), {}
     p = ChainUnitMachine().p
@@ -177,6 +196,7 @@ def main() -> None:
     rows.append(
         ("kernel, all outputs, math, one point", cost(lambda: kernel(engines.MATH, u, outputs, slopes)))
     )
+    rows.append(("kernel, all outputs, printed Python, one point", cost(printed_outputs())))
     xp = engines.numpy_()
     scalar = ChamberForces.Inputs(phi=np.float64(0.5), w=np.float64(6.0), a=np.float64(1.0))
     rows.append(

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -264,12 +265,6 @@ class Grid:
         base = {v.name: v.quantity.start for v in equations.arguments}
         if parameters is not None:
             base |= model.parameter_layout.by_name(parameters)
-        items = equations.operations.items
-        self._needed = {
-            equations.arguments[equations.place(operation.entry)].name
-            for operation in items
-            if operation.kind == ARGUMENT
-        }
         self._bounds: list[tuple[str, Any]] = []
         self._arguments = [self._flat(v, variations.get(v.name), base[v.name]) for v in equations.arguments]
 
@@ -280,6 +275,12 @@ class Grid:
             along = [x for x in variations.values() if dim in x.dims]
             if len(along) == 1 and along[0].ndim == 1:
                 self._coords[dim] = along[0].variable
+
+    @cached_property
+    def _needed(self) -> set[str]:
+        """The names of the arguments on which the results depend."""
+        places = (x.entry for x in self._equations.operations.items if x.kind == ARGUMENT)
+        return {self._equations.arguments[self._equations.place(entry)].name for entry in places}
 
     def _loops(self) -> None:
         """Divide the dimensions into outer ones and the inner one, the longest."""
@@ -445,8 +446,10 @@ class Grid:
     @property
     def reasons(self) -> list[StateReason]:
         """The reasons by their codes."""
-        bounds = {v.name: v.quantity.allowed_range for v in self._equations.arguments}
-        outside = (StateReason(ReasonKind.BOUNDS, name, bounds[name]) for name, _ in self._bounds)
+        quantities = {v.name: v.quantity for v in self._equations.arguments}
+        outside = (
+            StateReason(ReasonKind.BOUNDS, name, quantities[name].allowed_range) for name, _ in self._bounds
+        )
         return [*reasons_of(self._equations.model), *outside]
 
     @property

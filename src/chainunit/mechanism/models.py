@@ -61,8 +61,7 @@ class LinkageModel(Model):
     lengths do not depend on the inputs."""
 
     def __post_init__(self) -> None:
-        at_start = self.linkage(MATH, self.Parameters(), self.Inputs())
-        self.follow(derived_count=at_start.derived_count, derive=self._derived)
+        self.follow(derived_count=self.at_start.derived_count, derive=self._derived)
         super().__post_init__()
 
     def _derived(self, xp: Any, p: Any) -> list[Any]:
@@ -75,9 +74,14 @@ class LinkageModel(Model):
         return MachineState(xp, Mechanism(xp, self.linkage(xp, p, u), q, derived, self.topology), w)
 
     @cached_property
+    def at_start(self) -> Linkage:
+        """The linkage with the start values."""
+        return self.linkage(MATH, self.Parameters(), self.Inputs())
+
+    @property
     def topology(self) -> Topology:
         """The names of the linkage."""
-        return self.linkage(MATH, self.Parameters(), self.Inputs()).topology
+        return self.at_start.topology
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

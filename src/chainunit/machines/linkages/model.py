@@ -85,6 +85,11 @@ class FileMachine(InverseMachine):
 
     described_by: LinkageDescription
 
+    @property
+    def at_start(self) -> DescribedLinkage:
+        """The linkage with the start values."""
+        return self.described_by.at_start
+
 
 def _places_without(effect: Any, q: Any) -> Any:
     """The numbers of the places `q` at which a load has no value, or an infinite one, ascending."""
@@ -122,16 +127,17 @@ class LinkageDescription(LinkageOutputs):
             self.port, inputs = port._replace(start=start), [self._in_range(motion, "phi"), *inputs]
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
-        self.sides = dict(LinkageParts(LinkGeometry(MATH, self.structure, self.values(MATH, p, u))).sides)
-        self.sides |= turns_of_triads(self.linkage(MATH, p, u))
-        self.link_turns = self._turns(p)
+        geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
+        self.sides = dict(LinkageParts(geometry).sides)
+        self.sides |= turns_of_triads(self._loaded(LinkageParts(geometry, self.sides), p))
+        self.at_start = self._loaded(LinkageParts(geometry, self.sides), p)
+        self.link_turns = self._turns()
         self._check_extremes()
+        p = self._ready()
         self.widths = (
-            checked_widths(data["loads"], self.values(MATH, self._ready(), u))
-            if widths_of(data["loads"])
-            else ()
+            checked_widths(data["loads"], self.values(MATH, p, u)) if widths_of(data["loads"]) else ()
         )
-        self.check_loads(self._ready(), 1.0)
+        self.check_loads(p, 1.0)
 
     # declarations
 
@@ -188,7 +194,10 @@ class LinkageDescription(LinkageOutputs):
 
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
-        parts = self.parts(xp, p, u)
+        return self._loaded(self.parts(xp, p, u), p)
+
+    def _loaded(self, parts: LinkageParts, p: Any) -> DescribedLinkage:
+        """The linkage of these parts, with the loads on it."""
         loads: dict[str, Any] = {"weight": Weight(p.g)}
         for load in self.data["loads"]:
             loads[name_of_load(load)] = self._load(load, parts)
@@ -312,22 +321,20 @@ class LinkageDescription(LinkageOutputs):
     def angle_counts(self) -> str:
         """How the angle of the driver counts, in words."""
         driver = self.structure.driver
-        zero = value_of(MATH, driver.zero, self.values(MATH, self.Parameters(), self.Inputs()))
-        return driver.angle_counts(zero)
+        return driver.angle_counts(self.at_start.parts.geometry.number(driver.zero))
 
     def places(self) -> list[float]:
         """Places of the driver from the start on, around or over its range."""
         return self.way.places()
 
-    def _followed(self, p: Any) -> FollowedLinkage:
-        """The linkage with these parameters over the way of its driver."""
+    def _followed(self, linkage: DescribedLinkage) -> FollowedLinkage:
+        """The linkage over the way of its driver."""
         # extremes depend on the rotation of the links
-        linkage = replace(self.linkage(MATH, p, self.Inputs()), extremes=())
-        return FollowedLinkage(self.structure, self.way, linkage)
+        return FollowedLinkage(self.structure, self.way, replace(linkage, extremes=()))
 
-    def _turns(self, p: Any) -> dict[str, tuple[float, float]]:
+    def _turns(self) -> dict[str, tuple[float, float]]:
         """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes."""
-        followed = self._followed(p)
+        followed = self._followed(self.at_start)
         try:
             return followed.turns()
         except InputError as error:
@@ -337,7 +344,7 @@ class LinkageDescription(LinkageOutputs):
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
         parameters; empty where there is none."""
         try:
-            self._followed(p).turns()
+            self._followed(self.linkage(MATH, p, self.Inputs())).turns()
         except InputError as error:
             values = ", ".join(
                 f"{entry['name']} = {getattr(p, entry['name']):g}{unit_behind(entry['unit'])}"
@@ -351,7 +358,7 @@ class LinkageDescription(LinkageOutputs):
     def _ready(self) -> Any:
         """The start values of the parameters, with the numbers that are derived from them."""
         p = self.Parameters()
-        object.__setattr__(p, "derived", derived_numbers(MATH, self.linkage(MATH, p, self.Inputs())))
+        object.__setattr__(p, "derived", derived_numbers(MATH, self.at_start))
         return p
 
     def end_stops(self) -> EndStops | None:
@@ -374,8 +381,8 @@ class LinkageDescription(LinkageOutputs):
     def model(self) -> InverseMachine:
         """The model."""
         data = self.data
-        parts = self.parts(MATH, self.Parameters(), self.Inputs())
-        bearings = {self.variable("joint", name): parts.receivers[name][0] for name in self.structure.joints}
+        receivers = self.at_start.parts.receivers
+        bearings = {self.variable("joint", name): receivers[name][0] for name in self.structure.joints}
         titles = {name: self.variable("joint", name) for name in self.structure.joints}
         names = tuple(parameter["name"] for parameter in data.get("parameters", ()))
         groups = self.structure.groups
@@ -451,15 +458,14 @@ class LinkageDescription(LinkageOutputs):
             last += assur_group.derived_count
             if isinstance(assur_group, Triad):
                 yield derived[last - 2], -math.inf, MOST_MISFIT
-        values = self.values(xp, p, u)
+        values = linkage.parts.geometry.values
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
 
     @cached_property
     def _signs(self) -> list[float]:
         """The signs of the margins with the start values."""
-        linkage = self.linkage(MATH, self.Parameters(), self.Inputs())
-        m = Mechanism(MATH, linkage, self.places()[0], derived_numbers(MATH, linkage))
+        m = Mechanism(MATH, self.at_start, self.places()[0], derived_numbers(MATH, self.at_start))
         return [math.copysign(1.0, margin) for margin in m.margins()]
 
     @property

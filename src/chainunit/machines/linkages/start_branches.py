@@ -32,9 +32,7 @@ def check_start(described: LinkageDescription) -> None:
     InputError
         in one line, with both places of the pin, or both angles of the link, that the start may give.
     """
-    p, u = described.Parameters(), described.Inputs()
-    derived = derived_numbers(MATH, described.linkage(MATH, p, u))
-    geometry = LinkGeometry(MATH, described.structure, described.values(MATH, p, u))
+    derived, geometry = derived_numbers(MATH, described.at_start), described.at_start.parts.geometry
     for group in described.structure.groups:
         if group.kind in _TWO_WAYS:
             _check(described, geometry, derived, group)
