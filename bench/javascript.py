@@ -2,7 +2,7 @@
 # Models in JavaScript
 #
 # The size of a model's text, packed by zlib too, the time to write it, and that of all outputs at one state in node;
-# and the time of a jam of the packaged drive over 4 s with a row every millisecond: in node, and by each way of Python.
+# and the time of a jam of the packaged drive over 4 s with a row every millisecond: in node, and each way of Python.
 
 # %%
 from __future__ import annotations
