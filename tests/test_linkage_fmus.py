@@ -87,12 +87,13 @@ def test_the_machine_of_a_user_is_not_of_this_package(tmp_path):
     package = Path(chainunit.__file__).parent / "data/icons"
     icons = {file.read_bytes() for file in package.iterdir()}
     for model in (unnamed, unnamed.direct()):
-        files = companion_files(Interface(model, {}), "9.9", 3)
+        interface = Interface(model, {})
+        files, sketch = companion_files(interface, "9.9", 3), model.sketch(interface.start_parameters)
         assert not {files["terminalsAndIcons/icon.png"], files["terminalsAndIcons/icon.svg"]} & icons
         ElementTree.fromstring(files["terminalsAndIcons/icon.svg"])
         page = files["documentation/index.html"].decode()
         drawn = re.search(r"<svg.*</svg>", page, re.S)[0]
-        assert {*model.sketch().pins, *model.sketch().links} <= {*re.findall(r">([^<>]+)</text>", drawn)}
+        assert {*sketch.pins, *sketch.links} <= {*re.findall(r">([^<>]+)</text>", drawn)}
         assert "x points right, y up" in page and "Limits:" in page and "MIT licence" in page
     assert "A. Bauer" in companion_files(Interface(named, {}), "9.9", 2)["documentation/index.html"].decode()
 
@@ -129,14 +130,15 @@ def test_the_pictures_of_an_fmu_show_its_start_values():
     """A crank of twice the length is twice as long in the drawing, as the scale of the rest tells."""
     model = read_linkage(FOLDER / "slider_crank_press.toml")
     for each in (model, model.direct()):
-        usual, longer = (companion_files(Interface(each, start), "9.9", 3) for start in ({}, {"r": 0.16}))
+        interfaces = [Interface(each, start) for start in ({}, {"r": 0.16})]
+        usual, longer = (companion_files(interface, "9.9", 3) for interface in interfaces)
         names = ("documentation/index.html", "terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg")
         assert all(usual[name] != longer[name] for name in names)
-        own = each.sketch({"r": 0.16}).pins
-        (x0, y0), (x1, y1) = own["O1"], own["A"]
+        sketch = each.sketch(interfaces[1].start_parameters)
+        (x0, y0), (x1, y1) = sketch.pins["O1"], sketch.pins["A"]
         assert math.hypot(x1 - x0, y1 - y0) == pytest.approx(0.16)
         drawn = re.search(r"<svg.*</svg>", longer["documentation/index.html"].decode(), re.S)[0]
-        assert drawn + "\n" == drawing(each.sketch({"r": 0.16}))
+        assert drawn + "\n" == drawing(sketch)
 
 
 def test_a_text_that_is_no_text_is_told(tmp_path):

@@ -103,7 +103,8 @@ def test_icons_follow_from_the_terminals():
     }
 
     def shown(model):
-        return {kind: icons[icon(model, kind, model.sketch())] for kind in ("svg", "png")}
+        p = Interface(model, {}).start_parameters
+        return {kind: icons[icon(model, kind, model.sketch(p))] for kind in ("svg", "png")}
 
     for name, reference in {
         "ChamberForces": "machine", "ChainUnit": "machine", "ChainUnitFlexible": "machine",

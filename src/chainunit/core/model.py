@@ -204,8 +204,8 @@ class Model:
     """The states near x, in declared order, that meet the model's constraints (xp, p, u, x) (`controlled` models)."""
     shared: Callable[[Any, Any, Any, Any], Any] = UNSTATED
     """The common values of the parts (xp, p, u, x), computed once per point."""
-    sketch: Callable[[Mapping[str, float] | None], Sketch | None] = UNSTATED
-    """The machine as lines, if it is a mechanism: with the parameters given by name, or with the declared ones."""
+    sketch: Callable[[Any], Sketch | None] = UNSTATED
+    """The machine as lines, if it is a mechanism, with the parameters p, which are `with_derived`."""
     further_quantities: Callable[[Any, Any, Any, Any, Mapping[str, Any]], list[tuple[Variable, Any]]] = (
         UNSTATED
     )
@@ -232,7 +232,7 @@ class Model:
             start_states=lambda xp, p, u, z: self.initial_states(xp, p),
             start_limits=lambda xp, p, u, x: (),
             shared=lambda xp, p, u, x: None,
-            sketch=lambda start=None: None,
+            sketch=lambda p: None,
             further_quantities=lambda xp, p, u, x, outputs: [],
         )
         if self.made:

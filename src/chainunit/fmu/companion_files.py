@@ -17,8 +17,7 @@ def companion_files(
     """Files by their path inside the FMU; `libraries` are the packages whose code the FMU contains: their licences
     are added."""
     model = interface.model
-    start = {s.variable.name: s.start for s in interface.signals_of("parameter") if s.start is not None}
-    sketch = model.sketch(start)
+    sketch = model.sketch(interface.start_parameters)
     png, svg = (icon(model, kind, sketch) for kind in ("png", "svg"))
     files = {
         "documentation/index.html": interface.text(page(interface, version, sketch)).encode(),

@@ -105,6 +105,18 @@ class Interface:
         return [s for s in self.signals if s.causality == causality]
 
     @cached_property
+    def start_parameters(self) -> Any:
+        """The parameters at their start values, with the values that are derived from them.
+
+        Raises
+        ------
+        InputError, GeometryError
+            see `chainunit.core.model.Model.check`.
+        """
+        starts = [signal.start for signal in self.signals_of("parameter")]
+        return self.model.check(self.model.parameter_layout.instance(starts))
+
+    @cached_property
     def trace(self) -> Trace:
         """The model in symbols: the same as long as the interface is there, as `derived` has them, too."""
         return trace(self.model)

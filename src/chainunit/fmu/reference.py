@@ -160,7 +160,7 @@ def _tables(
         where a value is no finite number, or one step of the file takes more than `_MOST_STEPS` of the integrator.
     """
     interface = Interface(model, dict(starts), script)
-    p = parameters_at_start(interface)
+    p = interface.start_parameters
     inputs = excitation(interface)
     layout = model.state_layout
     tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
@@ -275,14 +275,6 @@ def _march(interface: Interface, p: Any) -> Any:
     return march
 
 
-def parameters_at_start(interface: Interface) -> Any:
-    """The parameters of the model at their start values, with the values that are derived from them."""
-    model = interface.model
-    return model.with_derived(
-        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
-    )
-
-
 def csv_bytes(head: Sequence[str], rows: Iterable[Sequence[float]], types: Mapping[str, Type]) -> bytes:
     """A table in CSV with the exact numbers; a column without a type, as that of the time, has real ones."""
     text = io.StringIO()
@@ -385,7 +377,7 @@ def _inertia(interface: Interface, torque: str) -> float:
     symbols, derivatives = interface.trace.symbols, interface.trace.derivatives
     speeds = [d for d, v in zip(derivatives, interface.states, strict=True) if v.unit == "rad/s"]
     by = casadi.jacobian(casadi.vertcat(*speeds), symbols[1][model.input_layout.names.index(torque)])
-    p = parameters_at_start(interface)
+    p = interface.start_parameters
     u = [s.start for s in interface.signals_of("input")]
     x = layout.values(model.begin(p, model.input_layout.instance(u)))
     point: list[Any] = [model.parameter_layout.values(p), u, x, getattr(p, "derived", [])]

@@ -195,15 +195,11 @@ class InverseMachine(LinkageModel, MachineModel):
             **running(s, a) | self.probes(xp, p, u, s, a),
         )
 
-    def _sketched(self, start: Mapping[str, float] | None = None) -> Sketch:
+    def _sketched(self, p: Any) -> Sketch:
         """The machine as lines; the driver is at 1/(2 pi) of its `span`."""
         from .sketch import sketch_of
 
         low, high = self.span
-        layout, values = self.parameter_layout, start or {}
-        p = self.with_derived(
-            MATH, layout.instance([values.get(v.name, v.quantity.start) for v in layout.variables])
-        )
         return sketch_of(self.state(MATH, p, self.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
     def usual_quantities(

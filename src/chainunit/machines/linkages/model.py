@@ -133,6 +133,7 @@ class LinkageDescription(LinkageOutputs):
         self.at_start = self._loaded(LinkageParts(geometry, self.sides), p)
         self.link_turns = self._turns()
         self._check_extremes()
+        self.start_derived = derived_numbers(MATH, self.at_start)
         p = self._ready()
         self.widths = (
             checked_widths(data["loads"], self.values(MATH, p, u)) if widths_of(data["loads"]) else ()
@@ -358,7 +359,7 @@ class LinkageDescription(LinkageOutputs):
     def _ready(self) -> Any:
         """The start values of the parameters, with the numbers that are derived from them."""
         p = self.Parameters()
-        object.__setattr__(p, "derived", derived_numbers(MATH, self.at_start))
+        object.__setattr__(p, "derived", self.start_derived)
         return p
 
     def end_stops(self) -> EndStops | None:
@@ -366,8 +367,10 @@ class LinkageDescription(LinkageOutputs):
         if self.way.turns:
             return None
         p, u = self._ready(), self.Inputs()
-        linkage, derived = self.linkage(MATH, p, u), p.derived
-        states = [MachineState(MATH, Mechanism(MATH, linkage, q, derived), 0.0) for q in self.places()]
+        linkage = self.linkage(MATH, p, u)
+        states = [
+            MachineState(MATH, Mechanism(MATH, linkage, q, self.start_derived), 0.0) for q in self.places()
+        ]
         mass = max(state.J for state in states)
         low, high = self.span
         bodies = sum(body.m for body in states[0].m.bodies.values())
@@ -465,7 +468,7 @@ class LinkageDescription(LinkageOutputs):
     @cached_property
     def _signs(self) -> list[float]:
         """The signs of the margins with the start values."""
-        m = Mechanism(MATH, self.at_start, self.places()[0], derived_numbers(MATH, self.at_start))
+        m = Mechanism(MATH, self.at_start, self.places()[0], self.start_derived)
         return [math.copysign(1.0, margin) for margin in m.margins()]
 
     @property

@@ -9,7 +9,7 @@ from ...core.engines import MATH
 from ...core.errors import InputError
 from ...mechanism.assur import AssurGroup
 from ...mechanism.linkage import Linkage
-from ...mechanism.machine import Mechanism, derived_numbers
+from ...mechanism.machine import Mechanism
 from .geometry import LinkGeometry
 from .model import LinkageDescription
 from .parts import LinkageParts
@@ -32,7 +32,7 @@ def check_start(described: LinkageDescription) -> None:
     InputError
         in one line, with both places of the pin, or both angles of the link, that the start may give.
     """
-    derived, geometry = derived_numbers(MATH, described.at_start), described.at_start.parts.geometry
+    derived, geometry = described.start_derived, described.at_start.parts.geometry
     for group in described.structure.groups:
         if group.kind in _TWO_WAYS:
             _check(described, geometry, derived, group)
