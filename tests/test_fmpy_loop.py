@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from chainunit.core.native.compilers import compiler
-from chainunit.fmu.companion_files import companion_files
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native.export import export
+from chainunit.fmu.pack import companion_files
 from chainunit.models import MODELS
 from chainunit.study.choice import drive_of
 from chainunit.study.config import load

@@ -16,8 +16,8 @@ from wrong_linkages import PRESS
 import chainunit
 from chainunit.core.engines import MATH
 from chainunit.fmu.backends import export
-from chainunit.fmu.companion_files import companion_files
 from chainunit.fmu.description import Interface, model_description, model_description_3
+from chainunit.fmu.pack import companion_files
 from chainunit.fmu.pictures import drawing
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine

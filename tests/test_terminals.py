@@ -23,8 +23,8 @@ from chainunit.core.quantities import declaration, quantity
 from chainunit.drives.gear import Gear
 from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.fmu.backends import export
-from chainunit.fmu.companion_files import companion_files
 from chainunit.fmu.description import Interface
+from chainunit.fmu.pack import companion_files
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.models import MODELS
 from chainunit.system import CoSimulation, ModelComponent, System, monolithic

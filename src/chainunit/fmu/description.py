@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from functools import cache, cached_property, lru_cache
 from importlib import metadata
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..core.engines import casadi_
 from ..core.errors import InputError
@@ -74,6 +74,17 @@ class Interface:
             for v in group:
                 value = None if causality == "output" else start.get(v.name, v.quantity.start)
                 self.signals.append(Signal(self.name(v.name), v, causality, value, len(self.signals)))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other one has the same model, start values and script."""
+        return isinstance(other, Interface) and self._contents == other._contents
+
+    def __hash__(self) -> int:
+        return hash(self._contents)
+
+    @property
+    def _contents(self) -> tuple[Any, ...]:
+        return self.model, self.script, tuple(signal.start for signal in self.signals)
 
     def name(self, variable: str) -> str:
         """The name in the FMU of the variable of the model with that name."""
@@ -517,3 +528,9 @@ def terminals(interface: Interface, *, with_icon: bool = True) -> Element:
                 node, "TerminalMemberVariable", variableName=name, memberName=member, variableKind=kind
             )
     return root
+
+
+def xml_bytes(root: Element) -> bytes:
+    """The contents of an XML file with this root, indented."""
+    indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)

@@ -15,9 +15,8 @@ from xml.etree.ElementTree import Element, tostring
 
 from ..core.files import atomic_file, folder
 from ..core.model import Model
-from .companion_files import companion_files
-from .description import Interface, model_description
-from .pack import interface_of, pack, xml_bytes
+from .description import Interface, model_description, xml_bytes
+from .pack import companion_files, interface_of, pack
 from .printed_model import printed_model
 from .script import Names, Script, script_with_names
 

@@ -1,17 +1,20 @@
-"""The common parts of both backends: the check of start values, and archives that are the same byte for byte."""
+"""The common parts of both backends: the check of start values, the files of an FMU besides its model (documentation,
+licences, icon and terminals, reference results), and archives that are the same byte for byte."""
 
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO
-from xml.etree.ElementTree import Element, indent, tostring
 
 from ..core.errors import InputError
 from ..core.model import Model
 from ..core.quantities import complaint
-from .description import Interface
+from .description import Interface, licence_text, terminals, xml_bytes
+from .documentation import page
+from .recipe import icon
+from .reference import reference_results
 from .script import Script
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time of a zip entry
@@ -54,6 +57,32 @@ def _refuse_same_names(interface: Interface) -> None:
         )
 
 
+def companion_files(
+    interface: Interface, version: str, fmi: int, libraries: Sequence[str] = ()
+) -> dict[str, bytes]:
+    """Files by their path inside the FMU; `libraries` are the packages whose code the FMU contains: their licences
+    are added."""
+    model = interface.model
+    sketch = model.sketch(interface.start_parameters)
+    png, svg = (icon(model, kind, sketch) for kind in ("png", "svg"))
+    files = {
+        "documentation/index.html": interface.text(page(interface, version, sketch)).encode(),
+        "documentation/licenses/license.txt": licence("chainunit", *libraries).encode(),
+    }
+    if fmi == 2:
+        files["model.png"] = png
+    else:
+        files |= {"terminalsAndIcons/icon.png": png, "terminalsAndIcons/icon.svg": svg}
+    if fmi == 3 or model.terminals:
+        files["terminalsAndIcons/terminalsAndIcons.xml"] = xml_bytes(terminals(interface, with_icon=fmi == 3))
+    return files | reference_results(interface)
+
+
+def licence(*packages: str) -> str:
+    """The licences of installed packages, in series."""
+    return "\n\n".join(f"{name}\n\n{licence_text(name)}" for name in packages)
+
+
 def pack(contents: Mapping[str, bytes], file: Path | IO[bytes], comment: bytes = b"") -> None:
     """Write an archive with a fixed order and a fixed time stamp of its entries."""
     with zipfile.ZipFile(file, "w") as archive:
@@ -63,9 +92,3 @@ def pack(contents: Mapping[str, bytes], file: Path | IO[bytes], comment: bytes =
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, contents[name], compresslevel=9)
-
-
-def xml_bytes(root: Element) -> bytes:
-    """The contents of an XML file with this root, indented."""
-    indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)

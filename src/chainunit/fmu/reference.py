@@ -12,21 +12,18 @@ import csv
 import io
 import logging
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
 
 from ..core.engines import MATH
 from ..core.inputs import xml_of
-from ..core.model import Model
 from ..core.ports import FLANGE, LOAD
 from ..core.quantities import Quantity, Type, written
-from .description import Interface
-from .pack import xml_bytes
-from .script import Script
+from .description import Interface, xml_bytes
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 REFERENCE = f"extra/{STANDARD}"
@@ -119,48 +116,21 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     return files | {RELATED: xml_bytes(root)}
 
 
+@lru_cache(maxsize=32)
 def reference_tables(
     interface: Interface, *, traced: bool = True
 ) -> dict[str, tuple[list[str], list[list[float]]]]:
     """Head and rows of each file of reference results by the ending of its name, from the equations: `traced`, or in
-    Python, which is slower, and takes no casadi for a model without states.
+    Python, which is slower, and takes no casadi for a model without states. They are the same for each version of
+    FMI.
 
     Raises
     ------
     ArithmeticError, ValueError
-        where the states run away or are too fast for the integrator, or a linkage does not close.
+        if a value is no finite number, one step of the file takes more than `_MOST_STEPS` of the integrator, or a
+        linkage does not close.
     """
-    starts = tuple((s.variable.name, s.start) for s in interface.signals if s.start is not None)
-    return _tables(interface.model, cast(Hashable, interface.script), starts, traced)
-
-
-def related_files(content: bytes | None = None) -> Element:
-    """The root of the manifest of FMI-LS-REF: of that in a file with this content, or of a new one, which names no
-    file yet."""
-    register_namespace("fmi-ls", _NAMESPACE)
-    if content is not None:
-        return xml_of(content, RELATED)
-    said = {
-        "name": STANDARD,
-        "version": "1.0.0-beta.1",
-        "description": "Layered Standard providing information on related files included in an FMU.",
-    }
-    return Element("fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in said.items()})
-
-
-@lru_cache(maxsize=32)
-def _tables(
-    model: Model, script: type[Script], starts: tuple[tuple[str, float], ...], traced: bool
-) -> dict[str, tuple[list[str], list[list[float]]]]:
-    """Head and rows of each file, which are the same for each version of FMI.
-
-    Raises
-    ------
-    ArithmeticError
-        where a value is no finite number, or one step of the file takes more than `_MOST_STEPS` of the integrator.
-    """
-    interface = Interface(model, dict(starts), script)
-    p = interface.start_parameters
+    model, p = interface.model, interface.start_parameters
     inputs = excitation(interface)
     layout = model.state_layout
     tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
@@ -194,6 +164,20 @@ def _tables(
             u[place] = model.input_layout.variables[place].quantity.within_bounds(moved)
     heads = {kind: ["time", *(s.name for s in interface.signals_of(kind))] for kind in ("input", "output")}
     return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
+
+
+def related_files(content: bytes | None = None) -> Element:
+    """The root of the manifest of FMI-LS-REF: of that in a file with this content, or of a new one, which names no
+    file yet."""
+    register_namespace("fmi-ls", _NAMESPACE)
+    if content is not None:
+        return xml_of(content, RELATED)
+    said = {
+        "name": STANDARD,
+        "version": "1.0.0-beta.1",
+        "description": "Layered Standard providing information on related files included in an FMU.",
+    }
+    return Element("fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in said.items()})
 
 
 _Outputs: TypeAlias = Callable[[Sequence[float], Sequence[float]], list[float]]

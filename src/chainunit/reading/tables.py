@@ -399,6 +399,20 @@ _NO_SIGNS = re.compile(
 Unicode assigns to nothing. XML, and with it an FMU, an SVG and a page, has no place for them."""
 
 
+def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """The table of that name in a file, empty where there is none.
+
+    Raises
+    ------
+    InputError
+        where it is no table.
+    """
+    table = data.get(name, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"{name} = {shown(table)}: must be a table", key=name)
+    return table
+
+
 def text_faults(data: Any) -> list[InputError]:
     """The faults of all texts and names in the tables of a file that have a character that is no sign."""
     return list(_wrong_texts(data, ""))

@@ -23,6 +23,7 @@ from ..reading.tables import (
     filled,
     given_values,
     in_file,
+    named_table,
     read,
     read_table,
     slips_of,
@@ -49,7 +50,6 @@ from .parts import (
     example,
     linkage_lines,
     motor_is_left,
-    named_table,
     over_example,
     with_linkage,
 )

@@ -11,11 +11,11 @@ from typing import Any
 from ..core.errors import Faults, InputError, each_refusal, refusal_prefix, shown
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue, offer
 from ..models import MACHINES, MOTORS
-from ..reading.tables import read_table
+from ..reading.tables import named_table, read_table
 from ..reading.text import chosen_units
 from .checks import lower_limits
 from .event_table import read_events, read_random_event
-from .parts import Parts, beside, catalogues_of, is_designation, named_table, parts_of
+from .parts import Parts, beside, catalogues_of, is_designation, parts_of
 from .registry import registered
 from .rules import refusals
 from .sections import all_sections

@@ -25,6 +25,7 @@ from ..reading.tables import (
     file_form,
     given_values,
     merged,
+    named_table,
     packaged,
     read_table,
     toml,
@@ -239,20 +240,6 @@ def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
         )
     rest = {key: value for key, value in machine.items() if key != "linkage"}
     return {**data, "system": {**system, "machine": name}, "machine": rest}
-
-
-def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """The table of that name in a file, empty where there is none.
-
-    Raises
-    ------
-    InputError
-        where it is no table.
-    """
-    table = data.get(name, {})
-    if not isinstance(table, Mapping):
-        raise InputError(f"{name} = {shown(table)}: must be a table", key=name)
-    return table
 
 
 def example(name: str = "chain-unit") -> str:

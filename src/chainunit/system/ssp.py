@@ -25,7 +25,8 @@ from ..core.model import Model
 from ..core.quantities import written
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
-from ..fmu.pack import interface_of, pack, xml_bytes
+from ..fmu.description import xml_bytes
+from ..fmu.pack import interface_of, pack
 from ..fmu.script import Names, name_in_fmu
 from .graph import Connector, FmuComponent, System
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from ...reading.tables import named_table
 from ...recordings.measurands import MEASURANDS
 from ...recordings.table import recording_rules
 from ...report.capability import Capability
 from ...study.capability import FileReference
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.parts import named_table
 from ...study.rules import Rule
 from .reading import IdentificationPlan, read_identification
 from .table import FIELDS, MOST_SPEEDS, RUNS, SENSORS, SOUGHT, IdentifyTable

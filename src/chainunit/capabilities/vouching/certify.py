@@ -12,8 +12,8 @@ from ... import __version__
 from ...core.errors import InputError, RunError, printable
 from ...core.inputs import ARCHIVE, file_bytes
 from ...core.model import Model
-from ...fmu.description import Interface, Signal
-from ...fmu.pack import interface_of, xml_bytes
+from ...fmu.description import Interface, Signal, xml_bytes
+from ...fmu.pack import interface_of
 from ...fmu.reference import REFERENCE, RELATED, related_files
 from ...fmu.script import Names, name_in_fmu
 from ...models import MODELS

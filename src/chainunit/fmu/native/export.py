@@ -17,9 +17,8 @@ from ...core.files import atomic_file, folder
 from ...core.model import Model
 from ...core.printing.c_elementary import HEADER, header
 from ...core.printing.c_forms import STEP, c_file
-from ..companion_files import companion_files
-from ..description import model_description, model_description_3
-from ..pack import interface_of, pack, xml_bytes
+from ..description import model_description, model_description_3, xml_bytes
+from ..pack import companion_files, interface_of, pack
 from ..recipe import recipes
 from ..script import Names, script_with_names
 from .generate import kernels, rules, tables
