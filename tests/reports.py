@@ -15,10 +15,15 @@ from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import files, html, motion, page_figures, series, terminal
 from chainunit.report import study as study_report
 from chainunit.report.packing import unpacked
+from chainunit.study.result import as_dict
+
+
+def report_of(study):
+    return study_report.report(study, as_dict(study))
 
 
 def page_of(study, result=None):
-    return html.render(study_report.report(study, result))
+    return html.render(study_report.report(study, result or as_dict(study)))
 
 
 def plotly_figure(spec, units=DEFAULT_UNITS):
@@ -44,7 +49,7 @@ def plain(report, width=120):
 
 
 def said_of(study, width=200):
-    return plain(study_report.report(study), width)
+    return plain(report_of(study), width)
 
 
 def screen_of(report):
@@ -57,7 +62,7 @@ def screen_of(report):
 
 
 def write(study, folder):
-    numbers, *others = files.writers(study_report.report(study), folder, "result", png=True)
+    numbers, *others = files.writers(report_of(study), folder, "result", png=True)
     return [file for each in (numbers, lambda: series.write(study, folder), *others) for file in each()]
 
 

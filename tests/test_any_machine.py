@@ -7,10 +7,10 @@ import re
 
 import numpy as np
 import pytest
+from reports import report_of
 
 from chainunit import InputError
 from chainunit.report.markdown import markdown
-from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
@@ -62,7 +62,7 @@ def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
     settled = np.sqrt(np.mean(study.steady["motor.air_gap_tau"].values ** 2))
     assert best.checks["rms_torque"].value == pytest.approx(settled, rel=0.01)
     # the duty has one feed, and no sides, nor is there a word on them
-    assert not re.search(r"\bsides?\b", markdown(report(study), []))
+    assert not re.search(r"\bsides?\b", markdown(report_of(study), []))
     numbers = as_dict(study)
     assert "one_sided" not in numbers["sizing"]
     assert numbers["sizing"]["cycle"]["torque_peak_one_sided"]["value"] is None

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reports import report_of
 from scipy.integrate import cumulative_simpson
 
-from chainunit.report.study import report
 from chainunit.study import config
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
 from chainunit.study.readings import crank_speed
@@ -89,7 +89,7 @@ def test_the_axis_of_time_ends_where_the_crank_stands(tmp_path, monkeypatch):
     monkeypatch.setattr("chainunit.capabilities.chains.analysis.ChainAnalysis.find", lambda *_: None)
     study = run_study(config.parse(STUDY.format(organ="two-bar", more="", trip=250)), tmp_path)
     assert study.failure is None
-    figure = next(each for each in report(study).figures if each.name == "time-jam-left")
+    figure = next(each for each in report_of(study).figures if each.name == "time-jam-left")
     event, coasting = study.event["jam_left"], study.runs["jam_left_coasting"]
     time, speed = coasting["time"].values - event, abs(crank_speed(study.drive, coasting))
     stands = time[np.flatnonzero(speed > 0.02 * 4.0)[-1]]

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from records import record_of
+from reports import report_of
 from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
@@ -284,7 +285,7 @@ def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
 
 def test_the_page_shows_all_that_was_given_and_used(tmp_path):
     study = study_of(parse(ALL), tmp_path)
-    (section,) = (each for each in report(study).sections if each.name == "given")
+    (section,) = (each for each in report_of(study).sections if each.name == "given")
     rows = {value.name: value for _, values in section.blocks[0].sections for value in values}
     wanted = {"gear.J", "starter.soft_start.voltage", "flywheel.J", "flywheel.compare", "monte_carlo.runs"}
     wanted |= {"monte_carlo.event.force", "monte_carlo.event.type", "start", "empty_start", "simulation"}

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from records import record_of
-from reports import said_of, write
+from reports import report_of, said_of, write
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from chainunit import InputError, RunError
@@ -26,7 +26,6 @@ from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.models import MACHINES
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import entry, number
-from chainunit.report.study import report
 from chainunit.report.study_motion import motion
 from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
@@ -347,7 +346,7 @@ def test_a_motor_that_stalls(tmp_path):
     assert " on average, rated is 14.4 N m" in said
     # no flywheel is advised beside
     assert "Take a larger motor, or less load." in said
-    assert "flywheel.png" not in {figure.file for figure in report(study).figures}
+    assert "flywheel.png" not in {figure.file for figure in report_of(study).figures}
     assert "(given, stalls)" in said_of(study)
 
 

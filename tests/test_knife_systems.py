@@ -7,12 +7,11 @@ import math
 
 import numpy as np
 import pytest
-from reports import page_of
+from reports import page_of, report_of
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from chainunit.core.engines import MATH
 from chainunit.core.quantities import Layout
-from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
 from chainunit.study.line.shaft import driveline_of
@@ -73,7 +72,7 @@ def run(text, folder):
 
 def sections(study):
     """The sections of the page that have anything in them, each of which the page shows."""
-    names = [section.name for section in report(study).sections if section.blocks]
+    names = [section.name for section in report_of(study).sections if section.blocks]
     page = page_of(study)
     assert all(f'id="{name}"' in page for name in names)
     return set(names)

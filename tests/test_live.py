@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 from javascript_hosts import node
 from live_pages import OUTCOME, in_node, live_of
+from reports import report_of
 
 from chainunit import InputError
 from chainunit.app.cli import live as live_command
@@ -21,7 +22,6 @@ from chainunit.machines.admissible import admits, holding_range
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.report import html
-from chainunit.report import study as study_report
 from chainunit.report.live.formulas import event_signals, varied_names
 from chainunit.report.live.linkage import of_linkage
 from chainunit.report.live.page import live_page
@@ -400,7 +400,7 @@ def test_every_overload_has_the_peaks_of_the_co_simulation(name, tmp_path):
 
 def check_size(study):
     """The page is small, and the live machine is a small part of it."""
-    report = study_report.report(study)
+    report = report_of(study)
     plain = replace(report, sections=tuple(each for each in report.sections if each.name != "live"))
     whole, without = (len(html.render(each).encode()) for each in (report, plain))
     assert 50_000 < whole - without < 150_000 and whole < 2_500_000

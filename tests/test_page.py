@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from event_tables import event_line
 from plotly.offline import get_plotlyjs
-from reports import page_of, pictures, plotly_figure, said_of, write
+from reports import page_of, pictures, plotly_figure, report_of, said_of, write
 
 from chainunit import EMPTY, InputError, RunError
 from chainunit.capabilities.chains.analysis import rest_forces
@@ -70,7 +70,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def written(study, tmp_path_factory):
-    return html.write(study_report.report(study), tmp_path_factory.mktemp("a page"))
+    return html.write(report_of(study), tmp_path_factory.mktemp("a page"))
 
 
 @pytest.fixture(scope="module")
@@ -691,7 +691,7 @@ def test_the_page_carries_the_library_packed(written):
 
 @pytest.mark.second
 def test_a_piece_of_another_page_has_nothing_that_a_script_draws(study):
-    report = study_report.report(study)
+    report = report_of(study)
     kinds = {type(block).__name__ for block in report.blocks("long")}
     assert {"Figure", "Animation", "Live"} <= kinds
     piece = html.fragment(report)
@@ -718,7 +718,7 @@ def test_an_error_leaves_the_old_page(study, tmp_path, monkeypatch):
 
     monkeypatch.setattr(html, "_packed_plotly", fails)
     with pytest.raises(OSError):
-        html.write(study_report.report(study), tmp_path)
+        html.write(report_of(study), tmp_path)
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("report.html", "old")]
 
 
@@ -947,7 +947,7 @@ def test_the_page_in_a_browser(study, written, tmp_path):
     assert done.returncode == 0
     assert not [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     figures = done.stdout.split('data-figure="')[1:]
-    declared = [figure.name for figure in study_report.report(study).figures if figure.on_page]
+    declared = [figure.name for figure in report_of(study).figures if figure.on_page]
     assert [figure.partition('"')[0] for figure in figures] == declared and "sides" in declared
     for figure in figures:
         box = figure.partition("<figcaption>")[0]
@@ -976,7 +976,7 @@ def test_a_table_that_is_wider_than_the_screen_says_that_it_scrolls(written, tmp
 
 def test_plots_mark_running_margin_and_where_two_bars_end(study):
     """Each mark against the numbers of the study, computed otherwise."""
-    figures = {figure.name: figure for figure in study_report.report(study).figures}
+    figures = {figure.name: figure for figure in report_of(study).figures}
     running = study.config.run.crank_speed
 
     def items(figure, kind, name=""):

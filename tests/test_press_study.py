@@ -13,13 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reports import page_of, pictures
+from reports import page_of, pictures, report_of
 
 from chainunit.capabilities.sizing.coupling import effects
 from chainunit.capabilities.sizing.protection import CouplingEffect, spares
 from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import load_figures, page_figures, study_motion
-from chainunit.report import study as study_report
 from chainunit.report.figure import Between, Curve
 from chainunit.report.linkage_loads import loads_on_slides
 from chainunit.report.study_motion import machine_state
@@ -61,7 +60,7 @@ def page(study):
 
 @pytest.fixture(scope="module")
 def figures(study):
-    return {figure.name: figure for figure in study_report.report(study).figures}
+    return {figure.name: figure for figure in report_of(study).figures}
 
 
 def test_the_guide_stands_among_the_bearings_by_the_names_of_the_file(study):

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from reports import report_of
 
 from chainunit import InputError
 from chainunit.capabilities.checks.plan import turning_pins
@@ -59,7 +60,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(study):
-    return sheet(study, study_report.report(study))
+    return sheet(study, report_of(study))
 
 
 def test_the_sheet_has_each_section_once(study, made):
@@ -68,7 +69,7 @@ def test_the_sheet_has_each_section_once(study, made):
     assert names[:4] == ["answer", "question", "checks", "assumptions"] and {"unchecked", "runs"} <= set(
         names
     )
-    whole = {each.name for each in study_report.report(study).sections}
+    whole = {each.name for each in report_of(study).sections}
     apart = {"live", "motion", "not_checked"}
     assert whole - set(names) == apart, "what moves is not on paper, and what was not checked has its section"
     assert made.block["Project"] == "Quarry 7" and made.block["Revision"] == "B"
@@ -89,7 +90,7 @@ def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assu
     chosen = replace(
         study, proposal=SimpleNamespace(name="sizing", insufficient="", motor=object(), duty=None, keys={})
     )
-    whole = study_report.report(study)
+    whole = report_of(study)
     given = b.Section("given", "Given values", (b.Given((("all", values),)),))
     sections = (*(each for each in whole.sections if each.name != "given"), given)
     made = sheet(chosen, replace(whole, sections=sections))
@@ -135,7 +136,7 @@ def test_without_sizing_it_says_that_no_drive_was_chosen_and_without_order_numbe
 
 
 def test_figures_of_its_sections_and_the_versions_are_in_the_annex(study):
-    whole = study_report.report(study)
+    whole = report_of(study)
     (plots,) = (each for each in whole.sections if each.name == "plots")
     picture = next(each for each in plots.blocks if isinstance(each, Figure))
     energy = b.Section("energy", "Energy", (b.Text("so much", form="long"), picture))
@@ -163,7 +164,7 @@ def test_its_text_escapes_the_file_and_numbers_its_sections(made):
 
 
 def test_numbers_of_the_sheet_are_those_of_the_result(study, made):
-    result = study_report.report(study).result
+    result = report_of(study).result
     text = pdf.page_text(made, {})
     peak = result["answers"]["jam_left"]["crank_torque_peak"]["value"]
     shown = re.findall(r'data-path="runs.answers.jam_left.crank_torque_peak" value="([^"]+)"', text)
@@ -189,7 +190,7 @@ def test_a_study_clears_the_sheet_of_an_earlier_one():
 
 def test_blocks_for_the_sheet_stand_in_place_of_the_long_ones(study):
     long, own, both = (b.Text("long", form="long"), b.Text("own", form="sheet"), b.Text("both"))
-    whole = study_report.report(study)
+    whole = report_of(study)
     checks = b.Section("checks", "Checks by clause", (long, own, both))
     others = (each for each in whole.sections if each.name != "checks")
     made = sheet(study, replace(whole, sections=(*others, checks)))
@@ -202,7 +203,7 @@ def test_blocks_for_the_sheet_stand_in_place_of_the_long_ones(study):
 
 def test_each_check_of_the_sheet_names_its_clause_and_formula(study, made):
     (section,) = (each for each in made.sections if each.name == "checks")
-    rows = study_report.report(study).result["checks"]["rows"]
+    rows = report_of(study).result["checks"]["rows"]
     (table,) = (each for each in section.blocks if isinstance(each, b.Table))
     assert len(table.rows) == len(rows) > 0
     laws = [each.line for each in section.blocks if isinstance(each, b.Text) and each.role == "note"]
@@ -256,7 +257,7 @@ def test_the_pdf_is_two_to_four_pages_and_an_annex_and_has_eight_at_most(study, 
         pdf.check_library()
     except InputError as missing:
         pytest.skip(str(missing))
-    pictures = print_figures.write(study_report.report(study).figures, tmp_path, made.units, are_small=True)
+    pictures = print_figures.write(report_of(study).figures, tmp_path, made.units, are_small=True)
     file = pdf.write(made, {each.name: each for each in pictures}, tmp_path / pdf.NAME)
     reader, pages = pages_of(file)
     assert len(pages) <= MOST_PAGES and len(pictures) > 5
@@ -285,7 +286,7 @@ def test_an_annex_that_would_be_too_long_is_set_closer(study, made, tmp_path, mo
         pdf.check_library()
     except InputError as missing:
         pytest.skip(str(missing))
-    pictures = print_figures.write(study_report.report(study).figures, tmp_path, made.units, are_small=True)
+    pictures = print_figures.write(report_of(study).figures, tmp_path, made.units, are_small=True)
     pictured, lengths = {each.name: each for each in pictures}, []
     for most in (100, 1):
         monkeypatch.setattr(pdf, "MOST_PAGES", most)
@@ -365,10 +366,10 @@ def test_the_sheet_of_each_machine_has_at_most_four_pages_with_readable_letters(
     except InputError as missing:
         pytest.skip(str(missing))
     study = run_study(config.parse(machine_of(name)), tmp_path)
-    made = sheet(study, study_report.report(study))
+    made = sheet(study, report_of(study))
     drawn = "".join(x.svg for each in made.sections for x in each.blocks if isinstance(x, b.Drawing))
     drawn = unescape(re.sub(r"<[^>]+>|\s", "", drawn))
-    pictures = print_figures.write(study_report.report(study).figures, tmp_path, made.units, are_small=True)
+    pictures = print_figures.write(report_of(study).figures, tmp_path, made.units, are_small=True)
     pictured = {each.name: each for each in pictures}
     reader, pages = pages_of(pdf.write(made, pictured, tmp_path / pdf.NAME))
     heading = rf"A1\s+{re.escape(made.annex[0].heading)}"

@@ -9,12 +9,11 @@ from html import unescape
 from pathlib import Path
 
 import pytest
-from reports import plain, screen_of
+from reports import plain, report_of, screen_of
 
 from chainunit.reading.text import number
 from chainunit.report import blocks as b
 from chainunit.report import html, pdf
-from chainunit.report import study as study_report
 from chainunit.report.lines import Number, Words, pieces
 from chainunit.report.markdown import markdown as markdown_of
 from chainunit.report.sheet import sheet
@@ -114,10 +113,6 @@ def study(request, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def report(study):
-    return study_report.report(study)
-
-
 def pieces_of(node):
     """All numbers and sentences of a result in a part of a report."""
     if isinstance(node, Number | Words):

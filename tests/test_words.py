@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from command import chainunit
 from event_tables import event_line
-from reports import said_of
+from reports import report_of, said_of
 
 from chainunit.core.quantities import Quantity
 from chainunit.reading.result_entries import ResultEntries
@@ -19,7 +19,6 @@ from chainunit.reading.text import chosen_units, number, shown_in
 from chainunit.report.blocks import Source
 from chainunit.report.lines import Words
 from chainunit.report.markdown import markdown
-from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
@@ -118,7 +117,7 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
     kinds = {note.code for note in study.notes}
     assert ("smoothed-friction" in kinds) is (friction > 0.0)
     # nor has it a crank
-    text = said_of(study) + markdown(report(study), [])
+    text = said_of(study) + markdown(report_of(study), [])
     assert not re.search(r"\bcrank\b", text, re.I)
     assert "accelerator torque, peak" in text
     assert "the accelerator at " in study_words(study)

@@ -13,7 +13,6 @@ from ..reading.text import shown_in
 from ..study.event_table import random_runs
 from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
-from ..study.result import as_dict
 from ..study.transients import DIFFERENCE
 from . import answer, figures, run_names, runs, shaft
 from . import blocks as b
@@ -33,9 +32,9 @@ _DRAWING_CAPTION = (
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 
-def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
-    """The report on a study; `result` has its numbers, by default those of `as_dict`."""
-    s = b.Source(as_dict(study) if result is None else result, study.driver_noun)
+def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
+    """The report on a study; `result` has its numbers, as `chainunit.study.result.as_dict` gives them."""
+    s = b.Source(result, study.driver_noun)
     with shown_in(study.config.units):
         sections = [
             b.Section(name, contents.heading, tuple(contents.blocks(s, study)), beside=name == QUESTION)
@@ -58,9 +57,9 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
         )
 
 
-def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
+def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
-    s = b.Source(as_dict(study) if result is None else result, study.driver_noun)
+    s = b.Source(result, study.driver_noun)
     blocks: list[b.Block] = list(answer.sentence(s))
     with shown_in(study.config.units):
         for block in answer.blocks(s, study):

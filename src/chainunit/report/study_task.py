@@ -15,7 +15,7 @@ from ..study.choice import check_motor
 from ..study.config import Config
 from ..study.event_table import random_runs
 from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
-from ..study.result import StudyData
+from ..study.result import StudyData, as_dict
 from ..study.run import run_study
 from ..work.progress import TaskProgress
 from ..work.runner import check_scheduler
@@ -82,7 +82,7 @@ def _shortfall(record: StudyRecord) -> str | None:
 TASK: Task[Config, StudyRecord] = Task(
     "study",
     _compute,
-    contents.report,
+    lambda record: contents.report(record, as_dict(record)),
     files=(*contents.pictures(), series.SERIES, LOAD_CYCLE, pdf.NAME),
     accept=_accept,
     writers=_writers,
