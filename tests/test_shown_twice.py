@@ -9,7 +9,7 @@ from html import unescape
 from pathlib import Path
 
 import pytest
-from reports import plain, report_of, screen_of
+from reports import plain, screen_of
 
 from chainunit.reading.text import number
 from chainunit.report import blocks as b
