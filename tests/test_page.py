@@ -381,7 +381,7 @@ def test_steady_running_begins_where_the_study_takes_it(study):
         drive=dataclasses.replace(study.config.drive, start="soft", starter=Starter(soft_start=soft)),
     )
     slow = dataclasses.replace(study, config=config, started=None)
-    start_up = next(each for each in study_report.report(slow).figures if each.name == "time-start-up")
+    start_up = next(each for each in report_of(slow).figures if each.name == "time-start-up")
     (mark,) = plotly_figure(start_up, DEFAULT_UNITS).layout.annotations
     assert mark.text == "steady from here" and mark.x == slow.steady_begin == pytest.approx(
         0.7 + math.pi / 3.0
@@ -662,7 +662,7 @@ def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
     stopped.failure = RunError("motor: it <broke>")
     stopped.runs = {"unfinished": study.runs["start_up"].isel(time=slice(0, 1))}
     stopped.answers, stopped.pins, stopped.event, stopped.certificate = {}, {}, {}, {}
-    text = html.write(study_report.report(stopped), tmp_path).read_text("utf-8")
+    text = html.write(report_of(stopped), tmp_path).read_text("utf-8")
     assert "The run stopped early:" in text and "it &lt;broke&gt;" in text
     assert not any(words["data-path"] == "status" for words in Reader(text).words)
     stopped.runs = {}
@@ -674,7 +674,7 @@ def test_the_head_names_project_author_date_and_revision(study):
     labels = config.parse(text).file.labels
     assert labels == {"project": "Mill 3", "author": "A. <b>", "date": "2026-11-22", "revision": "B"}
     named = dataclasses.replace(study, config=study.config.with_file(labels=labels))
-    page = html.render(study_report.report(named))
+    page = html.render(report_of(named))
     head = re.search(r'<p class="from">.*?</p>', page)[0]
     plain = re.sub(r"<[^>]*>", "", head)
     assert plain.startswith(

@@ -17,7 +17,6 @@ from chainunit import InputError
 from chainunit.capabilities.checks.plan import turning_pins
 from chainunit.report import blocks as b
 from chainunit.report import pdf, print_figures
-from chainunit.report import study as study_report
 from chainunit.report.figure import Figure
 from chainunit.report.lines import Number
 from chainunit.report.sheet import sheet
@@ -116,7 +115,7 @@ def test_it_says_up_to_which_speed_it_holds(study, made):
     assert float(shown["rocker_torque_speed"]) == limits["rocker torque"] < limits["crank torque"]
     assert float(shown["slack_speed"]) == limits["slack speed"]
     chain = replace(study, verdict=replace(study.verdict, model="chains"))
-    report = study_report.report(chain)
+    report = report_of(chain)
     assert "No highest speed was computed" in pdf.page_text(sheet(chain, report), {})
 
 
@@ -129,7 +128,7 @@ def test_it_names_each_pin_whose_bearing_was_not_checked(made):
 def test_without_sizing_it_says_that_no_drive_was_chosen_and_without_order_numbers(study):
     plans = {**study.config.plans, "sizing": None}
     without = replace(study, config=replace(study.config, plans=plans))
-    made = sheet(without, study_report.report(without))
+    made = sheet(without, report_of(without))
     (section,) = (each for each in made.sections if each.name == "unchecked")
     text = pdf.page_text(replace(made, sections=(section,), annex=()), {})
     assert "and order numbers: the motor is that of" in text

@@ -9,7 +9,7 @@ from html import unescape
 from pathlib import Path
 
 import pytest
-from reports import plain, screen_of
+from reports import plain, report_of, screen_of
 
 from chainunit.reading.text import number
 from chainunit.report import blocks as b
@@ -113,6 +113,10 @@ def study(request, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def report(study):
+    return report_of(study)
+
+
 def pieces_of(node):
     """All numbers and sentences of a result in a part of a report."""
     if isinstance(node, Number | Words):

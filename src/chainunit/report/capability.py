@@ -43,6 +43,8 @@ class AnswerBlocks:
     """after the numbers of the drive"""
     warnings: Iterable[Block] = ()
     """beside the warnings of the study"""
+    validity: Iterable[Block] = ()
+    """on the sheet, at the head of basis and validity"""
 
 
 class AnyStudy(Protocol):
@@ -72,10 +74,6 @@ class Capability(StudyCapability):
     def on_sheet(self) -> tuple[str, ...]:
         """Names of its sections that belong on the sheet of a study, not in the annex alone."""
         return ()
-
-    def up_to_speed(self, s: Source, study: StudyRecord) -> Iterator[Line]:
-        """Sentences on the speed up to which the numbers of a study hold, for its sheet."""
-        return iter(())
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """What the study could have checked by this capability and did not."""

@@ -75,9 +75,7 @@ def _without_figures(section: b.Section) -> b.Section:
 
 def _basis(s: b.Source, study: StudyRecord) -> b.Section:
     """Basis and validity, with the speed up to which the numbers hold at its head."""
-    head = (
-        b.Text(sentence, "note", "long") for part in capabilities() for sentence in part.up_to_speed(s, study)
-    )
+    head = [block for part in capabilities() for block in part.answer(s, study).validity]
     return b.Section("basis", "Basis and validity", (*_speed(s, study), *head, *basis(s, study)))
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from ..machines.machine import Machine
     from .analysis import Analysis
     from .config import Config
-    from .cycle import Cycle
-    from .drive import Drive
     from .file_reading import FileReading
     from .rules import Rule
 
@@ -35,16 +33,6 @@ class FileReference:
     name: str
     is_recording: bool = True
     """whether it is a recording, which has to be there"""
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """Estimated numbers of a study: their `values` by full name, the `covariance` of their errors in this order,
-    shape (numbers, numbers), and the name of the `file` that holds both, beside the study file."""
-
-    values: Mapping[str, float]
-    covariance: Any
-    file: str
 
 
 class StudyCapability:
@@ -90,14 +78,6 @@ class StudyCapability:
     def not_with_foreign_motor(self, plan: Any) -> str:
         """The reason and the remedy where its plan needs a motor of this package; empty where it does not."""
         return ""
-
-    def beside(self, plan: Any, drive: Drive, feed: Any, turn: Cycle) -> Drive:
-        """The drive with the parts of the system that the capability adds beside the line; the machine has this
-        `feed` and `turn` in normal running."""
-        return drive
-
-    def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
-        """Write into its `tables` of the study file with estimated numbers what follows from their errors."""
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Its analyses of a study."""

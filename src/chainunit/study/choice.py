@@ -18,8 +18,9 @@ from .cycle import Cycle, cycle
 from .drive import Drive
 from .drive_tables import DriveTables
 from .motor_sources import MotorSource
+from .plans import PartBeside
 from .proposal import DriveProposal, motor_choice
-from .registry import parts_of_line, registered
+from .registry import parts_of_line
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ def _with_line(drive: Drive, plans: Mapping[str, Any], turn: Cycle) -> Drive:
 def with_parts_beside(drive: Drive, plans: Mapping[str, Any], feed: Any, turn: Cycle) -> Drive:
     """The drive with the parts that capabilities add to its system, by their `plans`, for a machine with this
     `feed` and this `turn` in normal running."""
-    for part in registered():
-        drive = part.beside(plans[part.name], drive, feed, turn)
+    for plan in plans.values():
+        if isinstance(plan, PartBeside):
+            drive = plan.beside(drive, feed, turn)
     return drive

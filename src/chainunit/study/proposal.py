@@ -81,6 +81,8 @@ class DriveProposal:
     """the choice and its reason, in words"""
     sentence: Callable[[Any], str]
     """the sentence on the drive of a study by its `StudyRecord`"""
+    currents_until_trip: Callable[[Any], Mapping[str, float]]
+    """by overload of a `StudyRecord`, the largest current of the motor [A] until the recommended limiter opens"""
     insufficient: str = ""
     """the sentence on a study in which no drive fits, so that all is run with the nearest; empty where one fits"""
     keys: Mapping[str, str] = field(default_factory=dict)

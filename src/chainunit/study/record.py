@@ -172,12 +172,9 @@ class StudyRecord:
         return "" if self.proposal is None else self.proposal.insufficient
 
     @property
-    def currents_until_trip(self) -> dict[str, float]:
+    def currents_until_trip(self) -> Mapping[str, float]:
         """By overload that opens a recommended torque limiter, the largest current of the motor until then [A]."""
-        currents: dict[str, float] = {}
-        for findings in self.findings.values():
-            currents |= findings.currents_until_trip(self)
-        return currents
+        return {} if self.proposal is None else self.proposal.currents_until_trip(self)
 
     @property
     def not_known(self) -> frozenset[str]:
@@ -238,11 +235,6 @@ class Findings(ABC):
         """The mean loss of the gear [W] in its own runs of the study's steady running, with a winding as warm as that
         makes it; None without such runs."""
         return None
-
-    def currents_until_trip(self, study: StudyRecord) -> Mapping[str, float]:
-        """By overload, the largest current of the motor [A] until a torque limiter opens that these findings
-        recommend."""
-        return {}
 
     @classmethod
     def found_in(cls, study: StudyRecord) -> Self | None:

@@ -8,6 +8,7 @@ bounds, and products, such as that of friction and weight, which are determined 
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Collection
@@ -17,14 +18,17 @@ from typing import Any
 
 import numpy as np
 
+from ...core.errors import RunError
 from ...recordings.fit import NormalEquations, inverse
-from ...recordings.problem import OUTLIER, Problem
+from ...recordings.problem import OUTLIER, Comparison, Problem
 
 WIDE = 0.02
 """Standard deviation of a direction, in parts of that of its prior, from which on it counts as wide."""
 MOST_WIDE = 6
 STEP = 5e-3
 """Time between the rows that are taken for second derivatives [s]."""
+PARTS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.001)
+"""Parts of a step for second derivatives that are tried until the machine runs after it."""
 CHAINS, STEPS, KEPT = 300, 1200, 10
 """Number of chains, their steps, of which the second half counts, and states that are kept of each."""
 _STIFF = 1e4
@@ -190,7 +194,7 @@ class _CurvedDensity:
             step = self._across[:, k]
             ahead, behind = (_largest_factor(best.z, sign * step, low, high) for sign in (1.0, -1.0))
             size = max(min(ahead, 1.0), 0.1) if ahead >= behind else -max(min(behind, 1.0), 0.1)
-            moved = problem.comparisons(best.z + size * step, workers)
+            size, moved = _moved(problem, best.z, step, size, workers)
             for n, (here, there) in enumerate(zip(base, moved, strict=True)):
                 seconds[n, k] = (there.slopes - here.slopes) @ self._across[list(here.places)] / size
         total = np.zeros((1 + wide + len(self._pairs) + self._along.shape[1],) * 2)
@@ -251,6 +255,22 @@ class _CurvedDensity:
             if step >= STEPS // 2 and (step + 1) % (STEPS // 2 // KEPT) == 0:
                 kept.append(z)
         return np.concatenate(kept)
+
+
+def _moved(
+    problem: Problem, z: Any, step: Any, size: float, workers: int
+) -> tuple[float, list[Comparison]]:
+    """A step of that `size`, or of a part of it with which the machine runs, and the comparisons after it.
+
+    Raises
+    ------
+    RunError
+        if the machine runs with no part of `PARTS`.
+    """
+    for part in PARTS[:-1]:
+        with contextlib.suppress(RunError):
+            return part * size, list(problem.comparisons(z + part * size * step, workers))
+    return PARTS[-1] * size, list(problem.comparisons(z + PARTS[-1] * size * step, workers))
 
 
 def _largest_factor(z: Any, step: Any, low: Any, high: Any) -> float:

@@ -16,9 +16,8 @@ from ...reading.text import shown_in
 from ...recordings.fit import FittedValue, fitted_values
 from ...recordings.measurands import MEASURANDS
 from ...recordings.residuals import EXCESS_NOISE, ResidualTest
-from ...study.capability import Estimates
 from ...study.heading import Heading
-from ...study.registry import registered
+from ...study.plans import Estimates, EstimateUser
 from ...study.study_file import changed_tables
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
 from .information import Combination, Information, Proposal, short_name
@@ -394,8 +393,9 @@ def identified_tables(machine: IdentifiedMachine, folder: Path) -> dict[str, Any
     tables = changed_tables(machine.config, values, "identified", folder)
     tables.pop("identify", None)
     estimates = Estimates(values, machine.covariance, RESULT)
-    for capability in registered():
-        capability.take_estimates(machine.config, estimates, tables)
+    for plan in machine.config.plans.values():
+        if isinstance(plan, EstimateUser):
+            plan.take_estimates(machine.config, estimates, tables)
     return tables
 
 

@@ -3,11 +3,10 @@ them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 
 from ...report.blocks import Source
-from ...report.capability import Capability, Contents
-from ...report.lines import Line
+from ...report.capability import AnswerBlocks, Capability, Contents
 from ...report.supplement import Supplement
 from ...study.analysis import Analysis
 from ...study.record import StudyRecord
@@ -31,11 +30,11 @@ class SidesCapability(Capability):
 
         return {"organs": Contents("One side against both", page.blocks, page.PICTURES.files)}
 
-    def up_to_speed(self, s: Source, study: StudyRecord) -> Iterator[Line]:
-        """The limits of two bars in place of chains."""
+    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+        """The crank speed up to which two bars stand for chains."""
         from . import page
 
-        return page.up_to_speed(s, study)
+        return AnswerBlocks(validity=page.up_to_speed(s, study))
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """The organs in motion."""

@@ -9,7 +9,7 @@ from ...machines.chain_unit import SIDES
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.cited import cited, number
-from ...report.lines import Line, capital
+from ...report.lines import capital
 from ...report.pictures import Pictures
 from ...study.load_cases import OverloadFactors
 from ...study.record import StudyRecord
@@ -61,13 +61,16 @@ def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Limits of the model", form="long")
 
 
-def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[Line]:
+def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The crank speeds up to which two bars stand for chains; nothing where no run has two bars."""
     findings, verdict = OrganFindings.found_in(study), study.verdict
     if findings is None or verdict is None:
         return
     if verdict.model != "two bars":
-        yield "No highest speed was computed up to which the numbers hold; the limits of two bars do not apply."
+        sentence = (
+            "No highest speed was computed up to which the numbers hold; the limits of two bars do not apply."
+        )
+        yield b.Text(sentence, "note", "long")
         return
     limits = {
         "crank_torque_speed": "the crank torque is good to 10 % up to {}",
@@ -80,7 +83,8 @@ def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[Line]:
         if finite(getattr(findings.limits, name)) is not None
     ]
     if parts:
-        yield s.line(f"Speed of the crank, for two bars in place of chains: {'; '.join(parts)}.")
+        limits_line = s.line(f"Speed of the crank, for two bars in place of chains: {'; '.join(parts)}.")
+        yield b.Text(limits_line, "note", "long")
 
 
 _GOOD = {"crank": CRANK_GOOD, "rocker": ROCKER_GOOD_EMPTY}

@@ -148,6 +148,7 @@ class SizingFindings(Findings):
             "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
             self.answer,
             lambda study: SizingFindings.of_study(study).sized(study).sentence,
+            lambda study: SizingFindings.of_study(study).currents_until_trip(study),
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,

@@ -10,13 +10,14 @@ from ...core.errors import InputError
 from ...recordings.table import FROM_RECORDING, recording_rules
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
-from ...study.capability import Estimates, FileReference
+from ...study.capability import FileReference
 from ...study.conditions import given
 from ...study.config import Config
 from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
+from ...study.plans import Estimates, EstimateUser, PartBeside
 from ...study.rules import MOTOR_FMU, Rule, has_sides
 from .observer_table import ObserverTable
 from .reading import WatchPlan, read_watch
@@ -24,11 +25,29 @@ from .table import KEYS, WatchTable
 
 
 @dataclass(frozen=True)
-class WatchPlans:
+class WatchPlans(PartBeside, EstimateUser):
     """The plan of the table [watch], and the values of [observer]; None for one that is absent."""
 
     watch: WatchPlan | None
     observer: ObserverTable | None
+
+    def beside(self, drive: Drive, feed: Any, turn: Cycle) -> Drive:
+        """The drive with its load observer."""
+        from .observation import with_observer
+
+        return drive if self.observer is None else with_observer(drive, self.observer, feed, turn)
+
+    def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
+        """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that
+        they make."""
+        from ...study.choice import drive_of
+        from .observation import false_imbalance_of
+
+        if "watch" in tables:
+            tables["watch"]["identification"] = estimates.file
+        if "observer" in tables:
+            imbalance = false_imbalance_of(drive_of(config), config.feed, config.run.crank_speed, estimates)
+            tables["observer"] |= {name: float(f"{x:.4g}") for name, x in imbalance.items()}
 
 
 class WatchCapability(Capability):
@@ -100,24 +119,6 @@ class WatchCapability(Capability):
                         f"feed.right.material_mass are 0 kg; give the feed of normal running, or leave [{table}] out",
                         key=table,
                     )
-
-    def beside(self, plan: WatchPlans, drive: Drive, feed: Any, turn: Cycle) -> Drive:
-        """The drive with its load observer."""
-        from .observation import with_observer
-
-        return drive if plan.observer is None else with_observer(drive, plan.observer, feed, turn)
-
-    def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
-        """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that
-        they make."""
-        from ...study.choice import drive_of
-        from .observation import false_imbalance_of
-
-        if "watch" in tables:
-            tables["watch"]["identification"] = estimates.file
-        if "observer" in tables:
-            imbalance = false_imbalance_of(drive_of(config), config.feed, config.run.crank_speed, estimates)
-            tables["observer"] |= {name: float(f"{x:.4g}") for name, x in imbalance.items()}
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Who notices an event."""
