@@ -52,6 +52,17 @@ MEASURE = """    bearing_peak: Value = measure(
         during=_ALL,
     )
 """
+WARNING = """
+
+_FORCE_OF_BEARING = warning(
+    "output-bearing",
+    "The bearing of the output link carries {force}, more than 10 N.",
+    sizes={"N": "force"},
+)
+"""
+WARNED = """    if (found := study.answers.get(STEADY)) is not None and found.bearing_peak > 10.0:
+        study.say(_FORCE_OF_BEARING, STEADY, force=found.bearing_peak)
+"""
 FIGURE = '''
 
 @PICTURES.declare(lambda study: "machine.angle" in study.runs.get("start_up", ()), "output_angle.png")
@@ -176,12 +187,13 @@ def house(tmp_path_factory):
 def files_of(house, add):
     before = len(house.touched)
     add()
-    return len(house.touched) - before
+    return len(set(house.touched[before:]))
 
 
 @pytest.fixture(scope="module")
 def result(house):
-    """The study of the six-bar by a motor of a new type, with a new event, a new measure and a new figure."""
+    """The study of the six-bar by a motor of a new type, with a new event, a new measure, a new warning and a new
+    figure."""
 
     def machine():
         house.add("machines/six_bar.py", HERE / "six_bar.py")
@@ -191,11 +203,16 @@ def result(house):
         house.add("drives/servo_motor.py", HERE / "servo_motor.py")
         house.declare(motors='ServoMotor = "chainunit.drives.servo_motor:ServoMotor"')
 
+    def said():
+        house.insert("study/remarks.py", "", WARNING)
+        house.insert("study/remarks.py", "    _on_runs(study)\n", WARNED)
+
     assert files_of(house, machine) == 2
     assert files_of(house, motor) == 2
     assert files_of(house, lambda: house.insert("study/events.py", "", EVENT)) == 1
     line = "    speed_mean: Value = measure("
     assert files_of(house, lambda: house.insert("study/measures.py", line, MEASURE)) == 1
+    assert files_of(house, said) == 1
     assert files_of(house, lambda: house.insert("report/figures.py", "", FIGURE)) == 1
     (house.folder / "mine.toml").write_text(STUDY, "utf-8")
     house.run("study", "mine.toml", "-o", "mine")
@@ -239,6 +256,20 @@ def test_a_measure_is_a_field(house, result):
         peak = result["answers"][run]["bearing_peak"]["value"]
         assert peak == pytest.approx(result["pins"][run]["O3 output"]["peak"]["value"], rel=1e-12)
     assert "force in the bearing O3, peak" in (house.folder / "mine" / "report.html").read_text("utf-8")
+
+
+def test_a_warning_is_a_declaration_in_the_module_that_says_it(house, result):
+    (said,) = (each for each in result["warnings"] if each["code"] == "output-bearing")
+    assert said["severity"] == "warning" and said["runs"] == ["steady"]
+    peak = result["answers"]["steady"]["bearing_peak"]["value"]
+    assert said["quantities"]["force"] == {"value": peak, "unit": "N"}
+    assert f"The bearing of the output link carries {peak:.3g} N" in (
+        house.folder / "mine" / "report.html"
+    ).read_text("utf-8").replace("\u202f", " ")
+    declared = house.python(
+        "from chainunit.study.remarks import declared_remarks; print(*(x.code for x in declared_remarks()))"
+    )
+    assert "output-bearing" in declared.split()
 
 
 @pytest.mark.slow
