@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from command import chainunit
 
 from chainunit.capabilities.checks.gear import (
     _PULLEY,
@@ -163,36 +162,6 @@ def test_the_bearing_of_the_crank_is_that_in_the_ground_wherever_it_stands_in_th
 
 # -- a study
 
-STUDY = """
-title = "Gear"
-[system]
-motor = "IE3 4-pole 0.75 kW, 80M"
-[run]
-settle_turns = 2
-[[event]]
-type = "jam"
-side = "left"
-[gear_rating]
-rated_torque = 200
-application_factor = 1.4
-thermal_power = "2 kW"
-overhung_load = "3 kN"
-largest_speed = "3000 rev/min"
-exponent = 6.6
-[motor_shaft]
-overhung_load = 500
-pulley_diameter = "120 mm"
-tension_factor = 1.75
-"""
-
-
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("gear")
-    (folder / "mine.toml").write_text(STUDY, "utf-8")
-    assert chainunit("study", "mine.toml", "-o", "out", cwd=folder).returncode == 0
-    return folder / "out"
-
 
 def test_running_puts_its_torque_of_the_run_on_the_gear_not_that_of_the_curve(monkeypatch):
     """The cage does not follow fast loads: in running the torque by the curve of the motor is another one."""
@@ -212,10 +181,10 @@ def test_running_puts_its_torque_of_the_run_on_the_gear_not_that_of_the_curve(mo
 
 
 @pytest.mark.second
-def test_the_numbers_of_a_study_follow_from_its_runs(done):
-    result = ResultEntries(json.loads((done / "result.json").read_text("utf-8")))
+def test_the_numbers_of_a_study_follow_from_its_runs(rated):
+    result = ResultEntries(json.loads((rated / "result.json").read_text("utf-8")))
     found, shaft = result["checks"]["gear"], result["checks"]["motor_shaft"]
-    with xr.open_dataset(done / "result.nc", group="start_up") as run:
+    with xr.open_dataset(rated / "result.nc", group="start_up") as run:
         angle = run["machine.phi0"].values / found["ratio"]["value"]
         turns = run.sel(time=angle >= angle[-1] - 2.0 * np.pi * result["run"]["turns"]["value"])
         torque = turns["machine.tau"].values * found["ratio"]["value"]

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from command import chainunit
 from event_tables import event_line
 
 from chainunit.capabilities.checks.relay import RelaySetting, check_relay, relay_findings, stall_heat
@@ -174,33 +173,17 @@ def test_a_relay_that_never_trips_in_a_stall_does_not_protect():
 
 # -- a study
 
-STUDY = """
-title = "Relay"
-[system]
-motor = "IE3 4-pole 0.75 kW, 80M"
-[run]
-settle_turns = 2
-"""
-
-
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("relay")
-    (folder / "mine.toml").write_text(STUDY + '[relay]\ntrip_class = "20"\n', "utf-8")
-    assert chainunit("study", "mine.toml", "-o", "out", cwd=folder).returncode == 0
-    return folder / "out"
-
 
 @pytest.mark.second
-def test_the_numbers_of_a_study_follow_from_its_run(done):
-    result = ResultEntries(json.loads((done / "result.json").read_text("utf-8")))
+def test_the_numbers_of_a_study_follow_from_its_run(rated):
+    result = ResultEntries(json.loads((rated / "result.json").read_text("utf-8")))
     found = result["checks"]["relay"]
     plate = 750.0 / (0.825 * 0.75 * math.sqrt(3.0) * 400.0)
     assert found["setting"]["value"] == pytest.approx(plate, rel=1e-9)
     assert found["stall_current"]["value"] == pytest.approx(6.0 * plate, rel=1e-9)
     assert found["trip_class"] == "20" and found["suitable"] == ["5", "10A", "10"]
     start = result["start_up"]["start_time"]["value"]
-    with xr.open_dataset(done / "result.nc", group="start_up") as run:
+    with xr.open_dataset(rated / "result.nc", group="start_up") as run:
         current, time = np.abs(run["motor.i"].values), run["time"].values
     until = time <= start
     expected = np.trapezoid((current[until] / (7.2 * plate)) ** 2, time[until])
@@ -211,7 +194,7 @@ def test_the_numbers_of_a_study_follow_from_its_run(done):
     for row in rows:
         assert at(result, row["number"])["value"] == row["value"]["value"]
         assert all(at(result, place)["value"] is not None for place in row["numbers"].values())
-    page = (done / "report.html").read_text("utf-8")
+    page = (rated / "report.html").read_text("utf-8")
     assert "Classes of the thermal relay" in page
 
 
