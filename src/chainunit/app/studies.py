@@ -395,7 +395,7 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
     @cached_property
     def runs(self) -> Mapping[str, xr.Dataset]:
         """The time series of every run by its name, Datasets over ``time``: ``runs["jam_left"]["machine.tau"]``, with
-        units in ``attrs``; and those of the turns in steady running: ``runs["steady"]``. The file result.nc holds the
+        units in ``attrs``; ``runs["steady"]`` has the turns in steady running. The file result.nc holds the
         runs."""
         runs = {name: node.to_dataset() for name, node in series.tree(self.record).children.items()}
         return Named(runs | ({"steady": self.record.steady} if "steady" in self.record.answers else {}))

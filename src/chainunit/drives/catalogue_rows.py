@@ -114,7 +114,7 @@ class CatalogueKind:
     def items(
         self, rows: Iterable[CatalogueRow], others: Collection[str], faults: Faults
     ) -> list[CatalogueItem]:
-        """The things in these rows; those of the designations `others` stand before them. A wrong row is added to
+        """The things in these rows; things with the designations `others` stand before them. A wrong row is added to
         the `faults`."""
         items, taken = [], set(others)
         for row in rows:

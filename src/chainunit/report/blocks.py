@@ -206,7 +206,7 @@ class Report:
 
     @property
     def screen(self) -> list[Block]:
-        """The blocks of one screen, in order: the central ones, if there are any, else those of the short form."""
+        """The blocks of one screen, in order: the central ones, if any, else the blocks of the short form."""
         blocks = [*self.opening, *(block for s in self.sections for block in s.blocks)]
         if not any(_is_central(block) for block in blocks):
             return self.blocks("short")

@@ -24,7 +24,7 @@ class LiveMachine:
 
 @dataclass(frozen=True)
 class Live:
-    """A live machine, which `make` makes; `beside` is the noun of what has the values that the reader changes.
+    """A live machine, which `make` makes; `beside` is the noun of the thing whose values the reader changes.
 
     Raises
     ------

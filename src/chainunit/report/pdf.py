@@ -1,6 +1,6 @@
 """A sheet with its annex as PDF on A4, for people who sign paper: a title block, contents, page numbers.
 
-The blocks of a report are those of its page, with printed figures in place of those that move. The library makes
+It has the blocks of the page, with printed figures in place of moving ones. The library makes
 PDF/A-3u, which archives keep.
 """
 

@@ -26,7 +26,7 @@ _KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
 
 
 def _tables() -> tuple[KeyTable, ...]:
-    """The tables of a study file, and those of the columns of catalogues."""
+    """The tables of a study file, and the tables of the columns of catalogues."""
     return (*key_tables(), *catalogue_columns())
 
 

@@ -107,8 +107,8 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
 
 
 def _assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
-    """The values that the files leave out, but those that were chosen, which are the answer, and those of a motor of
-    a catalogue beside its surroundings."""
+    """The values that the files leave out, without chosen ones, which are the answer, and without the values of
+    a motor of a catalogue beside its surroundings."""
     for block in report_sections["given"].blocks if "given" in report_sections else ():
         if isinstance(block, b.Given):
             yield _kept(block, study, are_assumed=True)
@@ -118,7 +118,7 @@ def _assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> Itera
 
 
 def _not_assumed(section: b.Section, study: StudyRecord) -> b.Section:
-    """The section of given values without those that the sheet lists as assumptions; a value of an event that no file
+    """The section of given values without the assumptions, which the sheet lists; a value of an event that no file
     gives stands at the first of the events that have it."""
     blocks = (
         _once(_kept(block, study, are_assumed=False)) if isinstance(block, b.Given) else block

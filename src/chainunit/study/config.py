@@ -80,7 +80,7 @@ class FileContents:
     catalogues: tuple[Path, ...] = ()
     """the catalogues that it names"""
     unusual: tuple[UnusualValue, ...] = ()
-    """values of an unusual size, those of the linkage file that the study does not replace among them"""
+    """values of an unusual size, also in the linkage file if the study does not replace them"""
     tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)

@@ -154,7 +154,7 @@ class RandomRuns:
 
 
 def random_runs(plans: Mapping[str, Any]) -> list[RandomRuns]:
-    """Those of the `plans` of a study."""
+    """The plans of random overloads among the `plans` of a study."""
     return [plan for plan in plans.values() if isinstance(plan, RandomRuns)]
 
 

@@ -40,7 +40,7 @@ def need_of(
 
 
 def inverter_need(study: StudyRecord) -> InverterNeed | None:
-    """The inverter of a study, by its runs and those of the choice; None on the line. An overload that opens a
+    """The inverter of a study, by its runs and the runs of the choice; None on the line. An overload that opens a
     recommended torque limiter counts until the limiter opens."""
     rated, overload = study.drive.rated_current, study.config.drive.starter.overload
     if rated is None or study.config.drive.start != "inverter":

@@ -223,7 +223,7 @@ def export_study(
     """Write machine and motor of a study as an SSP package; returns its contents in words. Where the
     file leaves the motor open it is chosen first. The default experiment is as long as the study's
     start-up and steady running. With `all_inputs`, inputs without connection are connectors, too; `names` are
-    those of the variables of its FMUs.
+    the names of the variables of its FMUs.
 
     Raises
     ------

@@ -114,7 +114,7 @@ _LEFT_OUT = note(
 )
 _LENGTHS_OF_EXAMPLE = note(
     "lengths-of-example",
-    "The file gives the lengths {stated} of the chain unit. The lengths {others} are those of the example, and "
+    "The file gives the lengths {stated} of the chain unit. The lengths {others} come from the example, and "
     "may not suit them.",
     remedy="Give them, too, or rho = r/l, lam, mu, zeta, l and l1 in [ratios], from which all follow.",
 )

@@ -142,7 +142,7 @@ class _Part:
 
 
 def _parts(system: System, names: Names) -> dict[str, _Part]:
-    """The components with their start values; `names` are those of the variables of models."""
+    """The components with their start values; `names` are the names of the variables of models."""
     start: dict[str, dict[str, float]] = {name: {} for name in system.components}
     for full, value in system.values.items():
         name, _, variable = full.partition(".")

@@ -24,7 +24,7 @@ class Chains(OrganModel):
     def machine(self, machine: Machine, tables: Mapping[str, Any]) -> Machine:
         """The chain unit with chains."""
         chain: ChainOrgans = tables["chain"]
-        # a machine that is no chain unit is refused by its rule
+        # a rule refuses any other machine than a chain unit
         if not isinstance(machine, ChainUnitMachine):
             return machine
         return ChainUnitOfChains(machine.p, model=machine.model, law=chain, number=int(chain.rods))

@@ -167,7 +167,7 @@ class CouplingCheck(CouplingDuty):
 
 
 def start_factor(starts: float) -> float | None:
-    """The start factor by the `starts` an hour; None beyond those of the standard."""
+    """The start factor by the `starts` an hour; None for more starts than the standard covers."""
     return next((factor for most, factor in START_FACTORS if starts <= most), None)
 
 

@@ -118,9 +118,8 @@ def pulley_force(torque: float, diameter: float, factor: float) -> float:
 
 
 def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: float) -> GearRating:
-    """The ratings in the `table` of the file; for those that it leaves out, those of the gear that is `sold` in a
-    catalogue, and else the `torque_limit` of [gear]: the rated torque times the application factor, as of a gear of
-    a catalogue."""
+    """The ratings in the `table` of the file. A rating that it leaves out is taken from the gear that is `sold` in a
+    catalogue; without such a gear the `torque_limit` of [gear] is the rated torque times the application factor."""
     factor = table.application_factor
     sold = sold or GearRating(rated_torque=torque_limit / factor, application_factor=factor)
     torque = table if table.rated_torque else sold

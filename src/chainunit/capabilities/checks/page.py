@@ -33,8 +33,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     )
     if study.proposal is not None:
         lead += (
-            " These values are those of the simulated runs; the shares of limits in the answer are those of the "
-            f"duty of {study.proposal.name} (worst start, margins). They may differ."
+            " These values come from the simulated runs, the shares of limits in the answer from the duty of "
+            f"{study.proposal.name} (worst start, margins). They may differ."
         )
     yield b.Text(lead.format(place="under it"), "lead", "long")
     yield b.Text(lead.format(place="whose number stands behind it"), "lead", "sheet")

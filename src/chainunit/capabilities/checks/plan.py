@@ -20,7 +20,7 @@ _LEAST_STEP, _LEAST_FILLET = 0.98, 0.03
 
 
 class BearingPlan(NamedTuple):
-    """The `kind` of a bearing, one of `KINDS`, and the values of its table; None for those that it does not give."""
+    """The `kind` of a bearing, one of `KINDS`, and the values of its table, None for a missing key."""
 
     kind: str
     table: t.BearingTable

@@ -126,7 +126,7 @@ class StartingTable:
     )
     permitted: Value = quantity(
         "1",
-        "permitted starts an hour of the bare rotor without load; 0: those of the catalogue",
+        "permitted starts an hour of the bare rotor without load; 0: as in the catalogue",
         default=0.0,
         min=0.0,
         max=1e5,
@@ -347,7 +347,7 @@ TABLES = {
         title="Starts per hour",
         follows={
             "per_hour": "sizing.starts_per_hour, if the file has [sizing]",
-            "permitted": "those of the catalogue, if it has them",
+            "permitted": "the permitted starts in the catalogue, if it has them",
         },
     ),
     "gear_rating": FileSection(

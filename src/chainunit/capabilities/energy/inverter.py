@@ -4,8 +4,8 @@ The eight points are pairs of relative motor frequency and relative torque-produ
 of the reference drive is that by which the regulation EU 2019/1781 defines the classes of drives (IE1: within 25 % of
 it, IE2: less). Its distribution over the other seven points is typical of inverters with a diode bridge: a constant
 part for the electronics, conduction that grows with the current, switching and the bridge, which grow with the power.
-A drive on the market has to be IE2, so that its losses are below those of the reference drive by a quarter or more:
-that quarter is taken off here. The data sheet of its maker has the eight values.
+A drive on the market has to be IE2: its losses are smaller than the losses of the reference drive by a quarter or
+more. This quarter is taken off here. The data sheet of its maker has the eight values.
 """
 
 from __future__ import annotations

@@ -53,8 +53,8 @@ _TOO_LOW = warning(
 
 
 class MotorClassAnalysis(Analysis):
-    """The class, where a motor of the catalogue falls short of what is asked, or that is not known, or the study asks
-    for the energy."""
+    """The class of efficiency, if a motor of the catalogue is below the class that is asked for or has no known
+    class, or if the study asks for the energy."""
 
     name = "motor_class"
 

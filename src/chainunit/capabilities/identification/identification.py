@@ -50,7 +50,7 @@ class FittedNumber:
     """A sought number: its value in the best fit, `fitted`, which has a meaning together with those of all others;
     its mean `value` in the distribution that the recordings leave, its standard deviation, the ends of its interval
     of 95 %, and whether the recordings determine it. If the model does not describe the recordings, they tell nothing
-    about the number: deviation and interval are those that were known before."""
+    about the number: deviation and interval are the ones before the recordings."""
 
     unknown: Unknown
     fitted: float

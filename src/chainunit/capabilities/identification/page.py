@@ -58,7 +58,7 @@ def pictures(machine: IdentifiedMachine) -> tuple[str, ...]:
 def _writers(
     machine: IdentifiedMachine, report: b.Report, folder: Path, of_report: list[Writer]
 ) -> list[Writer]:
-    """With the study file of the identified values; without it if they are not those of the machine."""
+    """With the study file of the identified values; without it if they do not describe the machine."""
 
     def study_file() -> list[Path]:
         text = toml_text(identified_tables(machine, folder), identified_notes(machine))

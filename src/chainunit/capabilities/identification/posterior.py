@@ -257,9 +257,7 @@ class _CurvedDensity:
         return np.concatenate(kept)
 
 
-def _moved(
-    problem: Problem, z: Any, step: Any, size: float, workers: int
-) -> tuple[float, list[Comparison]]:
+def _moved(problem: Problem, z: Any, step: Any, size: float, workers: int) -> tuple[float, list[Comparison]]:
     """A step of that `size`, or of a part of it with which the machine runs, and the comparisons after it.
 
     Raises

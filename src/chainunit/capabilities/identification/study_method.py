@@ -37,7 +37,7 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
     def answers(self) -> pd.DataFrame:
         """The sought numbers by name: unit, value, standard deviation, interval of 95 % (low, high), and whether the
         recordings determine the number; the value of one that they do not determine is no number. If the model does
-        not describe the recordings, deviation and interval are those that were known before."""
+        not describe the recordings, deviation and interval are the ones before the recordings."""
         import pandas as pd
 
         rows = {

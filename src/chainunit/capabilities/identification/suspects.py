@@ -293,7 +293,7 @@ class _Search:
         return describes(problem, best, residual_tests(best), names)
 
     def _set(self, names: frozenset[str], freed: _Freed, excess: float) -> SuspectSet:
-        """The set of these suspects; those that changed most come first."""
+        """The set of these suspects; the ones that changed most come first."""
         values = freed.values(names)
         if names in self._fits:
             wider, best = self._fits[names]

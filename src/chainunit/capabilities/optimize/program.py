@@ -60,8 +60,8 @@ class Lanes:
 
 @dataclass(frozen=True)
 class Solution:
-    """A solution: the variables `z`, the multipliers of each row at its angles, and those of the bounds of the
-    variables (positive at an upper bound, negative at a lower one)."""
+    """A solution: the variables `z`, the multipliers of each row at its angles, and the multipliers of the bounds
+    of the variables (positive at an upper bound, negative at a lower one)."""
 
     z: Any
     lanes: list[Any]

@@ -30,9 +30,9 @@ class Row:
     `scale`, is at most 0, or exactly 0 if it is `equal`. `owner` is the limit that it belongs to, and `side` "min" or
     "max"; `times` the factor of the limit in `upper`.
 
-    A row "turn" or "slack" has one term and stands at each angle of the turn, at the speed or at those of the
-    slack-free range; "mean" and "rms" are over the turn; in "reached" and "slope" the angles are auxiliary variables,
-    and "slope" is the derivative by them; the term of "distance" is one of the model's requirements.
+    A row "turn" or "slack" has one term and stands at each angle of the turn, at the speed or at the speeds of the
+    slack-free range; "mean" and "rms" are over the turn; in "reached" and "slope" the angles are auxiliary
+    variables, and "slope" is the derivative by them; the term of "distance" is one of the model's requirements.
     """
 
     kind: Kind

@@ -212,7 +212,7 @@ class SizingFindings(Findings):
         )
 
     def currents_until_trip(self, study: StudyRecord) -> Mapping[str, float]:
-        """Those of the recommended torque limiter, if there is one."""
+        """By overload that opens the recommended torque limiter, the largest current of the motor until then [A]."""
         setting = self.coupling(study)
         if setting is None or setting.torque is None:
             return {}

@@ -56,8 +56,8 @@ def strong_enough(gears: Iterable[CatalogueGear], torque: float) -> list[Catalog
 def gear_faults(
     gears: Sequence[CatalogueGear], keys: Iterable[str], ratio: float, torque: float
 ) -> Iterator[InputError]:
-    """Refusals of keys beside the `gears` of a catalogue; `keys` are those of the file, `ratio` is `gear.ratio`, and
-    `torque` is `sizing.gear_torque` [N m]."""
+    """Refusals of keys beside the `gears` of a catalogue; `keys` are the keys of the file, `ratio` is `gear.ratio`,
+    and `torque` is `sizing.gear_torque` [N m]."""
     keys = set(keys)
     most = max(gear.transmission.torque_limit for gear in gears)
     if torque > most:

@@ -49,7 +49,7 @@ def ordered_gear(
     `inertia_factor` see `chainunit.drives.service_factor`."""
     margin, service = float(plan.demands.margin), plan.gear_factor(inertia_factor)
     if "gear.torque_limit" in study.config.drive.given and study.drive.gear_rating is None:
-        # a limit of one's own is checked without the factor of a catalogue
+        # a limit that the user gives is checked without the factor of a catalogue
         service = 1.0
     order = gear_order(study, setting, margin, service)
     if order is None or not study.drive.is_geared:

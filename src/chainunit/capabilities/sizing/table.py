@@ -144,7 +144,7 @@ SIZING_KEYS: Mapping[str, Any] = {
         Literal[OBJECTIVES],
         Field(
             PREFERENCE,
-            description="the drive that is chosen of those that fit: the first by the order of preference, or the "
+            description="the chosen drive of the fitting ones: the first by the order of preference, or the "
             "one of the lowest price of motor and gear",
         ),
     ),

@@ -27,7 +27,7 @@ LEAST_POINTS = 32
 """Least number of points behind shares."""
 _FOLDS = 8
 _TERMS, _CHOSEN, _DEGREE, _TOGETHER = 600, 150, 20, 3
-"""Largest number of terms to choose from and of those that are chosen, their largest degree in a parameter, and the
+"""Largest number of terms to choose from and of chosen terms, their largest degree in a parameter, and the
 largest number of parameters of a term."""
 _NO_GAIN = 1e-22
 """A part of the variance that is an error of rounding."""
@@ -110,8 +110,8 @@ def _most_between(x: Any, e: Any) -> float:
 
 
 def _terms(parameters: Sequence[SweptParameter]) -> Any:
-    """The degrees of the terms in each parameter, shape (terms, parameters): the constant, then those of the least
-    product of the degrees plus one (a hyperbolic cross)."""
+    """The degrees of the terms in each parameter, shape (terms, parameters): the constant, then the terms with the
+    least product of the degrees plus one (a hyperbolic cross)."""
     d = len(parameters)
     most = [
         min(_DEGREE, len(parameter.values) - 1) if parameter.values else _DEGREE for parameter in parameters

@@ -127,7 +127,7 @@ def interface_in(fmu: UnpackedFmu, model: Model | None = None) -> Interface | No
     Raises
     ------
     InputError
-        if variables or start values are not those of the model.
+        if variables or start values differ from the model.
     """
     names: Names = "flat" if fmu.description.variableNamingConvention == "flat" else "structured"
     if fmu.name == "ChainUnitFlexible" and model is None:

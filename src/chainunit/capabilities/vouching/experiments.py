@@ -123,7 +123,7 @@ def _largest(gaps: Mapping[str, float], sizes: Mapping[str, float]) -> Deviation
 
 
 def table_gap(one: Tables | None, wanted: Tables | None, fmu: UnpackedFmu) -> Deviation:
-    """The largest deviation of the tables of one reference experiment from those of the wanted one."""
+    """The largest deviation of the tables of one reference experiment from the wanted tables."""
     if one is None or wanted is None:
         return Deviation(0.0 if one is wanted else math.inf, "a reference experiment that one of both lacks")
     return max(deviation(table, other, fmu) for table, other in zip(one, wanted, strict=True))

@@ -59,7 +59,7 @@ def reason_without_runs(drive: Drive) -> str:
 
 
 def stand_in(drive: Drive) -> str:
-    """The organs of the turn on a page, if those of the study are others; else empty."""
+    """The organs of the turn on a page, if the study has other ones; else empty."""
     return "" if drive.simulated_machine.model is drive.machine.model else "two bars"
 
 
