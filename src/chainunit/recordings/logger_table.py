@@ -20,13 +20,15 @@ MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", "  ": "bla
 the first counts."""
 MISSING = re.compile(
     r"|[+-]?(?:nan|1\.#\w+)|n/?a|none|null|[+-]?(?:ol|0l|over(?:load|flow|range|flw)?|inf(?:inity)?)|-+|\*+|\?+|#+"
-    r"|#(?:n/a|value!|div/0!|num!|ref!|null!|wert!|nv)|err(?:or)?|invalid|nodata|bad|---?\.-*",
+    r"|#(?:n/a|value!|div/0!|num!|ref!|null!|wert!|nv)|err(?:or)?|invalid|bad|---?\.-*|\++|n\.a\.|[<(]null[>)]|o\.l\.?"
+    r"|ovld|ovfl|under(?:load|flow|range)?|burn-?out|open|undefined|fault|time-?out|no[ _-]?(?:data|signal|value)"
+    r"|(?:out[ _]of|over)[ _]range|bad[ _](?:input|value|data)|comm?[ _](?:fail|err)(?:ure|or)?",
     re.IGNORECASE,
 )
 """Cells without a measurement, and of a meter whose range is exceeded."""
 CLOCK = re.compile(
-    r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?(?P<h>\d{1,3}):(?P<m>\d{2})(?::(?P<s>\d{2}))?"
-    r"(?:[.,:](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
+    r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?(?P<h>\d{1,3}):"
+    r"(?P<m>\d{2}|\d(?=:))(?::(?P<s>\d{1,2}))?(?:[.,:;](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
 )
 """A time of the day, or one that has passed, such as 23:59:40.024, 11:59:40 PM, 59:40.0 and 0 days 00:00:00.024."""
 DATE = re.compile(
@@ -34,7 +36,7 @@ DATE = re.compile(
     r"|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
 )
 _COMPACT = re.compile(r"(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)(?=\D|$)")
-_NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eED][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
@@ -46,7 +48,10 @@ _WORDS = {
     "volts": "V", "amps": "A", "amperes": "A", "watts": "W", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "µs", "microseconds": "µs", "sek": "s", "secs": "s", "sekunden": "s", "newton meter": "N m",
     "newton-meter": "N m", "n-m": "N m", "lb-ft": "lbf ft", "lbf-ft": "lbf ft", "ft-lb": "lbf ft", "ft-lbf": "lbf ft",
-    "lb ft": "lbf ft", "ft lb": "lbf ft", "rev per min": "rev/min", "rpm": "rpm",
+    "lb ft": "lbf ft", "ft lb": "lbf ft", "ft lbs": "lbf ft", "ft-lbs": "lbf ft", "in lb": "lbf in", "in-lb": "lbf in",
+    "in lbs": "lbf in", "in-lbs": "lbf in", "in-lbf": "lbf in", "lb in": "lbf in", "lb-in": "lbf in", "lbf-in": "lbf in",
+    "newtonmeter": "N m", "newton-metre": "N m", "rev per min": "rev/min", "rpm": "rpm", "upm": "rev/min",
+    "tr/min": "rev/min", "umdr./min": "rev/min", "rps": "rev/s", "dps": "deg/s", "sek.": "s",
 }  # fmt: skip
 """Units as loggers write them, and as `chainunit.core.units` reads them."""
 
@@ -93,28 +98,34 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
     longest = max((len(line) for _, line in sample), default=1)
     sample = sample[: max(20, min(_SAMPLE, _SAMPLE * 1000 // longest))]
     mark = stated[1] if stated and stated[1] in MARKS else _mark_of([line for _, line in sample])
-    begin = _first_row(sample, mark)
+    begin, filled = _first_row(sample, mark)
     if begin < 0:
         raise InputError(
             f"{file}: is no table: its first line must be the heads of the columns, such as time [s],motor.i [A], "
-            "and the next ones must have a number for each of them"
+            "and the next ones must have a number for each of them, with commas, semicolons, tabs, bars or blanks "
+            "between them"
         )
     names = list(names)
     first = cells_of_line(sample[begin][1], mark)
     head, heads = _head_of(file, sample[:begin], first, mark, names)
     while not heads[-1]:
         heads.pop()
+    # no tab stands in a head, and some writers have a head for remarks of which no row has a cell
+    unfilled = heads[len(first) :] if mark == "\t" else []
+    heads = heads[: len(heads) - len(unfilled)]
     if len(first) < len(heads):
         raise InputError(
             f"{file}, line {sample[head][0]}: the head has {len(heads)} cells, and the rows {len(first)}: put a head "
             f"with {MARKS[mark]} in it into quotation marks, or add the cells that are missing"
         )
-    rows_of_units = [cells_of_line(line, mark) for _, line in sample[head + 1 : begin]]
-    units = next((row for row in rows_of_units if _is_of_units(row, len(heads))), [])
+    below = [cells_of_line(line, mark) for _, line in sample[head + 1 : begin]]
+    units = next((row for row in below if _is_of_units(row, len(heads))), [])
     named = [name_and_unit(head_cell, names) for head_cell in heads]
     units = [unit or bare_unit(units[k]) if k < len(units) else unit for k, (_, unit) in enumerate(named)]
     start = next(k for k, (number, _) in enumerate(lines) if number == sample[begin][0])
-    rows, numbers, left_out = _body(file, lines[start:], mark, heads, first)
+    rows, numbers, left_out = _body(file, lines[start:], mark, [heads, *below], filled, first)
+    if unfilled:
+        left_out.append(f"the head {printable(', '.join(unfilled))} without cells")
     if head > 0:
         left_out.insert(0, f"{head} {'line' if head == 1 else 'lines'} before the head")
     if len(rows) < FEWEST:
@@ -175,7 +186,7 @@ def _unit_behind(rest: str) -> str:
 
 def bare_unit(text: str) -> str:
     """A unit without brackets, as `chainunit.core.units` reads it."""
-    text = text.strip().strip("[](){}<>").strip()
+    text = re.sub("[·∙•⋅*]", " ", text.strip().strip("[](){}<>").strip())
     return _WORDS.get(text.lower(), text)
 
 
@@ -231,20 +242,23 @@ def _mark_of(lines: Sequence[str]) -> str:
         counts = Counter(len(row) for line in lines if _is_row(row := cells_of_line(line, mark)))
         return max(counts.values(), default=0)
 
-    return max(MARKS, key=fitting)
+    counts = {mark: fitting(mark) for mark in MARKS}
+    # lines above the head may be rows, too, by a mark that stands within their cells
+    return next(mark for mark in MARKS if counts[mark] >= 0.95 * max(counts.values()))
 
 
-def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> int:
-    """The place of the first row of measurements, which has data where most rows have them; -1 without one."""
+def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> tuple[int, tuple[bool, ...]]:
+    """The place of the first row of measurements, which has data where most rows have them, and where these are; -1
+    without one."""
     rows = [cells_of_line(line, mark) for _, line in sample]
     shapes = [
         tuple(map(_is_data, row)) if _is_row(row) and not row[0].startswith(_COMMENTS) else () for row in rows
     ]
     usual = Counter(shape for shape in shapes if shape).most_common(1)
     if not usual:
-        return -1
+        return -1, ()
     wanted = usual[0][0]
-    return next(
+    place = next(
         k
         for k, (row, shape) in enumerate(zip(rows, shapes, strict=True))
         if len(shape) == len(wanted)
@@ -253,6 +267,7 @@ def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> int:
             for cell, has, needs in zip(row, shape, wanted, strict=True)
         )
     )
+    return place, wanted
 
 
 def _head_of(
@@ -302,11 +317,18 @@ def _is_of_units(cells: Sequence[str], count: int) -> bool:
 
 
 def _body(
-    file: Path, lines: Sequence[tuple[int, str]], mark: str, heads: Sequence[str], first: Sequence[str]
+    file: Path,
+    lines: Sequence[tuple[int, str]],
+    mark: str,
+    above: Sequence[Sequence[str]],
+    filled: Sequence[bool],
+    first: Sequence[str],
 ) -> tuple[list[list[str]], list[int], list[str]]:
-    """The rows of measurements, the numbers of their lines, and what was left out, in words."""
+    """The rows of measurements, the numbers of their lines, and what was left out, in words. The lines `above` the
+    `first` row, from the head on, may be repeated on each page; most rows have data where they are `filled`."""
+    heads, pages = above[0], {tuple(map(str.lower, cells)) for cells in above}
     width = len(heads)
-    key = next((k for k, cell in enumerate(first[:width]) if _is_data(cell)), -1)
+    key = next((k for k, is_filled in enumerate(filled[:width]) if is_filled), -1)
     if key < 0:
         raise InputError(f"{file}: no column with numbers has a head; write a head for each column")
     # a date and a clock between blanks are one cell under one head
@@ -327,8 +349,12 @@ def _body(
                 cells, remarks = cut, remarks + 1
             if len(cells) > width and not any(cells[width:]):
                 cells = cells[:width]
-            if [cell.lower() for cell in cells] == [cell.lower() for cell in heads]:
+            if tuple(map(str.lower, cells)) in pages:
                 repeated += 1
+                # the title of the page
+                while strange and (not rows or strange[-1][0] > numbers[-1]):
+                    strange.pop()
+                    repeated += 1
                 continue
             if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
                 strange.append((number, cells))
@@ -345,8 +371,8 @@ def _body(
     if strange and (wrong or len(strange) > _FOOTER or not rows):
         number, cells = (wrong or strange)[0]
         raise InputError(f"{file}, line {number}: {_words(cells, heads, mark)}")
-    counts = ((repeated, "repeated head"), (remarks, "comment"))
-    left_out = [f"{count} {noun}{'s' if count > 1 else ''}" for count, noun in counts if count]
+    counts = ((repeated, "line", " of repeated heads"), (remarks, "comment", ""))
+    left_out = [f"{count} {noun}{'s' if count > 1 else ''}{more}" for count, noun, more in counts if count]
     if strange:
         noun, verb = ("line", "is no row") if len(strange) == 1 else ("lines", "are no rows")
         left_out.append(f"{len(strange)} {noun} at the end that {verb}")
@@ -386,8 +412,8 @@ def _words(cells: Sequence[str], heads: Sequence[str], mark: str) -> str:
     if len(cells) > len(heads):
         if mark == ",":
             return (
-                f"{count}: a comma stands within a number or a text; put semicolons between the columns, write "
-                "decimal points, or put the cell in quotation marks"
+                f"{count}: a comma stands within a number or a text, or a head is missing; put semicolons between the "
+                "columns, write decimal points, put the cell in quotation marks, or write a head for each column"
             )
         return (
             f"{count}: {MARKS[mark]} stand within a cell, or a head is missing; put the cell in quotation marks, or "
