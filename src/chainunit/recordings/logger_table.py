@@ -54,6 +54,8 @@ _WORDS = {
     "tr/min": "rev/min", "umdr./min": "rev/min", "rps": "rev/s", "dps": "deg/s", "sek.": "s",
 }  # fmt: skip
 """Units as loggers write them, and as `chainunit.core.units` reads them."""
+NAMES_IN_ROWS = "a table with the name of the quantity in each row needs a column for each quantity instead"
+"""The remedy for a table that has the quantities below one another."""
 
 
 @dataclass(frozen=True)
@@ -225,14 +227,15 @@ def cells_of_line(line: str, mark: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])]
 
 
-def _is_data(cell: str) -> bool:
+def is_data(cell: str) -> bool:
+    """Whether a cell has a number, with a unit or without one, or a time."""
     return bool(_NUMBER.fullmatch(cell) or WITH_UNIT.fullmatch(cell)) or is_time(cell)
 
 
 def _is_row(cells: Sequence[str]) -> bool:
     """Whether cells are those of a row of measurements: at least half of those that are not empty."""
     filled = [cell for cell in cells if not MISSING.fullmatch(cell)]
-    return len(cells) > 1 and 2 * sum(map(_is_data, filled)) >= max(1, len(filled))
+    return len(cells) > 1 and 2 * sum(map(is_data, filled)) >= max(1, len(filled))
 
 
 def _mark_of(lines: Sequence[str]) -> str:
@@ -252,7 +255,7 @@ def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> tuple[int, tuple
     without one."""
     rows = [cells_of_line(line, mark) for _, line in sample]
     shapes = [
-        tuple(map(_is_data, row)) if _is_row(row) and not row[0].startswith(_COMMENTS) else () for row in rows
+        tuple(map(is_data, row)) if _is_row(row) and not row[0].startswith(_COMMENTS) else () for row in rows
     ]
     usual = Counter(shape for shape in shapes if shape).most_common(1)
     if not usual:
@@ -291,10 +294,8 @@ def _head_of(
             best, place, heads = matching, k, cells
     if not heads:
         more = ""
-        if any(not _is_data(cell) for cell in first) and any(map(is_time, first)):
-            more = (
-                "; a table with the name of the quantity in each row needs a column for each quantity instead"
-            )
+        if any(not is_data(cell) for cell in first) and any(map(is_time, first)):
+            more = f"; {NAMES_IN_ROWS}"
         raise InputError(
             f"{file}: has no head: its first row has values; write the heads of the columns into a line above it, "
             f"such as time [s],motor.i [A]{more}"
@@ -356,7 +357,7 @@ def _body(
                     strange.pop()
                     repeated += 1
                 continue
-            if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
+            if len(cells) != width or not (is_data(cells[key]) or MISSING.fullmatch(cells[key])):
                 strange.append((number, cells))
                 continue
         elif "#" in cells[-1] and (last := _REMARK.sub("", f" {cells[-1]}").strip()) != cells[-1]:
@@ -382,7 +383,7 @@ def _body(
 def _may_end(cells: Sequence[str], key: int, width: int, is_last: bool) -> bool:
     """Whether a line that is no row may stand below all rows: a footer, without a number in the column `key`, or the
     last row, which is cut."""
-    has_number = key < len(cells) and _is_data(cells[key])
+    has_number = key < len(cells) and is_data(cells[key])
     return not has_number or (is_last and len(cells) < width)
 
 

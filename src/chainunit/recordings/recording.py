@@ -103,7 +103,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     def others(place: int) -> frozenset[str]:
         return frozenset[str]().union(*(shown for other, shown in signs.items() if other != place))
 
-    if not time_from:
+    if not time_from and not any(_is_named(head, names.get("time", "time")) for head in table.heads):
         text = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
         faults.add(
             [InputError(f"{file}: has no column time [s]{text}{remedy('time', table.heads)}, or add it")]
@@ -122,10 +122,12 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         times = times_of(table, time_from, others(time_from[0])) if time_from else None
     faults.refuse()
     assert times is not None
-    raw = {place: numbers(table, place, others(place), name == "mark") for name, place in places.items()}
+    raw = {place: numbers(table, place, others(place), name) for name, place in places.items()}
     whole, lost = lost_rows(table, {time_from[0]: times.missing, **raw})
     kept = whole[times.kept]
     rows = times.kept[kept]
+    if "mark" in places:
+        raw[places["mark"]] = _in_next_row(raw[places["mark"]], whole, rows)
     columns, remarks = _quantities(
         {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in places.items()}
     )
@@ -249,6 +251,16 @@ def _places(table: LoggerTable, names: Mapping[str, str], faults: Faults) -> dic
 
 def _is_named(head: str, name: str) -> bool:
     return name_and_unit(head, [name])[0].lower() == name.lower()
+
+
+def _in_next_row(mark: Any, whole: Any, rows: Any) -> Any:
+    """The marks, of which those in rows without a number stand in the next one of the `rows` in time."""
+    order = -1 if rows[0] > rows[-1] else 1
+    lost = np.flatnonzero((mark > 0.5) & ~whole)
+    after = np.searchsorted(order * rows, order * lost)
+    mark = mark.copy()
+    mark[rows[after[after < len(rows)]]] = 1.0
+    return mark
 
 
 _OF_COUNTS = ("", "1", "-", "0/1", "bool", "boolean", "count", "counts", "pulses", "imp", "inc")
