@@ -437,7 +437,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
                     f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and does not resolve the rows; write "
                     "hh:mm:ss.fff"
                 )
-        if clock["f"] and len(clock["f"]) < 3 and clock[0][clock.start("f") - clock.start() - 1] in ":;":
+        if clock["f"] and len(clock["f"]) < 3 and clock[0][clock.start("f") - clock.start() - 1] == ":":
             raise InputError(
                 f"{table.place_of(k, places[0])}: {printable(clock[0], 40)} may end with hundredths, with frames or "
                 "with ms; write hh:mm:ss.fff"

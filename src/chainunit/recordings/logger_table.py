@@ -28,7 +28,7 @@ MISSING = re.compile(
 """Cells without a measurement, and of a meter whose range is exceeded."""
 CLOCK = re.compile(
     r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?(?P<h>\d{1,3}):"
-    r"(?P<m>\d{2}|\d(?=:))(?::(?P<s>\d{1,2}))?(?:[.,:;](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
+    r"(?P<m>\d{2}|\d(?=:))(?::(?P<s>\d{1,2}))?(?:[.,:](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
 )
 """A time of the day, or one that has passed, such as 23:59:40.024, 11:59:40 PM, 59:40.0 and 0 days 00:00:00.024."""
 DATE = re.compile(
@@ -74,6 +74,11 @@ class LoggerTable:
     def column(self, place: int) -> list[str]:
         """The cells of a column."""
         return [cells[place] for cells in self.rows]
+
+    def has_numbers(self, place: int) -> bool:
+        """Whether the first row of a column has a number, and no time."""
+        cell = self.rows[0][place]
+        return is_data(cell) and not is_time(cell)
 
     def place_of(self, row: int, place: int) -> str:
         """The file, line, column and head of a cell, in words."""

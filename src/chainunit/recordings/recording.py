@@ -105,16 +105,19 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
 
     if not time_from and not any(_is_named(head, names.get("time", "time")) for head in table.heads):
         text = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
-        faults.add(
-            [InputError(f"{file}: has no column time [s]{text}{remedy('time', table.heads)}, or add it")]
+        likely = sorted(
+            table.heads,
+            key=lambda head: (not has_times(table, table.heads.index(head)), "time" not in head.lower()),
         )
+        faults.add([InputError(f"{file}: has no column time [s]{text}{remedy('time', likely)}, or add it")])
     if not places:
         text = ", ".join(
             f"{measurand.name} [{measurand.unit}]"
             for measurand in MEASURANDS.values()
             if measurand.name != "time"
         )
-        text += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
+        likely = [head for k, head in enumerate(table.heads) if k not in time_from and table.has_numbers(k)]
+        text += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', (likely or table.heads)[::-1])}"
         faults.add([InputError(f"{file}: has no column of a known quantity, such as {text}")])
     with faults.collected():
         if len(time_from) == 1 and table.units[time_from[0]] and not has_times(table, time_from[0]):
@@ -297,6 +300,9 @@ def _quantities(columns: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
         currents = [columns[name] for name in phases]
         quantities = {"motor.i": rms_of_phases(currents) if len(phases) > 1 else currents[0], **quantities}
         remarks.append(f"motor.i is {'the RMS of ' if len(phases) > 1 else ''}{', '.join(phases)}")
+    if "mark" in quantities and set(np.unique(quantities["mark"])) == {-1.0, 0.0}:
+        # true in Basic
+        quantities["mark"] = np.abs(quantities["mark"])
     if "motor.count" in quantities:
         quantities["motor.count"], wraps = unwrapped(quantities["motor.count"])
         if wraps:
