@@ -34,8 +34,8 @@ STUCK = 0.2
 """Longest time for which a column with noise may keep its value [s]."""
 CLIPPED = 2e-3
 """Largest share of rows at the same extreme value, in parts of all rows."""
-JUMP = 1e4
-"""Fall of the count of an encoder from which it began anew."""
+JUMP, FASTER = 100.0, 1.5
+"""Fall of the count of an encoder from which it began anew, if it falls faster by this factor than it ever rises."""
 STANDS = 0.05
 """Mean speed, in parts of the expected one, below which the machine stands."""
 SAME = 1.2
@@ -508,10 +508,11 @@ def _counted(recording: Recording) -> Iterator[InputError]:
     if count is None:
         return
     steps = np.diff(count)
-    place = int(np.argmin(steps))
+    rates = steps / np.diff(recording.time)
+    place = int(np.argmin(rates))
     if count[-1] < count[0] and np.median(steps) < 0.0:
         yield _fault(recording, "motor.count", "counts down, while the motor turns forward: change its sign")
-    elif steps[place] < -JUMP:
+    elif steps[place] < -JUMP and rates[place] < -FASTER * np.max(rates):
         instant = recording.time[place + 1]
         yield _fault(
             recording, "motor.count",

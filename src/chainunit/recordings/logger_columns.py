@@ -56,7 +56,9 @@ _SIGN = re.compile(r"^([+-]) +(?=\d)", re.MULTILINE)
 _OF_FORTRAN = re.compile(r"(?<=[\d.,])[dD](?=[+-]\d)")
 _OF_ACCOUNTS = re.compile(r"^(?:\(([\d.,' ]+)\)|([\d.,' ]+)-)$", re.MULTILINE)
 """Negative numbers in parentheses, or with their sign behind."""
-_ABSENT = re.compile(r"^[+-]?(?:9{4,}(?:\.[09]*)?|[67]999(?:\.0*)?|32768|1(?:\.0*)?e\+?3\d)$", re.MULTILINE | re.IGNORECASE)
+_ABSENT = re.compile(
+    r"^[+-]?(?:9{4,}(?:\.[09]*)?|[67]999(?:\.0*)?|32768|1(?:\.0*)?e\+?3\d)$", re.MULTILINE | re.IGNORECASE
+)
 """Numbers in place of a missing measurement, if all others are far smaller."""
 _HALF = re.compile(r"[AaPp]\.?[Mm]\.?")
 """The half of a day of a clock of 12 hours."""
@@ -105,7 +107,9 @@ def _no_number(table: LoggerTable, row: int, place: int, quantity: str) -> Input
             wanted = f"in the unit of the head, {unit}" if unit else "in one unit, which stands in the head"
             remedy = f"write all numbers of this column in full, {wanted}"
         elif len(cell_units) > 1:
-            remedy = f"and the units differ ({', '.join(cell_units)}); write all in one, which stands in the head"
+            remedy = (
+                f"and the units differ ({', '.join(cell_units)}); write all in one, which stands in the head"
+            )
         else:
             remedy = f"write [{cell_units[0]}] into the head, and take it out of all cells"
         remedy = f"alone, {remedy}"
@@ -114,7 +118,9 @@ def _no_number(table: LoggerTable, row: int, place: int, quantity: str) -> Input
     elif texts > LOST * len(cells):
         remedy = "as in most rows; write numbers, or give the column another head, so that it is left out"
     joint = " " if remedy.startswith(("alone", "and", "as")) else "; "
-    return InputError(f"{table.place_of(row, place)}: {printable(cells[row], 40)} is no number{joint}{remedy}")
+    return InputError(
+        f"{table.place_of(row, place)}: {printable(cells[row], 40)} is no number{joint}{remedy}"
+    )
 
 
 def _fits(text: str, unit: str) -> bool:

@@ -27,8 +27,9 @@ MISSING = re.compile(
 )
 """Cells without a measurement, and of a meter whose range is exceeded."""
 CLOCK = re.compile(
-    r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?(?P<h>\d{1,3}):"
-    r"(?P<m>\d{2}|\d(?=:))(?::(?P<s>\d{1,2}))?(?:[.,:](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
+    r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?"
+    r"(?P<h>\d{1,3}):(?P<m>\d{2}|\d(?=:))(?::(?P<s>\d{1,2}))?(?:[.,:](?P<f>\d+))?"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
 )
 """A time of the day, or one that has passed, such as 23:59:40.024, 11:59:40 PM, 59:40.0 and 0 days 00:00:00.024."""
 DATE = re.compile(
@@ -48,8 +49,9 @@ _WORDS = {
     "volts": "V", "amps": "A", "amperes": "A", "watts": "W", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "µs", "microseconds": "µs", "sek": "s", "secs": "s", "sekunden": "s", "newton meter": "N m",
     "newton-meter": "N m", "n-m": "N m", "lb-ft": "lbf ft", "lbf-ft": "lbf ft", "ft-lb": "lbf ft", "ft-lbf": "lbf ft",
-    "lb ft": "lbf ft", "ft lb": "lbf ft", "ft lbs": "lbf ft", "ft-lbs": "lbf ft", "in lb": "lbf in", "in-lb": "lbf in",
-    "in lbs": "lbf in", "in-lbs": "lbf in", "in-lbf": "lbf in", "lb in": "lbf in", "lb-in": "lbf in", "lbf-in": "lbf in",
+    "lb ft": "lbf ft", "ft lb": "lbf ft", "ft lbs": "lbf ft", "ft-lbs": "lbf ft", "in lb": "lbf in",
+    "in-lb": "lbf in", "in lbs": "lbf in", "in-lbs": "lbf in", "in-lbf": "lbf in", "lb in": "lbf in",
+    "lb-in": "lbf in", "lbf-in": "lbf in",
     "newtonmeter": "N m", "newton-metre": "N m", "rev per min": "rev/min", "rpm": "rpm", "upm": "rev/min",
     "tr/min": "rev/min", "umdr./min": "rev/min", "rps": "rev/s", "dps": "deg/s", "sek.": "s",
 }  # fmt: skip
@@ -418,8 +420,8 @@ def _words(cells: Sequence[str], heads: Sequence[str], mark: str) -> str:
     if len(cells) > len(heads):
         if mark == ",":
             return (
-                f"{count}: a comma stands within a number or a text, or a head is missing; put semicolons between the "
-                "columns, write decimal points, put the cell in quotation marks, or write a head for each column"
+                f"{count}: a comma stands within a number or a text, or a head is missing; put semicolons between "
+                "the columns, write decimal points, put the cell in quotation marks, or write a head for each column"
             )
         return (
             f"{count}: {MARKS[mark]} stand within a cell, or a head is missing; put the cell in quotation marks, or "
