@@ -394,6 +394,104 @@ FORMATS = {
         .replace("\n1.000", f"\n{','.join(HEADS)}\n1.000"),
         {},
     ),
+    "LabVIEW, a preamble of pairs and a head for remarks without cells": (
+        table(
+            plain,
+            (*HEADS[:3], "mark"),
+            "\t",
+            before="LabVIEW Measurement\t\n"
+            + "".join(f"Date{k}\t2023/06/19 23:59:59 a\n" for k in range(12))
+            + "***End_of_Header***\t",
+        ).replace("mark\n", "mark\tComment\n"),
+        {},
+    ),
+    "Tektronix TDS, settings beside the first rows": (
+        table(
+            lambda k: [
+                *(("Record Length", "120", ""), ("Source", "CH1", ""), ("", "", ""))[min(k, 2)],
+                f"{T[k]:.3f}",
+            ],
+            ("a", "b", "c", *HEADS),
+        ),
+        {},
+    ),
+    "Rockwell, ms in a column without zeros": (
+        table(
+            lambda k: [
+                f"{moment(k):%m/%d/%Y}",
+                f"{moment(k):%H:%M:%S}",
+                str(moment(k).microsecond // 1000),
+                " ",
+            ],
+            ("Date", "Time", "Millitm", "Marker", *HEADS[1:]),
+            ";",
+        ),
+        {},
+    ),
+    "a fraction of a second in a column": (
+        table(
+            lambda k: [f"{moment(k):%H:%M:%S}", f"0.{moment(k).microsecond // 1000:03d}"],
+            ("Time", "Fractional Seconds", *HEADS[1:]),
+        ),
+        {},
+    ),
+    "AM and PM in a column": (
+        table(
+            lambda k: [f"{moment(k):%m/%d/%Y}", f"{moment(k):%I:%M:%S.%f}", f"{moment(k):%p}"],
+            ("Date", "Time", "AM/PM", *HEADS[1:]),
+        ),
+        {},
+    ),
+    "a clock without zeros before its parts": (
+        table(
+            lambda k: [
+                f"{moment(k).hour}:{moment(k).minute}:{moment(k).second}.{moment(k).microsecond // 1000:03d}"
+            ],
+            ("time", *HEADS[1:]),
+        ),
+        {},
+    ),
+    "SAP, bars, rules and signs behind": (
+        f"{'-' * 40}\n|"
+        + table(
+            lambda k: [
+                german(k)[0],
+                grouped(abs(TAU[k]), ".", ",") + "-" * bool(TAU[k] < 0),
+                german(k)[2],
+                f"{MARK[k]}|",
+            ],
+            mark="|",
+        ).replace("\n", "\n|")
+        + f"{'-' * 40}\n",
+        {},
+    ),
+    "negative numbers in parentheses": (
+        table(lambda k: [*plain(k), f"({-TAU[k]:.2f})" if TAU[k] < 0 else f"{TAU[k]:.2f}"]),
+        {},
+    ),
+    "exponents with d": (table(lambda k: [*plain(k), f"{TAU[k]:.8e}".replace("e", "d")]), {}),
+    "true as -1": (table(lambda k: [*plain(k), f"{TAU[k]:.2f}", f"{W[k]:.5f}", str(-MARK[k])]), {}),
+    "booleans in French": (table(lambda k: [*german(k)[:3], ("FAUX", "VRAI")[MARK[k]]], mark=";"), {}),
+    "booleans of a database": (
+        table(lambda k: [*plain(k), f"{TAU[k]:.2f}", f"{W[k]:.5f}", "ft"[MARK[k]]]),
+        {},
+    ),
+    "titles of pages, heads and units again": (
+        re.sub(
+            r"^(0\.400|1\.000),",
+            "\nPage 2, drive 1\n\ntime,crank.tau,crank.w,mark\ns,N m,rad/s,\n\\1,",
+            table(plain, ("time", "crank.tau", "crank.w", "mark"), units=("s", "N m", "rad/s", "")),
+            flags=re.MULTILINE,
+        ),
+        {},
+    ),
+    "a torque in in-lb and a speed in Upm": (
+        table(
+            lambda k: [*plain(k), f"{TAU[k] / 0.1129848290276167:.9f}", f"{W[k] * 30 / np.pi:.12f}"],
+            (HEADS[0], "crank.tau [in-lb]", "crank.w [Upm]", HEADS[3]),
+        ),
+        {},
+    ),
     "doubled rows": (
         table(plain).replace("\n0.400", f"\n0.380,{TAU[19]:.2f},{W[19]:.5f},{MARK[19]}\n0.400"),
         {},
@@ -405,7 +503,7 @@ FORMATS = {
 def check(recording, keep=slice(None), tol=2e-6):
     np.testing.assert_allclose(recording.time - recording.time[0], T[keep] - T[keep][0], atol=tol)
     np.testing.assert_allclose(recording.columns["crank.tau"], TAU[keep], rtol=1e-6)
-    np.testing.assert_array_equal(recording.columns["crank.w"], W[keep])
+    np.testing.assert_allclose(recording.columns["crank.w"], W[keep], rtol=1e-12)
     np.testing.assert_array_equal(recording.columns["mark"], MARK[keep])
 
 
@@ -429,7 +527,36 @@ def test_encodings_by_their_marks(tmp_path, encoding, mark):
 
 
 @pytest.mark.parametrize(
-    "cell", ["", "NaN", "OL", "-OL", "#N/A", "---", "9.9E+37", "1.#QNAN", "inf", "Overload"]
+    "cell",
+    [
+        *(
+            "",
+            "NaN",
+            "OL",
+            "-OL",
+            "#N/A",
+            "---",
+            "9.9E+37",
+            "1.#QNAN",
+            "inf",
+            "Overload",
+            "+++++++",
+            "BURNOUT",
+        ),
+        *(
+            "O.L",
+            "OVLD",
+            "UNDER",
+            "No Data",
+            "n.a.",
+            "Bad Input",
+            "Timeout",
+            "<null>",
+            "Out of range",
+            "Comm Fail",
+        ),
+        *("-99999.99", "99999", "1.0E+30"),
+    ],
 )
 def test_cells_without_a_number_are_left_out_and_counted(tmp_path, cell):
     lines = table(plain).splitlines()
@@ -450,6 +577,24 @@ def test_a_time_without_a_number_is_counted(tmp_path):
     recording = read_recording(written(tmp_path, table(plain).replace("\n0.400,", "\nnan,")))
     check(recording, np.arange(COUNT) != 20)
     assert "left out: 1 row without a number (nan)" in recording.understood
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_mark_in_a_row_without_a_number_stands_in_the_next_one(tmp_path, order):
+    """In time, also if the newest row is the first one."""
+    head, *rows = table(plain).splitlines()
+    passed = int(np.flatnonzero(MARK)[1])
+    rows[passed] = rows[passed].replace(f",{TAU[passed]:.2f},", ",NaN,")
+    recording = read_recording(written(tmp_path, "\n".join([head, *rows[::order]])))
+    moved = np.roll(MARK, 1) * (np.arange(COUNT) == passed + 1) + MARK
+    keep = np.arange(COUNT) != passed
+    np.testing.assert_array_equal(recording.columns["mark"], moved[keep])
+    np.testing.assert_array_equal(recording.columns["crank.tau"], TAU[keep])
+
+
+def test_large_numbers_of_nines_are_measurements_among_their_like(tmp_path):
+    text = table(lambda k: [*plain(k), "9999.00" if k == 40 else f"{TAU[k]:.2f}"])
+    assert read_recording(written(tmp_path, text)).columns["crank.tau"][40] == 9999.0
 
 
 def replaced(text, *changes):
@@ -653,6 +798,101 @@ REMEDIES = {
         "has no column time [s]",
         'columns = { "time" = "start" }',
         {"time": "start"},
+    ),
+    "thousands beside a clock with a point": (
+        table(lambda k: [f"{moment(k):%H:%M:%S.%f}", f"{TAU[k] / 1000 + 2:.3f}"], ("time", HEADS[1]), ";"),
+        "may be",
+        "without a mark of thousands",
+        lambda _: table(lambda k: [f"{T[k]:.3f}"], mark=";"),
+    ),
+    "a long table with heads": (
+        "name;time [s];crank.tau [N m]\n"
+        + "".join(f"{n};{T[k]};{x}\n" for k in range(COUNT) for n, x in (("tau", TAU[k]), ("w", W[k]))),
+        "column name: changes from tau to w at one time",
+        "needs a column for each quantity",
+        lambda _: table(plain),
+    ),
+    "a long table with one quantity below the other": (
+        "name;time [s];crank.tau [N m]\n"
+        + "".join(f"{n};{T[k]};{x[k]}\n" for n, x in (("tau", TAU), ("w", W)) for k in range(COUNT)),
+        "column name: changes from tau to w at one time",
+        "needs a column for each quantity",
+        lambda _: table(plain),
+    ),
+    "frames of a clock": (
+        table(lambda k: [f"12:00:{k // 25:02d}:{k % 25:02d}"], ("time", *HEADS[1:])),
+        "12:00:00:00 may end with hundredths, with frames or with ms",
+        "write hh:mm:ss.fff",
+        lambda _: table(plain),
+    ),
+    "ms without zeros": (
+        table(lambda k: [f"{moment(k):%H:%M:%S}.{moment(k).microsecond // 1000}"], ("time", *HEADS[1:])),
+        "has parts of a second of 1 to 3 digits, and the times run backwards",
+        "write ms with zeros before them, such as .024",
+        lambda _: table(lambda k: [f"{moment(k):%H:%M:%S.%f}"], ("time", *HEADS[1:])),
+    ),
+    "a time that no reader knows": (
+        table(lambda k: [f"{moment(k):%d/%m/%Y %Hh%Mm%S.%f}"], ("time", *HEADS[1:])),
+        "is no number and no time that can be read",
+        "write it as 2023-06-19 23:59:40.024",
+        lambda text: replaced(text, (r"(\d\d)/06/2023 (\d\d)h(\d\d)m", r"2023-06-\1 \2:\3:")),
+    ),
+    "prefixes behind numbers": (
+        table(lambda k: [*plain(k), f"{TAU[k] / 1000:.5f}k"]),
+        "k is no number alone",
+        "write all numbers of this column in full, in the unit of the head, N m",
+        lambda _: table(plain),
+    ),
+    "cells in percent": (
+        table(lambda k: [*plain(k), f"{TAU[k] / 140:.5f} %"]),
+        " % is no number alone",
+        "in the unit of the head, N m",
+        lambda _: table(plain),
+    ),
+    "numbers without the E of their exponents": (
+        table(lambda k: [*plain(k), f"{TAU[k]:.6e}".replace("e", "")]),
+        "is no number as in most rows",
+        "write numbers",
+        lambda _: table(plain),
+    ),
+    "a mark of other words": (
+        table(lambda k: [*plain(k), f"{TAU[k]:.2f}", f"{W[k]:.5f}", "-x"[MARK[k]]]),
+        "x is no number",
+        "write 0 and 1, off and on",
+        lambda text: replaced(text, ("-$", "0"), ("x$", "1")),
+    ),
+    "rows in another order than their times": (
+        table(lambda k: [f"{T[k] + 0.05 * (k % 4 == 2):.3f}"]),
+        "the times run backwards at 30 rows",
+        "sort the rows by time",
+        lambda text: table(plain),
+    ),
+    "one name for two times": (
+        table(lambda k: [f"{T[k]:.3f}", f"{1000 * T[k]:.0f}"], (HEADS[0], "Time [ms]", *HEADS[1:])),
+        "columns 1 and 2 have the head time",
+        'columns = { "time" = "time [s]" }',
+        {"time": "time [s]"},
+    ),
+    "times of a database": (
+        table(
+            lambda k: ["0", f"{START}", f"{START}", f"{moment(k)}.000"[:23]],
+            ("table", "_start", "_stop", "_time", *HEADS[1:]),
+        ),
+        'was "_time" meant?',
+        'columns = { "time" = "_time" }',
+        {"time": "_time"},
+    ),
+    "no time at all": (
+        table(lambda k: [f"{TAU[k]:.2f}"], HEADS[1:]),
+        "its heads are: crank.tau [N m], crank.w [rad/s], mark [1]",
+        "; add it",
+        lambda _: table(plain),
+    ),
+    "row names without a head": (
+        table(lambda k: [str(k), *plain(k)], ("", *HEADS))[1:],
+        "has 5 cells, and the head 4: a comma stands within a number or a text, or a head is missing",
+        "or write a head for each column",
+        lambda text: f"row,{text}",
     ),
     "an unknown date": (
         table(lambda k: [f"{19 + k // 50}-Xyz-2023 00:00:{T[k]:06.3f}"], ("time", *HEADS[1:])),

@@ -88,21 +88,20 @@ def numbers(table: LoggerTable, place: int, others: frozenset[str], quantity: st
     x = np.array(values)
     for k in map(int, np.flatnonzero(~(np.abs(x) < _OVERLOAD))):
         if not (cells[k] == _NAN or MISSING.fullmatch(table.rows[k][place]) or math.isfinite(x[k])):
-            raise _no_number(table, k, place, quantity)
+            raise _no_number(table, k, place, quantity, np.isnan(x))
         x[k] = np.nan
     return x
 
 
-def _no_number(table: LoggerTable, row: int, place: int, quantity: str) -> InputError:
-    """The refusal of a cell that is no number, with the remedy for its column."""
+def _no_number(table: LoggerTable, row: int, place: int, quantity: str, without: Any) -> InputError:
+    """The refusal of a cell that is no number, with the remedy for its column; some rows are `without` a number."""
     cells, unit = table.column(place), table.units[place]
-    matches = [match for cell in cells if (match := WITH_UNIT.fullmatch(cell))]
-    texts = sum(not (_has_number(cell) or MISSING.fullmatch(cell)) for cell in cells) - len(matches)
+    texts = [cells[k] for k in np.flatnonzero(without) if not MISSING.fullmatch(cells[k])]
     remedy = "delete this row, or write nan for a missing measurement"
     if quantity == "mark":
         remedy = "write 0 and 1, off and on, or false and true"
-    elif WITH_UNIT.fullmatch(cells[row]):
-        cell_units = list(dict.fromkeys(match[2] for match in matches))
+    elif without[row] and WITH_UNIT.fullmatch(cells[row]):
+        cell_units = list(dict.fromkeys(match[2] for text in texts if (match := WITH_UNIT.fullmatch(text))))
         if any(not _fits(text, unit) for text in cell_units):
             wanted = f"in the unit of the head, {unit}" if unit else "in one unit, which stands in the head"
             remedy = f"write all numbers of this column in full, {wanted}"
@@ -113,9 +112,9 @@ def _no_number(table: LoggerTable, row: int, place: int, quantity: str) -> Input
         else:
             remedy = f"write [{cell_units[0]}] into the head, and take it out of all cells"
         remedy = f"alone, {remedy}"
-    elif texts > LOST * len(cells) and quantity == "time":
+    elif len(texts) > LOST * len(cells) and quantity == "time":
         remedy = "and no time that can be read; write it as 2023-06-19 23:59:40.024, or in seconds"
-    elif texts > LOST * len(cells):
+    elif len(texts) > LOST * len(cells):
         remedy = "as in most rows; write numbers, or give the column another head, so that it is left out"
     joint = " " if remedy.startswith(("alone", "and", "as")) else "; "
     return InputError(
@@ -129,10 +128,6 @@ def _fits(text: str, unit: str) -> bool:
         return dimension(bare_unit(text)) == dimension(unit or bare_unit(text))
     except ValueError:
         return False
-
-
-def _has_number(cell: str) -> bool:
-    return bool(re.fullmatch(r"[+-]?[\d.,' ]*\d[\d.,' ]*(?:[eEdD][+-]?\d+)?", cell))
 
 
 def _number(cell: str, boolean: bool) -> float:
@@ -331,12 +326,8 @@ def _fraction(table: LoggerTable, place: int) -> float:
     words = re.split(r"[\s_\[\]()]+", table.heads[place].lower().replace("sub-", "sub"))
     factor = next((_FRACTIONS[word] for word in words if word in _FRACTIONS), 0.0)
     cells = table.column(place) if factor else []
-    part = re.compile(r"0?[.,]\d+|0" if factor == 1.0 else r"\d+")
-    return factor if cells and all(part.fullmatch(x) and factor * _part(x) < 1.0 for x in cells) else 0.0
-
-
-def _part(cell: str) -> float:
-    return float(cell.replace(",", "."))
+    part = re.compile(r"0?\.\d+|0" if factor == 1.0 else r"\d+")
+    return factor if cells and all(part.fullmatch(x) and factor * float(x) < 1.0 for x in cells) else 0.0
 
 
 _PARTS = ("hour", "minute", "second", "day", "month", "year")
@@ -408,9 +399,7 @@ def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str])
 def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     """The times from the first row on, by dates and times of the day."""
     seconds, days = np.full(len(table.rows), np.nan), list[str]()
-    short, has_fraction, hours, zones = False, False, set[int](), set[str]()
-    thousandths, fractions = np.zeros((2, len(table.rows)))
-    widths = set[int]()
+    short, has_fraction, hours, zones, widths = False, False, set[int](), set[str](), set[int]()
     half = next((place for place in places if _is_half(table, place)), -1)
     beside = {place: factor for place in places if (factor := _fraction(table, place))}
     places = [place for place in places if place not in beside and place != half]
@@ -451,19 +440,17 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         if letter := clock["half"] or (row[half][0] if half >= 0 else ""):
             h = h % 12 + 12 * (letter in "pP")
         widths.add(len(clock["f"] or ""))
-        thousandths[k] = 1e-3 * int(clock["f"] or 0)
         hours.add(h)
         zones.add((clock["zone"] or "").strip())
         passed = int(clock["days"] or clock["span"] or 0)
-        fractions[k] = float(f"0.{clock['f'] or 0}")
-        seconds[k] = _DAY * passed + 3600.0 * h + 60.0 * m + int(s) + fractions[k]
+        seconds[k] = _DAY * passed + 3600.0 * h + 60.0 * m + int(s) + float(f"0.{clock['f'] or 0}")
     if len(zones) > 1:
         raise InputError(
             f"{table.file}, column {table.heads[places[0]]}: has times of {len(zones)} zones "
             f"({', '.join(sorted(map(repr, zones)))}); write all in one"
         )
     for place, factor in beside.items() if not has_fraction else ():
-        seconds += factor * np.array([_part(row[place]) for row in table.rows])
+        seconds += factor * np.array([float(row[place]) for row in table.rows])
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
         zone = next(iter(zones), "")
@@ -481,17 +468,13 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         if not np.array_equal(before, seconds, equal_nan=True):
             source += f", over {'the full hour' if short else 'midnight'}"
     has_time = np.isfinite(seconds)
-    padded = (seconds - fractions + thousandths)[has_time]
-    if len(widths) > 1 and max(widths) <= 3 and np.any(np.diff(seconds[has_time]) < 0.0) and _rises(padded):
+    steps = np.diff(seconds[has_time])
+    if len(widths) > 1 and np.any(steps < 0.0) and np.any(steps > 0.0):
         raise InputError(
             f"{table.file}, column {table.heads[places[0]]}: has parts of a second of {min(widths)} to {max(widths)} "
-            "digits, with which the times run backwards; write ms with zeros before them, such as .024"
+            "digits, and the times run backwards; write ms with zeros before them, such as .024, or sort the rows"
         )
     return seconds - seconds[np.flatnonzero(has_time)[0]], source
-
-
-def _rises(t: Any) -> bool:
-    return bool(np.all(np.diff(t) >= -1e-9))
 
 
 def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:

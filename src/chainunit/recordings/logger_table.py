@@ -246,14 +246,14 @@ def _is_row(cells: Sequence[str]) -> bool:
 
 
 def _mark_of(lines: Sequence[str]) -> str:
-    """The mark with which most lines are rows of one length."""
+    """The mark with which most lines of the latter half are rows of one length: above the head, and below the rows,
+    marks may stand within cells."""
 
     def fitting(mark: str) -> int:
-        counts = Counter(len(row) for line in lines if _is_row(row := cells_of_line(line, mark)))
+        counts = Counter(len(row) for line in lines[len(lines) // 2 :] if _is_row(row := cells_of_line(line, mark)))
         return max(counts.values(), default=0)
 
     counts = {mark: fitting(mark) for mark in MARKS}
-    # lines above the head may be rows, too, by a mark that stands within their cells
     return next(mark for mark in MARKS if counts[mark] >= 0.95 * max(counts.values()))
 
 

@@ -109,12 +109,8 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
 
     if not time_from and not any(_is_named(head, names.get("time", "time")) for head in table.heads):
         text = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
-        may_be = [
-            k
-            for k, unit in enumerate(table.units)
-            if k not in places.values() and not (unit and of_other_kind(unit, "s"))
-        ]
-        may_be = [k for k in may_be if table.has_numbers(k) or has_times(table, k)]
+        may_be = [k for k, unit in enumerate(table.units) if not (unit and of_other_kind(unit, "s"))]
+        may_be = [k for k in {*may_be} - {*places.values()} if table.has_numbers(k) or has_times(table, k)]
         may_be.sort(key=lambda k: (not has_times(table, k), "time" not in table.heads[k].lower()))
         text += f"{remedy('time', [table.heads[k] for k in may_be])}{', or' if may_be else ';'} add it"
         faults.add([InputError(f"{file}: has no column time [s]{text}")])
@@ -321,8 +317,8 @@ def _quantities(columns: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
 
 
 def rms_of_phases(currents: Sequence[Any]) -> Any:
-    """The RMS of a phase by the instantaneous currents of two or three phases, whose sum is zero; of RMS values, which
-    are positive, their root mean square."""
+    """The RMS of a phase by the instantaneous currents of two or three phases, whose sum is zero, or by RMS values,
+    which are positive."""
     if len(currents) == 2 and min(map(np.min, currents)) >= 0.0:
         return np.sqrt(sum(i**2 for i in currents) / 2.0)
     if len(currents) == 2:
