@@ -15,6 +15,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chainunit import InputError
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.induction_motor import InductionMotor
 from chainunit.recordings import logger_table
 from chainunit.recordings.recording import read_recording, with_rms
 
@@ -940,6 +942,12 @@ def test_a_count_of_16_bits_that_begins_anew(tmp_path):
     recording = read_recording(written(tmp_path, text))
     np.testing.assert_array_equal(recording.columns["motor.count"], count)
     assert "the count begins anew 1 time: joined" in recording.understood
+    decimal = table(
+        lambda k: [*plain(k), str(count[k] % 10000)], (HEADS[0], "motor.count [counts]", *HEADS[1:])
+    )
+    np.testing.assert_array_equal(
+        read_recording(written(tmp_path, decimal)).columns["motor.count"] - 5000, count - 65000
+    )
     # a counter that is set back by hand is left to the inspection
     back = read_recording(written(tmp_path, replaced(text, (f",{count[80] % 65536},", ",5,"))))
     assert np.min(np.diff(back.columns["motor.count"])) < 0.0
@@ -967,6 +975,67 @@ def test_phase_currents_make_the_rms(tmp_path, phases):
     np.testing.assert_allclose(recording.columns["motor.i"], size, rtol=1e-6)
     assert recording.columns.keys() == {"motor.i"}
     assert f"motor.i is the RMS of {', '.join(f'motor.i{name}' for name in phases)}" in recording.understood
+
+
+def currents_of(folder, currents, step=1):
+    """A recording of these columns over the time of `phase_currents`."""
+    time = phase_currents()[0][::step]
+    heads = ["time [s]", *(f"{name} [A]" for name in currents)]
+    rows = zip(time, *(x[::step] for x in currents.values()), strict=True)
+    lines = [",".join(heads), *(",".join(f"{x:.9f}" for x in row) for row in rows)]
+    return read_recording(written(folder, "\n".join(lines)))
+
+
+def test_rms_values_of_two_phases_are_no_instantaneous_currents(tmp_path):
+    """They are positive, and their sum is not the third one."""
+    _, size, _ = phase_currents()
+    recording = currents_of(tmp_path, {"motor.ia": size, "motor.ib": 1.02 * size})
+    np.testing.assert_allclose(recording.columns["motor.i"], np.sqrt(0.5 * (1 + 1.02**2)) * size, rtol=1e-6)
+    both = currents_of(tmp_path, {"motor.i": size, "motor.ia": 2.0 * size})
+    np.testing.assert_allclose(both.columns["motor.i"], size, rtol=1e-6)
+    assert "motor.ia left out beside motor.i" in both.understood
+
+
+@pytest.mark.parametrize(
+    ("second", "likeness"), [(lambda i: -i[1], "0.5"), (lambda i: i[0], "1"), (lambda i: -i[0], "-1")]
+)
+def test_currents_that_are_not_those_of_two_phases_are_named(tmp_path, second, likeness):
+    """A sensor turned round, and one phase twice; the remedy for the first one."""
+    _, size, currents = phase_currents()
+    with pytest.raises(
+        InputError, match=rf"columns motor.ia \[A\] and motor.ib \[A\]: have .* of {likeness}, and"
+    ):
+        currents_of(tmp_path, {"motor.ia": currents[0], "motor.ib": second(currents)})
+    mended = currents_of(tmp_path, {"motor.ia": currents[0], "motor.ib": currents[1]})
+    np.testing.assert_allclose(mended.columns["motor.i"], size, rtol=1e-6)
+
+
+def test_a_current_of_a_dc_motor_that_reverses_is_never_squared(tmp_path):
+    """It swings about zero with the third order of a fast crank, as a current of 30 Hz does."""
+    time, *_ = phase_currents()
+    recording = currents_of(tmp_path, {"motor.i": 5.0 * np.sin(2.0 * np.pi * 30.0 * time) + 0.1})
+    assert with_rms(recording, 0.1, DcMotor) is recording
+    assert len(with_rms(recording, 0.1, InductionMotor).time) < 400
+    phase = currents_of(tmp_path, {"motor.ia": np.cos(time)})
+    with pytest.raises(
+        InputError, match=r"motor.ia \[A\]: is the current of a phase, and the motor is a DcMotor; name"
+    ):
+        with_rms(phase, TURN, DcMotor)
+
+
+def test_a_current_of_both_signs_is_no_rms(tmp_path):
+    """At 41 rows a second a current of 50 Hz has no periods; an offset hides none that are resolved."""
+    _, size, (current, *_) = phase_currents()
+    slow = currents_of(tmp_path, {"motor.i": current}, step=24)
+    with pytest.raises(
+        InputError, match=r"motor.i \[A\]: goes from -.* the RMS of a phase is positive.*record >= 8 rows"
+    ):
+        with_rms(slow, TURN, InductionMotor)
+    shifted = with_rms(currents_of(tmp_path, {"motor.i": current + 1.0}), TURN, InductionMotor)
+    assert "motor.i is instantaneous, of 50 Hz" in shifted.understood
+    assert np.mean(shifted.columns["motor.i"]) == pytest.approx(np.mean(size), rel=0.01)
+    rms = currents_of(tmp_path, {"motor.i": size})
+    assert with_rms(rms, TURN, InductionMotor) is rms
 
 
 def test_an_instantaneous_current_makes_a_row_for_each_period(tmp_path):
