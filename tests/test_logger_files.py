@@ -460,6 +460,27 @@ FORMATS = {
         table(lambda k: [*plain(k), f"{TAU[k]:.2f}", f"{W[k]:.5f}", "ft"[MARK[k]]]),
         {},
     ),
+    "passes of the mark alone": (
+        table(lambda k: [*plain(k), f"{TAU[k]:.2f}", f"{W[k]:.5f}", "1"[: MARK[k]]]),
+        {},
+    ),
+    "a table of channels with numbers": (
+        f"Channel,Gain,Offset,Range\n1,1.0,0.0,10\n2,1.0,0.0,10\n\n{table(plain)}",
+        {},
+    ),
+    "a long preamble": ("".join(f"setting {k}\n" for k in range(900)) + table(plain), {}),
+    "lines of zeros by a loss of power": (table(plain).replace("\n0.400", "\n" + 40 * "\0" + "\n0.400"), {}),
+    "a date where it changes": (
+        table(
+            lambda k: [
+                f"{moment(k):%d.%m.%Y}" if k == 0 or moment(k).day != moment(k - 1).day else "",
+                f"{moment(k):%H:%M:%S.%f}",
+            ],
+            ("Date", "Time", *HEADS[1:]),
+        ),
+        {},
+    ),
+    "seconds of the day, over midnight": (table(lambda k: [f"{(86399.0 + T[k]) % 86400.0:.3f}"]), {}),
     "titles of pages, heads and units again": (
         re.sub(
             r"^(0\.400|1\.000),",
@@ -891,6 +912,12 @@ REMEDIES = {
         "has 5 cells, and the head 4: a comma stands within a number or a text, or a head is missing",
         "or write a head for each column",
         lambda text: f"row,{text}",
+    ),
+    "a coarse clock and missing rows": (
+        table(lambda k: [f"{(k + 6 * (k > 60)) // 10 / 5:.1f}"]),
+        "the time goes on 12 times in 120 rows, and not evenly",
+        "write the time of each row",
+        lambda _: table(plain),
     ),
     "an unknown date": (
         table(lambda k: [f"{19 + k // 50}-Xyz-2023 00:00:{T[k]:06.3f}"], ("time", *HEADS[1:])),

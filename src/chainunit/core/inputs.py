@@ -181,6 +181,8 @@ def decoded_by_marks(file: Path, data: bytes) -> str:
             continue
         # Ctrl-Z ends a text of DOS
         text = text.rstrip("\0\x1a")
+        # a logger that lost its power leaves lines of zeros
+        text = re.sub(r"^\0+$", "", text, flags=re.MULTILINE) if "\0" in text else text
         if not re.search(r"[\0-\x08\x0e-\x1b\x7f]", text):
             return text
         break

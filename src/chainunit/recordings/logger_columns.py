@@ -31,8 +31,9 @@ SOME, COARSE = 0.02, 0.2
 """Shares of rows with the time of the row before: from which on a clock may be coarse, and from which on it is."""
 WRAPS = tuple(sorted([2.0**bits for bits in range(10, 33)] + [10.0**digits for digits in range(3, 10)]))
 """Sizes of counters that begin anew."""
-LEAST_OF_CLOCKS = 2.0**16
-"""Least size of the counter of a clock."""
+LEAST_OF_CLOCKS, PERIODS = 2.0**16, (60.0, 3600.0, 86400.0, 604800.0)
+"""Least size of the counter of a clock, and the times after which seconds of a minute, an hour, a day or a week begin
+anew [s]."""
 LEFT_OUT = 0.01
 """Largest share of numbers without a decimal sign from which it was left out."""
 _OVERLOAD = 9.8e37
@@ -86,6 +87,9 @@ def numbers(table: LoggerTable, place: int, others: frozenset[str], quantity: st
     except ValueError:
         values = [_number(cell, quantity == "mark") for cell in cells]
     x = np.array(values)
+    if quantity == "mark" and set(x[~np.isnan(x)]) == {1.0}:
+        # passes alone are written
+        x[[not cell for cell in cells]] = 0.0
     for k in map(int, np.flatnonzero(~(np.abs(x) < _OVERLOAD))):
         if not (cells[k] == _NAN or MISSING.fullmatch(table.rows[k][place]) or math.isfinite(x[k])):
             raise _no_number(table, k, place, quantity, np.isnan(x))
@@ -357,7 +361,8 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
     else:
         x = numbers(table, places[0], others, "time")
         factor, source = _unit_of_time(table, head, table.units[places[0]], x)
-        x, wraps = unwrapped(x, LEAST_OF_CLOCKS)
+        sizes = [size for size in WRAPS if size >= LEAST_OF_CLOCKS]
+        x, wraps = unwrapped(x, sorted([*sizes, *(period / factor for period in PERIODS)]))
         time = x * factor
         if wraps:
             source += f" (the counter begins anew {wraps} {'time' if wraps == 1 else 'times'})"
@@ -405,13 +410,14 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     places = [place for place in places if place not in beside and place != half]
     shape = (False, False, False)
     for k, row in enumerate(table.rows):
-        parts = [date_and_clock(row[place]) for place in places]
-        day = "".join(part[0] for part in parts if part)
+        # a date may stand only where it changes
+        parts = [date_and_clock(row[place]) for place in places if row[place] or not any(days)]
+        day = "".join(part[0] for part in parts if part) or (days[-1] if len(parts) < len(places) else "")
         clock = next((part[1] for part in parts if part and part[1]), None)
         row_shape = bool(day), clock is not None, clock is not None and clock["s"] is None
         shape = row_shape if k == 0 else shape
         days.append(day or (days[-1] if days else ""))
-        if None in parts and all(MISSING.fullmatch(row[place]) for place in places):
+        if (None in parts or not parts) and all(MISSING.fullmatch(row[place]) for place in places):
             continue
         if (
             None in parts
@@ -534,7 +540,7 @@ def _ordinal(day: str, order: str) -> int:
     return date(y if y > 99 else 2000 + y, m, d).toordinal()
 
 
-def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
+def unwrapped(x: Any, sizes: Sequence[float] = WRAPS) -> tuple[Any, int]:
     """A counter without the falls at which it begins anew, and their number: it falls by nearly the size of a
     counter, and goes on as before."""
     steps = np.diff(x)
@@ -543,7 +549,7 @@ def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
     if not len(falls) or len(falls) > 0.2 * len(steps) or not len(rising):
         return x, 0
     largest = 5.0 * float(np.median(rising))
-    for size in (wrap for wrap in WRAPS if wrap >= least):
+    for size in sizes:
         inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
         if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= largest)):
             return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
@@ -625,7 +631,7 @@ def _even(t: Any) -> Any:
         return None
     even = np.polynomial.Polynomial.fit(ticks, t[ticks], 1)(np.arange(len(t)))
     step, tick = float(even[1] - even[0]), float(np.median(np.diff(t[ticks])))
-    is_near = step > 0.0 and np.max(np.abs(even[ticks] - t[ticks])) <= max(tick, step)
+    is_near = step > 0.0 and np.max(np.abs(even[ticks] - t[ticks])) <= max(step, min(tick, 3.0 * step))
     # the clock goes on up to one row before, by half a row on average
     return even + 0.5 * step if is_near else None
 

@@ -42,9 +42,9 @@ WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
 _REMARK = re.compile(r"\s#(?!N/A|NV|VALUE|DIV|NUM|REF|NULL|WERT).*$", re.IGNORECASE)
-_SAMPLE, _FOOTER, _ABOVE, _LONGEST = 400, 50, 12, 50_000
-"""Lines by which mark and head are found, most lines of a footer, most lines above the rows that may be heads, and
-most characters of a line."""
+_SAMPLE, _FOOTER, _ABOVE, _PREAMBLE, _LONGEST = 400, 50, 12, 5000, 50_000
+"""Lines by which mark and head are found, most lines of a footer, most lines above the rows that may be heads, most
+lines above the head, and most characters of a line."""
 _WORDS = {
     "volts": "V", "amps": "A", "amperes": "A", "watts": "W", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "µs", "microseconds": "µs", "sek": "s", "secs": "s", "sekunden": "s", "newton meter": "N m",
@@ -103,7 +103,9 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
     stated = re.fullmatch(r'"?sep=(.)"?', lines[0][1].strip("\r\n"))
     lines = lines[1:] if stated else lines
-    sample = [numbered for numbered in lines[: 2 * _SAMPLE] if numbered[1].strip()]
+    names = list(names)
+    likely = _likely_head(lines[:_PREAMBLE], names)
+    sample = [numbered for numbered in lines[likely : likely + 2 * _SAMPLE] if numbered[1].strip()]
     longest = max((len(line) for _, line in sample), default=1)
     sample = sample[: max(20, min(_SAMPLE, _SAMPLE * 1000 // longest))]
     mark = stated[1] if stated and stated[1] in MARKS else _mark_of([line for _, line in sample])
@@ -114,7 +116,6 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
             "and the next ones must have a number for each of them, with commas, semicolons, tabs, bars or blanks "
             "between them"
         )
-    names = list(names)
     first = cells_of_line(sample[begin][1], mark)
     head, heads = _head_of(file, sample[:begin], first, mark, names)
     while not heads[-1]:
@@ -135,8 +136,8 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
     rows, numbers, left_out = _body(file, lines[start:], mark, [heads, *below], filled, first)
     if unfilled:
         left_out.append(f"the head {printable(', '.join(unfilled))} without cells")
-    if head > 0:
-        left_out.insert(0, f"{head} {'line' if head == 1 else 'lines'} before the head")
+    if (above := head + likely) > 0:
+        left_out.insert(0, f"{above} {'line' if above == 1 else 'lines'} before the head")
     if len(rows) < FEWEST:
         raise InputError(f"{file}: has {len(rows)} rows behind its head; must have >= {FEWEST}")
     return LoggerTable(file, mark, heads, units, rows, numbers, left_out)
@@ -245,12 +246,22 @@ def _is_row(cells: Sequence[str]) -> bool:
     return len(cells) > 1 and 2 * sum(map(is_data, filled)) >= max(1, len(filled))
 
 
+def _likely_head(lines: Sequence[tuple[int, str]], names: Iterable[str]) -> int:
+    """The place of the first line with two of the `names`, and at least half as many as another line; 0 without one.
+    Tables of channels and settings stand above it."""
+    lower = [name.lower() for name in names]
+    counts = [sum(name in text for name in lower) for text in (line.lower() for _, line in lines)]
+    return next((k for k, count in enumerate(counts) if count >= max(2.0, 0.5 * max(counts))), 0)
+
+
 def _mark_of(lines: Sequence[str]) -> str:
     """The mark with which most lines of the latter half are rows of one length: above the head, and below the rows,
     marks may stand within cells."""
 
     def fitting(mark: str) -> int:
-        counts = Counter(len(row) for line in lines[len(lines) // 2 :] if _is_row(row := cells_of_line(line, mark)))
+        counts = Counter(
+            len(row) for line in lines[len(lines) // 2 :] if _is_row(row := cells_of_line(line, mark))
+        )
         return max(counts.values(), default=0)
 
     counts = {mark: fitting(mark) for mark in MARKS}

@@ -141,7 +141,10 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     used = {*time_from, *places.values()}
     rate = f"{len(rows):,} rows, {1.0 / float(np.median(np.diff(times.time[kept]))):.4g} Hz"
     parts = [times.source, decimal_words(table, others(-1), places.values()), rate, *times.remarks, *remarks]
+    unused = [head for place, head in enumerate(table.heads) if head and place not in used]
     left_out = [*table.left_out, *lost]
+    if unused:
+        left_out.append(f"the columns {printable(', '.join(unused), 80)}")
     heads = {name: table.heads[place] for name, place in places.items()} | {"time": table.heads[time_from[0]]}
     if "motor.i" in columns and "motor.i" not in heads:
         heads["motor.i"] = ", ".join(heads[name] for name in PHASES if name in heads)
@@ -150,7 +153,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         times.time[kept],
         columns,
         heads,
-        [head for place, head in enumerate(table.heads) if head and place not in used],
+        unused,
         ", ".join(parts) + (f"; left out: {', '.join(left_out)}" if left_out else ""),
     )
 
