@@ -914,8 +914,8 @@ REMEDIES = {
         lambda text: f"row,{text}",
     ),
     "a coarse clock and missing rows": (
-        table(lambda k: [f"{(k + 6 * (k > 60)) // 10 / 5:.1f}"]),
-        "the time goes on 12 times in 120 rows, and not evenly",
+        table(lambda k: [f"{(k + 12 * (k > 60)) // 10 / 5:.1f}"]),
+        "the time goes on 13 times in 120 rows, and not evenly",
         "write the time of each row",
         lambda _: table(plain),
     ),
