@@ -108,6 +108,15 @@ def test_a_fault_names_its_column(changes, column, words):
     assert fault.startswith(f"run.csv, column {column}: ") and words in fault
 
 
+@pytest.mark.parametrize(("head", "values", "true"), [("mA", 1.0, "A"), ("kA", 1.0, "A"), ("kA", 1e3, "mA")])
+def test_the_likely_unit_is_another_one_than_the_head_has(head, values, true):
+    """The numbers of the column as they stand in the file, with a wrong unit."""
+    factor = {"mA": 1e-3, "kA": 1e3}[head]
+    recording = recorded(**{"motor.i": factor * values * I})
+    (fault,) = faults(replace(recording, heads=recording.heads | {"motor.i": f"motor.i [{head}]"}))
+    assert f"the values look like {true}; write [{true}] into its head" in fault
+
+
 def wandering(share, **more):
     """A recording whose speed changes by this share to both sides, in some seconds."""
     angle = SPEED * (time := np.arange(40000) / 1000.0) + SPEED * share * np.sin(RATE * time) / RATE

@@ -412,7 +412,7 @@ def _of_column(
         yield _fault(recording, name, f"{kept}: the sensor or the logger is stuck; {remedy_text}")
         return
     if expected is not None and not expected.admits(size):
-        yield _fault(recording, name, _scale_words(name, size, expected))
+        yield _fault(recording, name, _scale_words(name, recording.heads[name], size, expected))
         return
     if expected is not None and expected.is_reversed(mean, size):
         yield _fault(
@@ -594,12 +594,16 @@ def _exchanged(recording: Recording, first: str, second: str, sizes: Mapping[str
     )  # fmt: skip
 
 
-def _scale_words(name: str, size: float, expected: Expectation) -> str:
+def _scale_words(name: str, head: str, size: float, expected: Expectation) -> str:
     finding = f"RMS of {_size(name, size)}"
     limit = f"must be from {_size(name, expected.low)} to {_size(name, expected.high)} ({expected.words})"
     unit = MEASURANDS[name].unit
-    for factor, prefix in ((1e-3, "m"), (1e3, "k")):
-        if expected.admits(size * factor):
+    try:
+        stated = scale(name_and_unit(head)[1], unit)[0]
+    except ValueError:
+        stated = 1.0
+    for factor, prefix in ((1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M")):
+        if stated != factor and expected.admits(size * factor / stated):
             return f"{finding}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
     more = ", crank_speed and machine.ratio" if name in OF_SPEED else ""
     return f"{finding}; {limit}: check the sensor, the unit in its head{more}"
