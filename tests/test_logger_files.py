@@ -919,6 +919,20 @@ REMEDIES = {
         "write the time of each row",
         lambda _: table(plain),
     ),
+    "rows swapped at midnight": (
+        "\n".join([*lines[:50], lines[51], lines[50], *lines[52:]])
+        if (lines := table(lambda k: [f"{moment(k):%H:%M:%S.%f}"], ("time", *HEADS[1:])).splitlines())
+        else "",
+        "s: must be later than 1 s of the line before",
+        "delete the rows before this line, or those from it on",
+        lambda _: table(plain),
+    ),
+    "one sign behind a number": (
+        table(lambda k: [*plain(k), f"{TAU[k]:.2f}{'-' * (k == 20)}"]),
+        "line 22, column 2, crank.tau [N m]: 13058.66- is no number",
+        "delete this row, or write nan",
+        lambda _: table(plain),
+    ),
     "an unknown date": (
         table(lambda k: [f"{19 + k // 50}-Xyz-2023 00:00:{T[k]:06.3f}"], ("time", *HEADS[1:])),
         "is no date that can be read",
@@ -1144,6 +1158,8 @@ MARKS = ",;\t|. "
     mark=st.sampled_from(MARKS),
 )
 @example(name=".NET TimeSpan", row=70, share=0.984375, change="added", mark=".")
+@example(name="AM and PM in a column", row=66, share=0.62, change="added", mark=":")
+@example(name="bars", row=60, share=0.57, change="added", mark="-")
 def test_one_wrong_mark_is_never_misread_in_silence(name, row, share, change, mark, tmp_path_factory):
     """Of each file, all rows that are read are right, or it is refused."""
     text, names = FORMATS[name]

@@ -173,7 +173,7 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
         text = _SIGN.sub(r"\1", text)
     if "D" in text or "d" in text:
         text = _OF_FORTRAN.sub("e", text)
-    if "(" in text or "-\n" in f"{text}\n":
+    if len(_OF_ACCOUNTS.findall(text)) > max(1.0, LEFT_OUT * len(table.rows)):
         text = _OF_ACCOUNTS.sub(r"-\1\2", text)
     if (
         any(sign in text for sign in _BLANKS)
@@ -322,7 +322,7 @@ def _kind(table: LoggerTable, place: int) -> str:
 
 def _is_half(table: LoggerTable, place: int) -> bool:
     """Whether a column has the halves of a day of a clock of 12 hours."""
-    return all(_HALF.fullmatch(row[place]) for row in table.rows)
+    return all(_HALF.fullmatch(row[place]) for row in table.rows[:20])
 
 
 def _fraction(table: LoggerTable, place: int) -> float:
@@ -421,6 +421,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             continue
         if (
             None in parts
+            or (half >= 0 and not _HALF.fullmatch(row[half]))
             or row_shape != shape
             or (clock and (int(clock["m"]) > 59 or int(clock["s"] or 0) > 60))
         ):
@@ -492,9 +493,10 @@ def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:
 
 
 def _over_midnight(seconds: Any, period: float) -> Any:
-    """Times of a clock that begins anew after a `period` [s]: it falls by most of it."""
-    falls = np.diff(seconds, prepend=seconds[:1]) < -0.9 * period
-    return seconds + period * np.cumsum(falls)
+    """Times of a clock that begins anew after a `period` [s]: it falls by most of it; if it rises by most of it, rows
+    are swapped."""
+    steps = np.diff(seconds, prepend=seconds[:1]) / period
+    return seconds + period * np.cumsum((steps < -0.9).astype(int) - (steps > 0.9))
 
 
 def _day_numbers(table: LoggerTable, days: Sequence[str], place: int) -> list[float]:
