@@ -910,7 +910,7 @@ REMEDIES = {
     "row names without a head": (
         table(lambda k: [str(k), *plain(k)], ("", *HEADS))[1:],
         "has 5 cells, and the head 4: a comma stands within a number or a text, or a head is missing",
-        "or write a head for each column",
+        "or, if no number has a comma, write a head for each column",
         lambda text: f"row,{text}",
     ),
     "a coarse clock and missing rows": (

@@ -432,7 +432,8 @@ def _words(cells: Sequence[str], heads: Sequence[str], mark: str) -> str:
         if mark == ",":
             return (
                 f"{count}: a comma stands within a number or a text, or a head is missing; put semicolons between "
-                "the columns, write decimal points, put the cell in quotation marks, or write a head for each column"
+                "the columns, write decimal points, put the cell in quotation marks, or, if no number has a comma, "
+                "write a head for each column"
             )
         return (
             f"{count}: {MARKS[mark]} stand within a cell, or a head is missing; put the cell in quotation marks, or "

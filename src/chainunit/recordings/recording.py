@@ -144,7 +144,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     unused = [head for place, head in enumerate(table.heads) if head and place not in used]
     left_out = [*table.left_out, *lost]
     if unused:
-        left_out.append(f"the columns {printable(', '.join(unused), 80)}")
+        left_out.append(f"the column{'s' * (len(unused) > 1)} {printable(', '.join(unused), 80)}")
     heads = {name: table.heads[place] for name, place in places.items()} | {"time": table.heads[time_from[0]]}
     if "motor.i" in columns and "motor.i" not in heads:
         heads["motor.i"] = ", ".join(heads[name] for name in PHASES if name in heads)
