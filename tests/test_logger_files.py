@@ -856,6 +856,19 @@ REMEDIES = {
         "write it as 2023-06-19 23:59:40.024",
         lambda text: replaced(text, (r"(\d\d)/06/2023 (\d\d)h(\d\d)m", r"2023-06-\1 \2:\3:")),
     ),
+    "a semicolon within a clock": (
+        table(
+            lambda k: [
+                "Data",
+                f"{moment(k):%m/%d/%Y}",
+                f"{moment(k):%H:%M:%S};{moment(k).microsecond // 1000:03d}",
+            ],
+            ("Header", "Date", "Time", *HEADS[1:]),
+        ),
+        "23:59:59;000 is no number and no time that can be read",
+        "write it as 2023-06-19 23:59:40.024",
+        lambda text: replaced(text, (r";(\d)", r".\1")),
+    ),
     "prefixes behind numbers": (
         table(lambda k: [*plain(k), f"{TAU[k] / 1000:.5f}k"]),
         "k is no number alone",

@@ -37,7 +37,9 @@ DATE = re.compile(
     r"|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
 )
 _COMPACT = re.compile(r"(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)(?=\D|$)")
-_NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+_NUMBER = re.compile(
+    r"[+-]?\s*(?:\d+(?:[.,' \u00a0\u2009\u202f’]\d{3})*(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?"
+)
 WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
