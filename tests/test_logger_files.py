@@ -940,6 +940,18 @@ REMEDIES = {
         "delete the rows before this line, or those from it on",
         lambda _: table(plain),
     ),
+    "rows swapped where a counter begins anew": (
+        "\n".join([*lines[:35], lines[36], lines[35], *lines[37:]])
+        if (
+            lines := table(
+                lambda k: [str((4294967296 - 700000 + 20000 * k) % 2**32)], ("time [us]", *HEADS[1:])
+            ).splitlines()
+        )
+        else "",
+        "must be later than",
+        "delete the rows before this line, or those from it on",
+        lambda _: table(plain),
+    ),
     "one sign behind a number": (
         table(lambda k: [*plain(k), f"{TAU[k]:.2f}{'-' * (k == 20)}"]),
         "line 22, column 2, crank.tau [N m]: 13058.66- is no number",

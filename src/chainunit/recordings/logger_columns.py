@@ -552,7 +552,7 @@ def unwrapped(x: Any, sizes: Sequence[float] = WRAPS) -> tuple[Any, int]:
         return x, 0
     largest = 5.0 * float(np.median(rising))
     for size in sizes:
-        inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
+        inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size and np.nanmax(steps) < 0.5 * size
         if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= largest)):
             return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
     return x, 0
