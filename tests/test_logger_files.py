@@ -572,6 +572,22 @@ def test_cells_without_a_number_are_left_out_and_counted(tmp_path, cell):
     assert f"left out: 3 rows without a number ({cell or 'empty'})" in recording.understood
 
 
+@pytest.mark.parametrize(
+    ("begin", "kind"),
+    [
+        (b"PK\x03\x04", "a workbook of a spreadsheet; must"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", r"a workbook of a spreadsheet \(XLS\)"),
+        (b"TDSm\x0e\0\0\0", "a TDMS file"),
+        (b"MDF     4.10    ", r"a measurement data file \(MDF\)"),
+        (b"MATLAB 5.0 MAT-file", "a MAT file"),
+        ("time [s]".encode("utf-32"), "is not UTF-8 text; save it as UTF-8, or export a table as CSV"),
+    ],
+)
+def test_files_of_instruments_that_are_no_text_are_named(tmp_path, begin, kind):
+    with pytest.raises(InputError, match=kind):
+        read_recording(written(tmp_path, begin + 500 * b"\0"))
+
+
 def test_a_line_has_a_largest_length(tmp_path):
     """Before it is searched for marks and heads."""
     with pytest.raises(InputError, match=r"line 2: has more than 50000 characters"):
