@@ -108,6 +108,15 @@ def test_a_fault_names_its_column(changes, column, words):
     assert fault.startswith(f"run.csv, column {column}: ") and words in fault
 
 
+@pytest.mark.parametrize(("head", "values", "true"), [("mA", 1.0, "A"), ("kA", 1.0, "A"), ("kA", 1e3, "mA")])
+def test_the_likely_unit_is_another_one_than_the_head_has(head, values, true):
+    """The numbers of the column as they stand in the file, with a wrong unit."""
+    factor = {"mA": 1e-3, "kA": 1e3}[head]
+    recording = recorded(**{"motor.i": factor * values * I})
+    (fault,) = faults(replace(recording, heads=recording.heads | {"motor.i": f"motor.i [{head}]"}))
+    assert f"the values look like {true}; write [{true}] into its head" in fault
+
+
 def wandering(share, **more):
     """A recording whose speed changes by this share to both sides, in some seconds."""
     angle = SPEED * (time := np.arange(40000) / 1000.0) + SPEED * share * np.sin(RATE * time) / RATE
@@ -315,6 +324,15 @@ def test_an_encoder_counts_up_and_does_not_begin_anew():
     assert "motor.count [1]: counts down, while the motor turns forward: change its sign" in fault
     (fault,) = of_count(count % 65536.0)
     assert "falls by 65" in fault and "the counter begins anew; write the count without the jump" in fault
+    # by less than 10,000: a counter that is set back by hand, and one of the turn
+    (fault,) = of_count(np.where(GOOD.time < 0.05, count, count - count[50]))
+    assert "at 0.05 s: the counter begins anew" in fault
+    (fault,) = of_count(count % 9000.0)
+    assert "the counter begins anew" in fault
+    # after the motor was switched off, the crank rocks back about as fast as it turned
+    after = np.maximum(GOOD.time - 5.0, 0.0)
+    rocking = np.where(after > 0.0, count[5000] - 9000.0 * np.sin(12.0 * after) * np.exp(-after), count)
+    assert np.diff(rocking).min() < -100.0 and of_count(rocking) == []
 
 
 def coast(current=0.0):

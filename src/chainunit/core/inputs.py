@@ -43,7 +43,7 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )  # fmt: skip
 _OTHER_KINDS = {
-    b"PK\x03\x04": "a ZIP archive, such as an FMU or an SSP package",
+    b"PK\x03\x04": "a ZIP archive, such as an FMU, an SSP package or a workbook of a spreadsheet",
     b"\x89HDF": "a NetCDF or HDF5 file, such as result.nc",
     b"CDF": "a NetCDF file",
     b"%PDF": "a PDF file",
@@ -52,6 +52,10 @@ _OTHER_KINDS = {
     b"\x1f\x8b": "a compressed file",
     b"\x7fELF": "a program",
     b"MZ": "a program",
+    b"\xd0\xcf\x11\xe0": "a workbook of a spreadsheet (XLS)",
+    b"TDSm": "a TDMS file",
+    b"MDF     ": "a measurement data file (MDF)",
+    b"MATLAB 5": "a MAT file",
     b"<": "HTML or XML",
 }
 """By first bytes, the kinds of files that are no text."""
@@ -177,10 +181,12 @@ def decoded_by_marks(file: Path, data: bytes) -> str:
             continue
         # Ctrl-Z ends a text of DOS
         text = text.rstrip("\0\x1a")
+        # a logger that lost its power leaves lines of zeros
+        text = re.sub(r"^\0+$", "", text, flags=re.MULTILINE) if "\0" in text else text
         if not re.search(r"[\0-\x08\x0e-\x1b\x7f]", text):
             return text
         break
-    raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8")
+    raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8, or export a table as CSV")
 
 
 def unzipped(file: Path, data: bytes, most: int = TEXT) -> bytes:

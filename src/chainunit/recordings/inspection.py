@@ -34,8 +34,8 @@ STUCK = 0.2
 """Longest time for which a column with noise may keep its value [s]."""
 CLIPPED = 2e-3
 """Largest share of rows at the same extreme value, in parts of all rows."""
-JUMP = 1e4
-"""Fall of the count of an encoder from which it began anew."""
+JUMP, FASTER = 100.0, 1.5
+"""Fall of the count of an encoder from which it began anew, if it falls faster by this factor than it ever rises."""
 STANDS = 0.05
 """Mean speed, in parts of the expected one, below which the machine stands."""
 SAME = 1.2
@@ -412,7 +412,7 @@ def _of_column(
         yield _fault(recording, name, f"{kept}: the sensor or the logger is stuck; {remedy_text}")
         return
     if expected is not None and not expected.admits(size):
-        yield _fault(recording, name, _scale_words(name, size, expected))
+        yield _fault(recording, name, _scale_words(name, recording.heads[name], size, expected))
         return
     if expected is not None and expected.is_reversed(mean, size):
         yield _fault(
@@ -508,10 +508,11 @@ def _counted(recording: Recording) -> Iterator[InputError]:
     if count is None:
         return
     steps = np.diff(count)
-    place = int(np.argmin(steps))
+    rates = steps / np.diff(recording.time)
+    place = int(np.argmin(rates))
     if count[-1] < count[0] and np.median(steps) < 0.0:
         yield _fault(recording, "motor.count", "counts down, while the motor turns forward: change its sign")
-    elif steps[place] < -JUMP:
+    elif steps[place] < -JUMP and rates[place] < -FASTER * np.max(rates):
         instant = recording.time[place + 1]
         yield _fault(
             recording, "motor.count",
@@ -593,12 +594,16 @@ def _exchanged(recording: Recording, first: str, second: str, sizes: Mapping[str
     )  # fmt: skip
 
 
-def _scale_words(name: str, size: float, expected: Expectation) -> str:
+def _scale_words(name: str, head: str, size: float, expected: Expectation) -> str:
     finding = f"RMS of {_size(name, size)}"
     limit = f"must be from {_size(name, expected.low)} to {_size(name, expected.high)} ({expected.words})"
     unit = MEASURANDS[name].unit
-    for factor, prefix in ((1e-3, "m"), (1e3, "k")):
-        if expected.admits(size * factor):
+    try:
+        stated = scale(name_and_unit(head)[1], unit)[0]
+    except ValueError:
+        stated = 1.0
+    for factor, prefix in ((1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M")):
+        if stated != factor and expected.admits(size * factor / stated):
             return f"{finding}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
     more = ", crank_speed and machine.ratio" if name in OF_SPEED else ""
     return f"{finding}; {limit}: check the sensor, the unit in its head{more}"
