@@ -55,7 +55,7 @@ def model_named(name: str, direct: bool = False, rods: int | None = None) -> Mod
         return machine.direct() if direct else machine
     if name not in MODELS:
         there = f"there are {', '.join(MODELS)}, and study and linkage files (.toml)"
-        file = Path(name).with_suffix(".toml")
+        file = Path(name).parent / f"{Path(name).stem}.toml"
         near = f'; was "{file}" meant?' if file.exists() else near_name(name, MODELS)
         raise InputError(f"{name}: no such model{near or ';'} {there}")
     if direct:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.declared_numbers import in_declared_unit, magnitude_and_unit, number_in
-from ..core.errors import InputError, RemarkWarning, RunError, check_kind, texts_in
+from ..core.errors import InputError, RemarkWarning, RunError, check_choice, check_kind, texts_in
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from ..core.printing.operations import ARGUMENT
@@ -125,6 +125,7 @@ def evaluate(
     """
     import xarray as xr
 
+    check_kind("model", model, Model, 'a model, such as MODELS["DcMotor"] of chainunit.models')
     check_kind("values", values, Mapping, "a mapping of names to values")
     check_kind("over", over, str | None, "the name of a dimension")
     check_kind("workers", workers, int | None, "a number of threads")
@@ -159,8 +160,7 @@ def check_engine(engine: str) -> None:
     InputError
         see `evaluate`.
     """
-    if engine not in ENGINES:
-        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
+    check_choice("engine", engine, ENGINES)
     if engine == "cuda":
         cupy_()
 

@@ -6,11 +6,16 @@ which it does so: a solver stops there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from ..core.declared_numbers import number_in
+from ..core.errors import InputError, check_kind, shown
+
+_CHANGES = "a list of (begin, duration, value after it)"
 
 
 def _share(t: Any, begin: float, duration: float) -> Any:
@@ -21,6 +26,18 @@ def _share(t: Any, begin: float, duration: float) -> Any:
     return np.clip((np.asarray(t) - begin) / duration, 0.0, 1.0)
 
 
+def signals_by_name(signals: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A copy of the signals of a script.
+
+    Raises
+    ------
+    InputError
+        in one line, for another value than a mapping.
+    """
+    check_kind("signals", signals, Mapping | None, "a mapping of full names to numbers or functions of time")
+    return dict(signals or {})
+
+
 @dataclass(frozen=True)
 class Profile:
     """A value with smooth changes at given times.
@@ -29,20 +46,38 @@ class Profile:
     without overlap; each change is a quintic step, continuous to the second derivative, so that a
     communication step or a solver meets no jump.
 
+    Values are in the unit of the signal; times are in s, or texts or quantities of pint with a unit.
+
     Raises
     ------
-    ValueError
-        where changes overlap, or a duration is not positive.
+    InputError
+        where changes overlap, a duration is not positive, and for other values than numbers.
     """
 
     start: float
     changes: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self) -> None:
+        check_kind("changes", self.changes, tuple | list, _CHANGES)
+        changes = []
+        for change in self.changes:
+            if not isinstance(change, tuple | list) or len(change) != 3:
+                raise InputError(f"changes = {shown(self.changes)}: must be {_CHANGES}", "changes")
+            begin, duration, value = change
+            changes.append(
+                (
+                    number_in("s", "begin", begin, "time at which a change begins"),
+                    number_in("s", "duration", duration, "duration of a change"),
+                    number_in("1", "value", value, "value after a change, in the unit of the signal"),
+                )
+            )
+        start = number_in("1", "start", self.start, "value at the start, in the unit of the signal")
+        object.__setattr__(self, "start", start)
+        object.__setattr__(self, "changes", tuple(changes))
         free = -float("inf")
         for begin, duration, _ in self.changes:
             if duration <= 0.0 or begin < free:
-                raise ValueError(
+                raise InputError(
                     f"change at t = {begin:g} s: must last > 0 s and begin after the one before ends"
                 )
             free = begin + duration

@@ -338,6 +338,7 @@ def test_a_wrong_crank_is_recognised(tmp_path):
         [each["given_deviation"]["value"] for each in result["numbers"].values()],
     )
     assert not (tmp_path / "out" / "identified.toml").exists()
+    assert "identified.toml has it" not in (tmp_path / "out" / "result.md").read_text("utf-8")
     suspects = [each["name"] for some in result["suspects"] for each in some["suspects"]]
     assert "machine.r" in suspects and not any("smooth" in name for name in suspects)
     first = result["suspects"][0]
