@@ -12,7 +12,10 @@ import xarray as xr
 
 from chainunit import ChainUnitMachine, InputError, SideLoads, Study, linearize, linkage
 from chainunit.batch import Beyond, Histogram, evaluate
+from chainunit.core.bounds import complaint
+from chainunit.core.declared_numbers import one_number
 from chainunit.core.named import Named
+from chainunit.core.quantities import Quantity, Variable
 from chainunit.machines.api import ChainUnitOfChains
 from chainunit.machines.chain_unit import Feed
 from chainunit.machines.crank_rocker import CrankRocker
@@ -269,6 +272,15 @@ def test_a_system_takes_them_too():
         CompiledSimulation(system, {"motor.w_ref": "3 kg"})
     with CompiledSimulation(system) as simulation, pytest.raises(InputError, match=r'stop = "3 kg"'):
         simulation.run("3 kg", 0.002)
+
+
+@pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean"])
+def test_a_variable_without_a_description_has_no_empty_brackets(kind):
+    """Of an FMU of somebody else."""
+    with pytest.raises(InputError) as refusal:
+        one_number(Variable("drag", "drag", Quantity("1", "", type=kind)), "x")
+    assert "()" not in str(refusal.value)
+    assert "()" not in complaint("drag", 3.0, "1", "<= 2", True, "")
 
 
 def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, **values):
