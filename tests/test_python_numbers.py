@@ -283,6 +283,10 @@ def test_a_variable_without_a_description_has_no_empty_brackets(kind):
     assert "()" not in complaint("drag", 3.0, "1", "<= 2", True, "")
 
 
+def test_a_long_profile_has_a_short_repr():
+    assert len(repr(Profile(1.0, [(float(k), 0.5, 2.0) for k in range(200)]))) < 500
+
+
 def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, **values):
     options = {"by": by, "over": over, "reduce": reduce, "out": out, "workers": workers}
     return ChainUnitMachine().batch({"phi": [0.0, 0.5]} | values, outputs, **options, engine="numpy")
@@ -360,6 +364,11 @@ def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, 
         (lambda: batch(outputs=["tau"], by=[3]), "by = 3: must be a text, or a list of texts"),
         (lambda: batch(outputs="tau", workers="x"), 'workers = "x": must be a number of threads'),
         (lambda: batch(outputs="tau", out=3), "out = 3: must be the result of an earlier call"),
+        (
+            lambda: batch(w=xr.DataArray([1.0], dims="x", attrs={"units": "kg"})),
+            "w in kg: must be a number in rad/s",
+        ),
+        (lambda: MODELS["DcMotr"], '"DcMotr": no such model; was "DcMotor" meant? there are'),
         (lambda: batch(w=xr.DataArray(["1 rpm", "2 kg"], dims="x")), 'w = "2 kg": must be a number in rad/s'),
         (
             lambda: batch(w=xr.DataArray(np.array([None, 1.0], object), dims="x")),

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.brief import briefly_shown
 from ..core.declared_numbers import number_in
 from ..core.errors import InputError, check_kind, shown
 
@@ -38,6 +39,7 @@ def signals_by_name(signals: Mapping[str, Any] | None) -> dict[str, Any]:
     return dict(signals or {})
 
 
+@briefly_shown
 @dataclass(frozen=True)
 class Profile:
     """A value with smooth changes at given times.

@@ -222,6 +222,11 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     numbers = found.answers
     assert list(numbers.index) == list(TRUTH) and numbers["is_determined"].sum() == 2
     assert math.isnan(numbers.loc["machine.left.web_mass", "value"])
+    for name, own in result["numbers"].items():
+        # as identified.toml and the page
+        assert (
+            not own["told"] or numbers.loc[name, "value"] == own["fitted"]["value"] != own["value"]["value"]
+        )
 
 
 def found_within(done, folder, most=4.0):
