@@ -27,6 +27,11 @@ def _share(t: Any, begin: float, duration: float) -> Any:
     return np.clip((np.asarray(t) - begin) / duration, 0.0, 1.0)
 
 
+def _number(unit: str, name: str, value: Any, description: str) -> Any:
+    """A number of a profile; the symbols of a page in which the machine runs stay as they are."""
+    return value if getattr(value, "is_symbol", False) else number_in(unit, name, value, description)
+
+
 def signals_by_name(signals: Mapping[str, Any] | None) -> dict[str, Any]:
     """A copy of the signals of a script.
 
@@ -68,12 +73,12 @@ class Profile:
             begin, duration, value = change
             changes.append(
                 (
-                    number_in("s", "begin", begin, "time at which a change begins"),
-                    number_in("s", "duration", duration, "duration of a change"),
-                    number_in("1", "value", value, "value after a change, in the unit of the signal"),
+                    _number("s", "begin", begin, "time at which a change begins"),
+                    _number("s", "duration", duration, "duration of a change"),
+                    _number("1", "value", value, "value after a change, in the unit of the signal"),
                 )
             )
-        start = number_in("1", "start", self.start, "value at the start, in the unit of the signal")
+        start = _number("1", "start", self.start, "value at the start, in the unit of the signal")
         object.__setattr__(self, "start", start)
         object.__setattr__(self, "changes", tuple(changes))
         free = -float("inf")
