@@ -208,7 +208,10 @@ def test_faults_of_the_rows():
     assert missing.missing == pytest.approx(0.4, abs=1e-3) and missing.gaps == [(1.999, 6.001)]
     slow = recorded(rate=5.0, duration=60.0)
     (fault,) = faults(slow)
-    assert "5 rows a second are 10 in a turn of the crank; record >= 20 rows a second, correct crank_speed" in fault
+    assert (
+        "5 rows a second are 10 in a turn of the crank; record >= 20 rows a second, correct crank_speed"
+        in fault
+    )
     (fault,) = faults(GOOD.part(0.0, 2.5))
     assert (
         "2.5 s are 1.19 turns of the crank at crank_speed; record >= 3 turns, or correct crank_speed" in fault
