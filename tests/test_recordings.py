@@ -16,6 +16,7 @@ from chainunit.capabilities.identification.reading import PlannedRun
 from chainunit.capabilities.watch.watch import watch
 from chainunit.recordings.inspection import (
     Expectation,
+    _turning_speed,
     inspect_columns,
     inspect_motion,
     inspect_steadiness,
@@ -216,7 +217,10 @@ def test_faults_of_the_rows():
     assert missing.missing == pytest.approx(0.4, abs=1e-3) and missing.gaps == [(1.999, 6.001)]
     slow = recorded(rate=5.0, duration=60.0)
     (fault,) = faults(slow)
-    assert "5 rows a second are 10 in a turn of the crank; record >= 19 rows a second" in fault
+    assert (
+        "5 rows a second are 10 in a turn of the crank; record >= 20 rows a second, correct crank_speed"
+        in fault
+    )
     (fault,) = faults(GOOD.part(0.0, 2.5))
     assert (
         "2.5 s are 1.19 turns of the crank at crank_speed; record >= 3 turns, or correct crank_speed" in fault
@@ -296,6 +300,16 @@ def test_a_stated_speed_far_from_that_of_the_recording_is_the_one_cause(stated, 
     (remedy,) = re.findall('crank_speed = "(.*) rev/min"', fault)
     speed = float(remedy) * np.pi / 30.0
     assert speed == pytest.approx(SPEED, rel=0.01) and inspect_motion(recording, (speed, speed), RATIO) == []
+
+
+@pytest.mark.parametrize("stated", [0.45, 0.3])
+@pytest.mark.parametrize("left_out", [("mark",), ("mark", "motor.w")])
+def test_a_column_that_repeats_after_several_turns_tells_the_time_of_one(stated, left_out):
+    """At half the speed the refusal named a third of it, with the remedy to state this third."""
+    whole = recorded(rate=200.0, duration=60.0)
+    columns = {name: x for name, x in whole.columns.items() if name not in left_out}
+    name, speed, error = _turning_speed(replace(whole, columns=columns), stated * SPEED, RATIO, 0.01)
+    assert name in ("motor.i", "motor.u", "motor.w") and speed == pytest.approx(SPEED, rel=error)
 
 
 def test_a_stated_speed_is_not_blamed_for_another_fault():

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.declared_numbers import in_declared_unit, magnitude_and_unit, number_in
-from ..core.errors import InputError, RemarkWarning, RunError, check_kind, texts_in
+from ..core.declared_numbers import in_declared_unit, kind_words, magnitude_and_unit, number_in
+from ..core.errors import InputError, RemarkWarning, RunError, check_choice, check_kind, printable, texts_in
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from ..core.printing.operations import ARGUMENT
 from ..core.quantities import Variable
 from ..core.symbolic_trace import outputs_of
-from ..core.units import scale
+from ..core.units import of_other_kind, scale
 from . import arrays
 from .cuda import cuda_kernel, cupy_, host, namespace, on_device
 from .equations import Equations, Result, equations, find, names_of
@@ -126,6 +126,7 @@ def evaluate(
     """
     import xarray as xr
 
+    check_kind("model", model, Model, 'a model, such as MODELS["DcMotor"] of chainunit.models')
     check_kind("values", values, Mapping, "a mapping of names to values")
     check_kind("over", over, str | None, "the name of a dimension")
     check_kind("workers", workers, int | None, "a number of threads")
@@ -160,8 +161,7 @@ def check_engine(engine: str) -> None:
     InputError
         see `evaluate`.
     """
-    if engine not in ENGINES:
-        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
+    check_choice("engine", engine, ENGINES)
     if engine == "cuda":
         cupy_()
 
@@ -526,7 +526,9 @@ def _array(variable: Variable, x: Any) -> xr.DataArray:
             try:
                 factor, offset = scale(str(unit), variable.unit, variable.kind)
             except ValueError as error:
-                raise InputError(f"{variable.name} in {unit}: {error}") from error
+                kind = of_other_kind(str(unit), variable.unit)
+                line = f"{variable.name} in {printable(str(unit))}: must be {kind_words(variable)}"
+                raise InputError(f"{line}; {kind}" if kind else line, variable.name) from error
             values = values * factor + offset
         x = x.copy(data=values).assign_attrs(attributes)
         if x.dims == (variable.name,):

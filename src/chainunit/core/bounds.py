@@ -26,7 +26,7 @@ def complaint(name: str, x: float, unit: str, allowed: str, bounded: bool, descr
     if not math.isfinite(x):
         allowed = messages.FINITE.format(allowed=allowed) if bounded else messages.NUMBER
     line = messages.VALUE.format(name=name, value=x, unit=messages.unit_behind(unit), allowed=allowed)
-    return f"{line} ({description})"
+    return f"{line} ({description})" if description else line
 
 
 def refusal(

@@ -23,13 +23,15 @@ def may_be_share(variable: Variable) -> bool:
 def kind_words(variable: Variable) -> str:
     """Words on what a value of a file has to be: ``a number in m, or a text such as "2 mm" (crank O1-A)``."""
     fitting = units.fitting(variable.unit, variable.kind)
+    # a variable of an FMU may have no description
+    meaning = f" ({variable.description})" if variable.description else ""
     if variable.type != "Real":
-        return f"{variable.quantity.allowed_range} ({variable.description})"
+        return f"{variable.quantity.allowed_range}{meaning}"
     if variable.unit == "1":
         share = ', or a text such as "8 %"' if may_be_share(variable) else ""
-        return f"a pure number{share} ({variable.description})"
+        return f"a pure number{share}{meaning}"
     declared = variable.unit.replace(".", " ")
-    return f'a number in {declared}, or a text such as "2 {fitting[0]}" ({variable.description})'
+    return f'a number in {declared}, or a text such as "2 {fitting[0]}"{meaning}'
 
 
 def number_of_text(variable: Variable, text: str) -> float:

@@ -159,6 +159,18 @@ def check_kind(name: str, value: Any, kind: Any, description: str = "") -> None:
         raise InputError(f"{name} = {shown(value)}: must be {description or kind.__qualname__}", name)
 
 
+def check_choice(name: str, value: Any, allowed: Collection[str]) -> None:
+    """Refuse a `value` of a script that is none of the `allowed` texts.
+
+    Raises
+    ------
+    InputError
+        in one line.
+    """
+    if not isinstance(value, str) or value not in allowed:
+        raise InputError(f"{name} = {shown(value)}: must be {one_of(value, allowed)}", name)
+
+
 def texts_in(name: str, value: Any) -> tuple[str, ...]:
     """The texts of an argument of a script that is a sequence of them; one text alone is a sequence of one.
 
@@ -167,7 +179,10 @@ def texts_in(name: str, value: Any) -> tuple[str, ...]:
     InputError
         in one line.
     """
-    listed = (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    try:
+        listed = (value,) if isinstance(value, str) else tuple(value)
+    except TypeError:  # also of an array without a dimension
+        listed = (value,)
     for text in listed:
         check_kind(name, text, str, "a text, or a list of texts")
     return listed
@@ -232,8 +247,12 @@ def shown(value: Any, depth: int = 0) -> str:
         return _bracketed("{ ", entries, len(value), " }")
     if isinstance(value, list | tuple):
         return _bracketed("[", [shown(x, depth + 1) for x in _first(value)], len(value), "]")
+    if hasattr(value, "magnitude"):  # of a library such as pint
+        return shown(str(value))
     if hasattr(value, "tolist"):  # of numpy
-        return shown(value.tolist(), depth)
+        plain = value.tolist()
+        # a number of numpy that Python lacks stays as it is
+        return printable(str(plain)) if type(plain) is type(value) else shown(plain, depth)
     if isinstance(value, date | time):
         return value.isoformat()
     return printable(_brief(value), 100)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import Literal, get_args
 
-from ..core.errors import InputError, RunError, WriteError, one_of, shown
+from ..core.errors import InputError, RunError, WriteError, check_choice, shown
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from . import export as python
@@ -54,12 +55,11 @@ def export(
     KeyError, InputError, RunError
         see `chainunit.fmu.export.export` and `chainunit.fmu.native.export.export`.
     """
-    if fmi not in (2, 3):
-        raise InputError(f"fmi = {fmi}: must be 2 or 3")
-    if backend not in (None, *get_args(Backend)):
-        raise InputError(f"backend = {shown(backend)}: must be {one_of(backend, get_args(Backend))}")
-    if names not in get_args(Names):
-        raise InputError(f"names = {shown(names)}: must be {one_of(names, get_args(Names))}")
+    if not isinstance(fmi, Integral) or fmi not in (2, 3):
+        raise InputError(f"fmi = {shown(fmi)}: must be 2 or 3")
+    if backend is not None:
+        check_choice("backend", backend, get_args(Backend))
+    check_choice("names", names, get_args(Names))
     if backend == "python":
         return _by_python(model, file, start, names, fmi, platforms, "")
     if backend is None and not platforms and not targets.compiles(fmi):

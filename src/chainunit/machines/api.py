@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.declared_numbers import in_declared_unit, number_in, one_number
 from ..core.engines import MATH, numpy_
-from ..core.errors import GeometryError, InputError, check_kind, one_of, shown
+from ..core.errors import GeometryError, check_choice, check_kind
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, Quantity, Variable
 from ..mechanism.models import InverseMachine
@@ -168,7 +168,7 @@ class ChainUnitMachine(Machine):
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of one kilogram of material on the `side` ("left" or "right") [J/kg]: dE/dm,
         the factor of the feed in an energy balance (the energy is linear in the mass)."""
-        _check_side(side)
+        check_choice("side", side, SIDES)
         kilogram = SideLoads(material_mass=1.0, processing_force=0.0)
 
         def energy(**loads: Any) -> Any:
@@ -228,7 +228,7 @@ class ChainUnitMachine(Machine):
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
-        _check_side(side)
+        check_choice("side", side, SIDES)
         p, organ = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
         on_web = p.web_share * loads.material_mass
@@ -343,11 +343,6 @@ class ChainUnitMachine(Machine):
         """Lowest crank speed [rad/s] at which an end of a web is pushed somewhere in the turn, as `slack_speed`;
         there a chain sags."""
         return _first_loss(lambda w: self.least_web_pull(w * self.p.ratio, left, right), highest)
-
-
-def _check_side(side: Any) -> None:
-    if side not in SIDES:
-        raise InputError(f"side = {shown(side)}: must be {one_of(side, SIDES)}")
 
 
 def _first_loss(pull: Callable[[Any], Any], highest: Any) -> float:

@@ -129,7 +129,8 @@ class CrankRocker:
 
     def __post_init__(self) -> None:
         for name in ("r", "l", "h", "b"):
-            value = getattr(self, name)
+            value = number_in("m", name, getattr(self, name), "a length of the crank-rocker")
+            object.__setattr__(self, name, value)
             if not (math.isfinite(value) and value > 0.0):
                 raise GeometryError(f"{name} = {value:g} m: must be finite, > 0 m")
         longest = longest_crank(MATH, self.l, self.h, self.b)

@@ -57,6 +57,7 @@ class Machine:
     """Words on what the results without a run are of, where the runs have another model; else empty."""
 
     def __init__(self, model: InverseMachine, parameters: Any = None, /, **values: Any) -> None:
+        check_kind("model", model, InverseMachine, "a machine, such as KnifeDrive")
         self.model = model
         if isinstance(parameters, model.Parameters):
             parameters = model.parameter_layout.by_name(parameters)

@@ -57,6 +57,9 @@ CLOCK = 5e-4
 ALIKE, AROUND = 0.6, 1.5
 """Correlation of a column with itself one turn later from which it tells the turn; and the factor around the stated
 time of a turn within which the turn is sought."""
+_MOST_TURNS, _LESS_ALIKE = 12, 0.02
+"""Largest number of turns that a time after which a column repeats may have, and how much less alike it may be after
+one of them."""
 GAINS = 3.0
 """Standard deviations by which the gain of a sensor of speed may be wrong."""
 _ROWS_STUCK = 20
@@ -253,9 +256,24 @@ def _turning_speed(
         if like > ALIKE
     ]
     if turns:
-        _, name, turn = max(turns)
+        like, name, turn = max(turns)
+        if abs(2.0 * math.pi / turn / crank_speed - 1.0) > 2.0 * clock:
+            turn /= _turns_in(recording, name, turn, like, next(iter(speeds.values()), None))
         return name, 2.0 * math.pi / turn, 2.0 * clock
     return next(((name, speed, clock + GAINS * gain) for name, speed in speeds.items()), None)
+
+
+def _turns_in(recording: Recording, name: str, span: float, like: float, measured: float | None) -> int:
+    """The number of turns of the crank in a time after which a column repeats, with this correlation: by the measured
+    speed of the crank, else the largest number of parts after each of which the column repeats as well."""
+    if measured is not None:
+        return max(1, round(span * measured / (2.0 * math.pi)))
+    parts = [1]
+    for count in range(2, _MOST_TURNS + 1):
+        like_of_part, part = _turn(recording, name, span / count)
+        if like_of_part > like - _LESS_ALIKE and abs(count * part / span - 1.0) < 0.01:
+            parts.append(count)
+    return parts[-1]
 
 
 def _turn(recording: Recording, name: str, stated: float) -> tuple[float, float]:
@@ -450,7 +468,7 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         yield _fault(
             recording, "time",
             f"{1.0 / step:.3g} rows a second are {turn / step:.2g} in a turn of the crank; record >= "
-            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, correct crank_speed, or write the unit of the times "
+            f"{math.ceil(LEAST_ROWS / turn)} rows a second, correct crank_speed, or write the unit of the times "
             "into their head",
         )  # fmt: skip
     if recording.missing > MISSING:

@@ -405,5 +405,6 @@ TASK: Task[LinkageQuestion, tuple[LinkageFindings, str, tuple[UnusualValue, ...]
     lambda outcome: linkage_report(*outcome),
     files=PICTURES,
     accept=no_check,
+    sources=lambda question: (Path(question.file),),
     tells_remarks=True,
 )

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.errors import InputError, InterruptedRunError, RunError, printable
+from ..core.errors import InputError, InterruptedRunError, RunError, check_kind, printable
 from ..core.files import folder as make_folder
 from ..core.files import scratch
 from .job import BatchStore, Job
@@ -229,6 +229,7 @@ def check_scheduler(scheduler: str) -> None:
     InputError
         where they do not answer within a few seconds.
     """
+    check_kind("scheduler", scheduler, str, "the address of a Dask scheduler")
 
     async def ask() -> Any:
         import distributed
