@@ -268,7 +268,7 @@ def test_a_gpu_that_is_not_there_is_refused_before_there_is_a_store(monkeypatch,
     (tmp_path / "file.toml").write_text(SPREAD, "utf-8")
     for engine, words in {
         "cuda": r"engine 'cuda': needs CuPy: pip install 'chainunit\[cuda\]'; or take engine 'native'",
-        "gpu": "engine 'gpu': must be one of native, numpy, cuda",
+        "gpu": 'engine = "gpu": must be one of native, numpy, cuda',
     }.items():
         with pytest.raises(InputError, match=words):
             Study.from_text(SPREAD).sweep(tmp_path / "out", engine=engine)
