@@ -15,6 +15,7 @@ from ...mechanism.expressions import CONSTANTS, WORDS
 from .joint_kind import JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
+from .points import owners_of
 from .structure import DriverEntry, groups_of
 
 Fault = tuple[str, str]
@@ -116,10 +117,7 @@ def spring_faults(loads: Entries, joints: Entries) -> Iterator[Fault]:
 def alike_points(points: Mapping[str, Iterable[str]], used: set[tuple[str, ...]]) -> str:
     """Words on a point that nothing joins, whose name looks like that of a point of another link: a pin that was
     meant. `used` are the points that joints, loads and masses name, by link."""
-    owners: dict[str, list[str]] = {}
-    for link, names in points.items():
-        for point in names:
-            owners.setdefault(point, []).append(link)
+    owners = owners_of(points)
     for link, names in points.items():
         for point in names:
             if owners[point] != [link] or (link, point) in used:

@@ -22,6 +22,7 @@ from ...groups.group import Group, SolvedGroup
 from ...groups.joints import Hinge, HingeData, JointData, LinkageInMotion, Placed, Rates, Third
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from .joint_kind import JointEntry, JointParts, JointReader, JointTable, SingleLinkKind
+from .points import connected, owners_of
 
 _AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
 _MOST = 12
@@ -208,7 +209,10 @@ class GearKind(SingleLinkKind):
         """Add the arm with its points at the centres, and the pitch point, which it carries by the name of the
         joint."""
         key, wheels = f"joints.{joint['name']}", (joint["on"][0], joint["by"][0])
-        centres = [dict(_meeting(reader.points, joints, *joint[end])) for end in ("on", "by")]
+        met = [{tuple(j["on"]), tuple(j["by"])} for j in joints if j["type"] == REVOLUTE]
+        # pins join points of one name, too
+        met += [{(link, name) for link in links} for name, links in owners_of(reader.points).items()]
+        centres = [dict(connected(tuple(joint[end]), met)) for end in ("on", "by")]
         arm = next(
             (link for link in reader.points if link not in wheels and all(link in c for c in centres)), ""
         )
@@ -287,17 +291,3 @@ def _ratio(joint: JointEntry, link: str) -> Fraction:
     on, by = joint.table["teeth"]
     ratio = Fraction(by, on) if link == joint.on[0] else Fraction(on, by)
     return ratio if joint.table["internal"] else -ratio
-
-
-def _meeting(
-    points: Mapping[str, Mapping[str, Any]], joints: Sequence[JointTable], link: str, point: str
-) -> set[tuple[str, str]]:
-    """The points, by link and name, that pins hold together with this one, and itself."""
-    pins = [{tuple(joint["on"]), tuple(joint["by"])} for joint in joints if joint["type"] == REVOLUTE]
-    met, grown = set[tuple[str, str]](), {(link, point)}
-    while met != grown:
-        met = grown
-        names = {name for _, name in met}
-        alike = {(owner, name) for owner, owned in points.items() for name in names & {*owned}}
-        grown = met.union(alike, *(pair for pair in pins if pair & met))
-    return met

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from typing import Any, cast
 
 import numpy as np
@@ -24,7 +24,7 @@ from ...core.model import About, FmuData, Requirement
 from ...core.planar import ZERO
 from ...core.quantities import Value, declared_class, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
-from ...groups.triad import MOST_MISFIT, Triad
+from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
@@ -33,9 +33,10 @@ from ...mechanism.expressions import expression, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, words_on_motion
+from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
-from .following import LEAST_MARGIN, FollowedLinkage
-from .geometry import LinkGeometry
+from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
+from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
 from .loads import (
     ForceLaw,
@@ -47,13 +48,11 @@ from .loads import (
     name_of_load,
     parts_of_extreme,
     requirement_of_width,
-    widths_of,
 )
-from .narrow import lesser, turns_of_triads
 from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
 from .probes import constant_outputs, description_axis, notes_on, repeated_outputs
-from .structure import check_groups, structure_of
+from .structure import Structure, check_groups
 from .way import DriverWay
 
 STANDARD_GRAVITY = 9.81
@@ -103,7 +102,7 @@ class LinkageDescription(LinkageOutputs):
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data = data
-        self.structure = structure_of(data)
+        self.structure = Structure.of(data)
         self.way = DriverWay.of(data, self.structure.rate)
         check_groups(self.structure, data.get("groups", ()))
         tables = data.get("tables", {})
@@ -128,16 +127,19 @@ class LinkageDescription(LinkageOutputs):
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
         geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
-        self.sides = dict(LinkageParts(geometry).sides)
-        self.sides |= turns_of_triads(self._loaded(LinkageParts(geometry, self.sides), p))
+        self.sides = start_sides(geometry)
         self.at_start = self._loaded(LinkageParts(geometry, self.sides), p)
+        self.sides |= turns_of_triads(self.at_start)
+        self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
         self._check_extremes()
-        self.start_derived = derived_numbers(MATH, self.at_start)
+        self.start_derived = self.followed.derived
+        if self.extremes:
+            self.start_derived = derived_numbers(MATH, self.at_start)
+            # loads with extremes have values from here on
+            self.at_start = self.linkage(MATH, self._ready(), u)
         p = self._ready()
-        self.widths = (
-            checked_widths(data["loads"], self.values(MATH, p, u)) if widths_of(data["loads"]) else ()
-        )
+        self.widths = checked_widths(data["loads"], self.values(MATH, p, u))
         self.check_loads(p, 1.0)
 
     # declarations
@@ -211,7 +213,9 @@ class LinkageDescription(LinkageOutputs):
             }
             loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths)
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)
-        return DescribedLinkage(parts.ground, parts.driver, parts.groups, loads, parts, extremes=extremes)
+        return DescribedLinkage(
+            parts.ground, parts.driver, tuple(parts.groups), loads, parts, extremes=extremes
+        )
 
     def _extreme(self, name: str, parts: LinkageParts) -> MotionExtreme:
         """An extreme of the motion, by its name in expressions."""
@@ -335,11 +339,10 @@ class LinkageDescription(LinkageOutputs):
 
     def _turns(self) -> dict[str, tuple[float, float]]:
         """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes."""
-        followed = self._followed(self.at_start)
         try:
-            return followed.turns()
+            return self.followed.turns()
         except InputError as error:
-            raise InputError(f"{error}{followed.range_words()}", key=error.key) from None
+            raise InputError(f"{error}{self.followed.range_words()}", key=error.key) from None
 
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
@@ -366,10 +369,9 @@ class LinkageDescription(LinkageOutputs):
         """The usual end stops of a driver with a range, for its start values; None for one that turns round."""
         if self.way.turns:
             return None
-        p, u = self._ready(), self.Inputs()
-        linkage = self.linkage(MATH, p, u)
         states = [
-            MachineState(MATH, Mechanism(MATH, linkage, q, self.start_derived), 0.0) for q in self.places()
+            MachineState(MATH, Mechanism(MATH, self.at_start, q, self.start_derived), 0.0)
+            for q in self.places()
         ]
         mass = max(state.J for state in states)
         low, high = self.span
@@ -452,24 +454,15 @@ class LinkageDescription(LinkageOutputs):
                 margins = Mechanism(xp, linkage, q, derived).margins()
             except (ArithmeticError, ValueError):
                 margins = [math.nan] * len(self.structure.groups)
-            signed = [margin * sign for margin, sign in zip(margins, self._signs, strict=True)]
-            least = signed if not least else [lesser(xp, *pair) for pair in zip(least, signed, strict=True)]
+            margins = signed(margins, self.followed.signs)
+            least = margins if not least else [lesser(xp, *pair) for pair in zip(least, margins, strict=True)]
         for margin in least:
             yield margin, LEAST_MARGIN, math.inf
-        last = 0
-        for assur_group in linkage.groups:
-            last += assur_group.derived_count
-            if isinstance(assur_group, Triad):
-                yield derived[last - 2], -math.inf, MOST_MISFIT
+        for _, misfit in misfits(linkage, derived):
+            yield misfit, -math.inf, MOST_MISFIT
         values = linkage.parts.geometry.values
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
-
-    @cached_property
-    def _signs(self) -> list[float]:
-        """The signs of the margins with the start values."""
-        m = Mechanism(MATH, self.at_start, self.places()[0], self.start_derived)
-        return [math.copysign(1.0, margin) for margin in m.margins()]
 
     @property
     def notes(self) -> str:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...core.errors import InputError
 from ...core.planar import Vec2
 from ...groups.body import Bar, Mass
 from ...groups.driver import Crank, Cylinder, Driver, Ram
@@ -16,7 +14,7 @@ from ...groups.joints import Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
 from ...groups.triad import Pose, Triad
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
-from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry, RoughPoses
+from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry
 from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
 from .structure import CYLINDER
@@ -29,27 +27,22 @@ class LinkageParts:
     and link), with the sign that turns it into the force on the link that the description names first.
     """
 
-    def __init__(self, geometry: LinkGeometry, sides: Mapping[str, float] | None = None) -> None:
+    def __init__(self, geometry: LinkGeometry, sides: Mapping[str, float]) -> None:
         """
         Parameters
         ----------
-        sides : the assembly modes, of a triad the turns of its ternary link; None to find modes by the rough poses,
-            which takes numbers and `MATH`
+        sides : the assembly modes, of a triad the turns of its ternary link, by the first link of each group
         """
-        self.geometry, self.structure = geometry, geometry.structure
-        self._rough = RoughPoses(geometry)
-        self.sides: dict[str, float] = dict(sides or {})
-        self._known_sides = sides is not None
+        self.geometry, self.structure, self.sides = geometry, geometry.structure, sides
         self.frames: dict[str, LinkFrame] = {GROUND: OWN}
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
         self._carriers = {self.pin(GROUND, name): GROUND for name in self.structure.ground}
-        first, *rest = [*self.structure.groups, None]
-        cylinder = first is not None and first.kind == CYLINDER
-        self.driver = self._cylinder(first) if first is not None and cylinder else self._driver()
-        self.groups: tuple[Group, ...] = ()
-        for group in rest if cylinder else self.structure.groups:
-            if group is not None:
-                self.groups += (self._group(group),)
+        groups = list(self.structure.groups)
+        cylinder = groups.pop(0) if groups and groups[0].kind == CYLINDER else None
+        self.driver = self._driver() if cylinder is None else self._cylinder(cylinder)
+        self.groups: list[Group] = []
+        for group in groups:
+            self.groups.append(self._group(group))
 
     def pin(self, link: str, point: str) -> str:
         """The name of a point in the linkage."""
@@ -152,11 +145,6 @@ class LinkageParts:
         )
         bars = self.bar(barrel, frames[barrel], self.outer(p, barrel)), self.bar(rod, frames[rod])
         swung = self._rod(lever, q, c)
-
-        def turn() -> Any:
-            start, end = self._rough.place(GROUND, p), self._rough.place(GROUND, q)
-            return (end - start).cross(self._rough.place(lever, c) - start)
-
         return Cylinder(
             bars[0],
             inner,
@@ -166,7 +154,7 @@ class LinkageParts:
             near.y - far.y,
             far.y,
             self._guide(slide, rod),
-            self._side(barrel, turn),
+            self.sides[barrel],
         )
 
     # joints by their letters: p and q join a link with those before, b and c are the pin between two links, g and h
@@ -190,13 +178,7 @@ class LinkageParts:
 
     def _rrr(self, first: str, second: str, p: JointEntry, b: JointEntry, q: JointEntry) -> Group:
         inner = self._inner(b, first, second)
-        bars = self._rod(first, p, b), self._rod(second, q, b)
-
-        def turn() -> Any:
-            start, end = self._rough.place(p.other_link(first), p), self._rough.place(q.other_link(second), q)
-            return (end - start).cross(self._rough.place(second, b) - start)
-
-        return Dyad(inner, *bars, self._side(first, turn))
+        return Dyad(inner, self._rod(first, p, b), self._rod(second, q, b), self.sides[first])
 
     def _inner(self, joint: JointEntry, first: str, second: str) -> str:
         """The pin between two links, which the second one carries."""
@@ -204,19 +186,6 @@ class LinkageParts:
         self._carriers[pin] = second
         self.receive(joint, pin, first)
         return pin
-
-    def _side(self, first: str, value: Callable[[], Any]) -> float:
-        """The assembly mode of a dyad, from the sign of a value of the rough poses."""
-        if not self._known_sides:
-            rough = float(value())
-            if abs(rough) < 1e-9:
-                raise InputError(
-                    f"the start pose does not tell how {first} is assembled: it stands in a dead position; give the "
-                    "start at another place of the driver",
-                    key="start",
-                )
-            self.sides[first] = math.copysign(1.0, rough)
-        return self.sides[first]
 
     def _slider(self, link: str, rail: JointEntry, start: str) -> tuple[Bar, Rail, str]:
         """A block whose frame starts at the point `start` on its rail."""
@@ -228,36 +197,24 @@ class LinkageParts:
     def _rrp(self, first: str, slider: str, p: JointEntry, c: JointEntry, g: JointEntry) -> Group:
         inner = self._inner(c, first, slider)
         rod = self._rod(first, p, c)
-        bar, rail, guide = self._slider(slider, g, c.at(slider))
-
-        def along() -> Any:
-            return (self._rough.place(slider, c) - self._rough.place(p.other_link(first), p)).dot(
-                self._rough.line(g)
-            )
-
-        return RRP(inner, rod, bar, rail, guide, self._side(first, along))
+        return RRP(inner, rod, *self._slider(slider, g, c.at(slider)), self.sides[first])
 
     def _rpr(self, first: str, second: str, p: JointEntry, g: JointEntry, q: JointEntry) -> Group:
+        links = ((first, p), (second, q))
         frames = [
-            LinkFrame(self.geometry.point(link, j.at(link)), self.geometry.direction(g, link))
-            for link, j in ((first, p), (second, q))
+            LinkFrame(self.geometry.point(link, joint.at(link)), self.geometry.direction(g, link))
+            for link, joint in links
         ]
         block, line = (
             frame.coordinates(self.geometry.point(link, g.at(link)))
-            for frame, link in zip(frames, (first, second), strict=True)
+            for frame, (link, _) in zip(frames, links, strict=True)
         )
-        starts = self.outer(p, first), self.outer(q, second)
+        starts = [self.outer(joint, link) for link, joint in links]
         bars = [
             self.bar(link, frame, start)
-            for link, frame, start in zip((first, second), frames, starts, strict=True)
+            for (link, _), frame, start in zip(links, frames, starts, strict=True)
         ]
-
-        def along() -> Any:
-            arm = self._rough.place(p.other_link(first), p) - self._rough.place(q.other_link(second), q)
-            return arm.dot(self._rough.line(g))
-
-        offset = line.y - block.y
-        return RPR(bars[0], bars[1], offset, self._guide(g, first), self._side(first, along))
+        return RPR(bars[0], bars[1], line.y - block.y, self._guide(g, first), self.sides[first])
 
     def _prp(self, first: str, second: str, g: JointEntry, c: JointEntry, h: JointEntry) -> Group:
         inner = self._inner(c, first, second)

@@ -4,8 +4,8 @@ of links); its frame and signs in words."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from ...core.planar import Motion, Vec2
 from ...groups.joints import GuideForce
@@ -15,9 +15,8 @@ from .declarations import GuideReaction, PointMotion
 from .geometry import LinkFrame
 from .joint_kind import JointEntry
 from .parts import LinkageParts
+from .points import connected
 from .structure import DriverEntry, LinkEntry, Structure
-
-_Node = TypeVar("_Node")
 
 
 def description_axis(u: Vec2, frame: LinkFrame) -> Vec2:
@@ -101,7 +100,7 @@ def _points(link: LinkEntry) -> list[str]:
 def _orientation(structure: Structure, link: str) -> set[str]:
     """The links that turn as this one does, as sliding joints hold them, and itself; links of the ground cannot
     turn."""
-    return _connected(link, [j.links for j in structure.joints.values() if j.kind == PRISMATIC])
+    return connected(link, [j.links for j in structure.joints.values() if j.kind == PRISMATIC])
 
 
 def _pinned(structure: Structure, end: tuple[str, str]) -> set[tuple[str, str]]:
@@ -112,16 +111,7 @@ def _pinned(structure: Structure, end: tuple[str, str]) -> set[tuple[str, str]]:
         pins += [
             {(name, _CENTROID), (name, pin)} for pin, place in link.points.items() if place == link.centroid
         ]
-    return _connected(end, pins)
-
-
-def _connected(start: _Node, pairs: Sequence[set[_Node]]) -> set[_Node]:
-    """All that the pairs connect with this one, and itself."""
-    met, grows = {start}, True
-    while grows:
-        grown = met.union(*(pair for pair in pairs if pair & met))
-        met, grows = grown, grown != met
-    return met
+    return connected(end, pins)
 
 
 def notes_on(driver: DriverEntry, limits: tuple[float, float] | None, angle_counts: str) -> str:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError
 from ...mechanism.assur import AssurGroup
-from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism
-from .geometry import LinkGeometry
+from .geometry import TWO_WAYS
 from .model import LinkageDescription
-from .parts import LinkageParts
 from .probes import description_axis
 from .structure import CYLINDER
 
-_TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER)
 _AS_FAR = 0.8
 """Share of its distance from the other way that a start may be away from the way that is taken."""
 _SAME = 1e-6
@@ -32,23 +30,34 @@ def check_start(described: LinkageDescription) -> None:
     InputError
         in one line, with both places of the pin, or both angles of the link, that the start may give.
     """
-    derived, geometry = described.start_derived, described.at_start.parts.geometry
     for group in described.structure.groups:
-        if group.kind in _TWO_WAYS:
-            _check(described, geometry, derived, group)
+        if group.kind in TWO_WAYS:
+            _check(described, group)
 
 
-def _check(
-    described: LinkageDescription, geometry: LinkGeometry, derived: Sequence[float], group: AssurGroup
-) -> None:
-    structure, first = described.structure, group.links[0]
-    angles, pins, joint = [], [], structure.joints[group.joints[1].name]
-    for sense in (1.0, -1.0):
-        parts = LinkageParts(geometry, described.sides | {first: sense * described.sides[first]})
-        # a cylinder is the driver, and no group of the linkage
-        number = structure.groups.index(group) + 1 - (len(structure.groups) - len(parts.groups))
-        linkage = Linkage(parts.ground, parts.driver, parts.groups, {}).before(number)
-        m = Mechanism(MATH, linkage, structure.start, derived[: linkage.derived_count])
+def _both_ways(described: LinkageDescription, group: AssurGroup) -> list[Mechanism]:
+    """The start of the linkage up to a dyad, with the dyad as it is assembled, and in the other way."""
+    structure, linkage = described.structure, described.at_start
+    # a cylinder is the driver, and no group of the linkage
+    count = structure.groups.index(group) + 1 - (len(structure.groups) - len(linkage.groups))
+    one = linkage.before(count)
+    if group.kind == CYLINDER:
+        other = replace(one, driver=_turned(one.driver))
+    else:
+        other = replace(one, groups=(*one.groups[:-1], _turned(one.groups[-1])))
+    return [Mechanism(MATH, way, structure.start, described.start_derived) for way in (one, other)]
+
+
+def _turned(dyad: Any) -> Any:
+    """A dyad, or a cylinder, that is assembled in the other way."""
+    return replace(dyad, side=-dyad.side)
+
+
+def _check(described: LinkageDescription, group: AssurGroup) -> None:
+    structure, parts = described.structure, described.at_start.parts
+    joint = structure.joints[group.joints[1].name]
+    angles, pins = [], []
+    for m in _both_ways(described, group):
         axes = (description_axis(m.links[link].u, parts.frames[link]) for link in group.links)
         angles.append([math.atan2(axis.y, axis.x) for axis in axes])
         pins.append(m.pins.get(parts.pin(*joint.by)))
