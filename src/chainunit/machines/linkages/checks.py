@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import math
 import re
 import unicodedata
@@ -12,6 +11,8 @@ from typing import Any
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
+from .declarations import RESERVED
+from .entries import name_fault
 from .joint_kind import JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
@@ -21,28 +22,9 @@ from .structure import DriverEntry, groups_of
 Fault = tuple[str, str]
 Entries = Sequence[Mapping[str, Any]]
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_WORD = re.compile(r"[^\W\d]\w*")
 POINT_NAMES = ("angle", "w", "a", "centroid", "mass", "inertia")
 """Names that the variables of a link have already."""
 _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
-
-
-def words_in(entry: Any) -> set[str]:
-    """All words in the texts of a table."""
-    if isinstance(entry, str):
-        return {*_WORD.findall(entry)}
-    inside = entry.values() if isinstance(entry, Mapping) else entry if isinstance(entry, list) else ()
-    return set().union(*map(words_in, inside))
-
-
-def name_fault(name: str) -> str:
-    """What is wrong with a name; empty where nothing is."""
-    if not _NAME.fullmatch(name):
-        return "a name has letters, digits and _, and begins with a letter"
-    if keyword.iskeyword(name):
-        return f"{name} is a word of programming languages; choose another name, such as {name}_1"
-    return ""
 
 
 def model_name(stem: str) -> str:
@@ -76,26 +58,21 @@ def study_fault(data: Mapping[str, Any]) -> None:
         )
 
 
-def quantity_names(
-    parameters: Entries, inputs: Entries, tables: Mapping[str, Any], reserved: frozenset[str], links: Entries
-) -> Iterator[Fault]:
-    """Names of parameters, inputs and tables that two things share, or that have a meaning already."""
+def quantity_names(names: Mapping[str, Sequence[str]], links: Entries) -> Iterator[Fault]:
+    """Names of parameters, inputs and tables that two things share, or that have a meaning already; `names` are
+    those by the table of the file."""
     seen: dict[str, str] = {}
+    link_names = {link["name"] for link in links}
     link_quantities = {f"{quantity}_of_{link['name']}" for link in links for quantity in link.get("own", ())}
-    names = [
-        (kind, entry["name"])
-        for kind, entries in (("parameters", parameters), ("inputs", inputs))
-        for entry in entries
-    ]
-    for kind, name in (*names, *(("tables", name) for name in tables)):
+    for kind, name in ((kind, name) for kind, members in names.items() for name in members):
         key = f"{kind}.{name}"
         if name in (*WORDS, *CONSTANTS, *MOTION):
             yield key, "the name has a meaning in expressions; choose another one"
-        elif name in link_quantities or (kind != "tables" and name in reserved):
+        elif name in link_quantities or (kind != "tables" and name in RESERVED):
             yield key, "is a variable of every linkage; choose another name"
         elif name in seen:
             yield key, f"is a name in [{seen[name]}], too; choose another one"
-        elif kind != "tables" and name in {link["name"] for link in links}:
+        elif kind != "tables" and name in link_names:
             yield key, "is the name of a link, too; choose another one"
         seen.setdefault(name, kind)
 

@@ -1,12 +1,13 @@
-"""The entries of a linkage file: numbers with units, expressions, points, parameters, inputs and tables, each read by
+"""The entries of a linkage file: names, numbers with units, expressions, points, parameters and inputs, each read by
 its key, with all faults collected."""
 
 from __future__ import annotations
 
 import contextlib
+import keyword
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -18,7 +19,6 @@ from ...core.quantities import USUAL, Layout, Quantity, Variable, base_units
 from ...mechanism.expressions import CONSTANTS, WORDS, Expression, as_float, expression
 from ...reading.lists import Entry
 from ...reading.tables import UnusualValue
-from .checks import name_fault, words_in
 from .declarations import CommonParameters
 from .dimensions import Dimensions, checked_dimension, dimension_of_unit
 from .loads import MOTION, OF_POINT
@@ -36,7 +36,27 @@ _USUAL = USUAL | {"m": (0.0, USUAL["m"][1]), "m2": (1e-8, 10.0), "kg/m3": (10.0,
 
 LARGEST = 1e30
 """Largest size of a value in SI units."""
-Known = Mapping[str, str | None]
+NameUnits = Mapping[str, str | None]
+"""The units of quantities by name, None for one that its first use tells."""
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_WORD = re.compile(r"[^\W\d]\w*")
+
+
+def words_in(entry: Any) -> set[str]:
+    """All words in the texts of a table."""
+    if isinstance(entry, str):
+        return {*_WORD.findall(entry)}
+    inside = entry.values() if isinstance(entry, Mapping) else entry if isinstance(entry, list) else ()
+    return set().union(*map(words_in, inside))
+
+
+def name_fault(name: str) -> str:
+    """What is wrong with a name; empty if nothing is."""
+    if not _NAME.fullmatch(name):
+        return "a name has letters, digits and _, and begins with a letter"
+    if keyword.iskeyword(name):
+        return f"{name} is a word of programming languages; choose another name, such as {name}_1"
+    return ""
 
 
 class EntryReader(Entry):
@@ -57,12 +77,10 @@ class EntryReader(Entry):
         self.points: dict[str, dict[str, list[Any]]] = {}
         self.unusual: list[UnusualValue] = []
 
-    def table(
-        self, key: str, parent: Mapping[str, Any] | None = None, default: Any = None
-    ) -> Mapping[str, Any]:
-        """A table; faults where it is none."""
-        name = key.rpartition(".")[2]
-        entry = (self.data if parent is None else parent).get(name, {} if default is None else default)
+    def table(self, key: str, parent: Mapping[str, Any] | None = None) -> Mapping[str, Any]:
+        """A table of the file, or of a `parent` table by the last name of its `key`; empty, with a fault, if it is
+        none."""
+        entry = (self.data if parent is None else parent).get(key.rpartition(".")[2], {})
         if not isinstance(entry, Mapping):
             self.fault(key, f"is {shown(entry)}; must be a table")
             return {}
@@ -89,7 +107,8 @@ class EntryReader(Entry):
         return value
 
     def tables(self, kind: str, keys: tuple[str, ...] = ()) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-        """The tables in a table, each behind its name and its full key; their keys are `keys`, if any are given."""
+        """The name, the full key and the table of each of the tables in a table; `keys` are the keys that they may
+        have, if they are checked here."""
         entries = self.table(kind)
         self.fault_reserved_names(kind, entries)
         for name in entries:
@@ -107,33 +126,35 @@ class EntryReader(Entry):
                 self.refused.add(name)
 
     def doubt(self, variable: Variable, entry: Any, value: float) -> None:
-        """Note the `value` of a key, which the file has as `entry`, where it is of no usual size."""
+        """Note the `value` of a key, which the file has as `entry`, if it is of no usual size."""
         doubt = UnusualValue.of(variable, entry, value)
         if doubt is not None and doubt not in self.unusual:
             self.unusual.append(doubt)
 
     def number(self, key: str, entry: Any, unit: str, description: str = "") -> float:
-        """A number, or a text with a unit; the variable has this `description`. One of an unusual size is noted."""
-        if isinstance(entry, bool) or not isinstance(entry, int | float | str):
+        """A number, or a text with a unit, in the SI `unit`; one of an unusual size is noted by its key and this
+        `description`, if the key is not empty.
+
+        Raises
+        ------
+        InputError
+            in one line.
+        """
+        parts = units.split(entry) if isinstance(entry, str) else None
+        if isinstance(entry, bool) or (not isinstance(entry, int | float) and parts is None):
+            hint = units.spelling(entry, unit) if isinstance(entry, str) else ""
             raise InputError(
-                f"{is_given(entry)}; must be a number or a text with a unit, such as {_like(unit)}"
+                f"{is_given(entry)}; must be a number or a text with a unit, such as {_like(unit)}{hint}"
             )
-        if isinstance(entry, str):
-            parts = units.split(entry)
-            if parts is None:
-                raise InputError(
-                    f"is {shown(entry)}; must be a number or a text with a unit, such as {_like(unit)}"
-                    f"{units.spelling(entry, unit)}"
-                )
-            try:
-                value = units.convert(*parts, unit) if parts[1] else parts[0]
-            except ValueError:
-                hint = units.spelling(entry, unit)
-                raise InputError(
-                    f"is {shown(entry)}{hint or f'; the unit does not fit, write it as {_like(unit)}'}"
-                ) from None
-        else:
+        if parts is None:
             value = as_float(entry)
+        elif not parts[1]:
+            value = parts[0]
+        elif units.converts(parts[1], unit):
+            value = units.convert(*parts, unit)
+        else:
+            hint = units.spelling(entry, unit) or f"; the unit does not fit, write it as {_like(unit)}"
+            raise InputError(f"is {shown(entry)}{hint}")
         within(value, entry)
         if unit == "rad" and abs(value) > WHOLE * (1.0 + 1e-12) and not units.has_unit(entry):
             raise InputError(
@@ -143,9 +164,21 @@ class EntryReader(Entry):
             self.doubt(sized(key, unit, _USUAL.get(unit), description), entry, value)
         return value
 
+    def numbers(self, key: str, entry: Any, listed: Sequence[str], must: str) -> tuple[float, ...]:
+        """A list of numbers in the `listed` units; `must` are the words on what it must be.
+
+        Raises
+        ------
+        InputError
+            in one line.
+        """
+        if not isinstance(entry, list) or len(entry) != len(listed):
+            raise InputError(f"{is_given(entry)}; must be {must}")
+        return tuple(self.number(key, x, unit) for x, unit in zip(entry, listed, strict=True))
+
     def limit(self, end: str, whole: Mapping[str, Any], unit: str) -> float:
-        """The `end` (min or max) of a parameter; where its unit does not fit that of the value, either may be the
-        wrong one, so that both are named."""
+        """The `end` (min or max) of a parameter, in its `unit`; if its own unit does not fit, either may be the wrong
+        one, so that both are named."""
         bound = whole[end]
         parts = units.split(bound) if isinstance(bound, str) else None
         if "unit" not in whole and parts is not None and parts[1] and not units.converts(parts[1], unit):
@@ -156,32 +189,27 @@ class EntryReader(Entry):
         return self.number("", bound, unit)
 
     def entry(
-        self, key: str, entry: Any, unit: str, motion: Known | None = None, inputs: bool = False
+        self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False
     ) -> Any:
-        """A number in SI units, or the text of an expression, with its unit checked; NaN where it is wrong. `motion`
-        are the units of the names that a load knows beside parameters and inputs."""
+        """A number in SI units, or the text of an expression, with its unit checked; NaN if it is wrong. `motion` are
+        the units of the names that a load knows beside parameters and inputs."""
         with self.at(key):
             if not isinstance(entry, str) or _is_quantity(entry):
                 return self.number(key, entry, unit)
-            if self.refused & words_in(entry):  # the name itself is faulted where it is given
+            if self.refused & words_in(entry):  # the name itself is faulted at its own key
                 return math.nan
-            names = {**self.units, **(motion or {})}
             parsed = expression(entry)
-            names |= self.further_units(parsed, motion is not None)
-            for name in parsed.names:
-                if name not in names and name not in self.derived:
-                    raise InputError(f"is {shown(entry)}; {name} is no parameter{self.note(name, names)}")
-                if name in self.inputs and not inputs:
-                    raise InputError(
-                        f"is {shown(entry)}; {name} is an input, and lengths cannot change in a run; use a parameter"
-                    )
+            names = {**self.units, **(motion or {}), **self.further_units(parsed, motion is not None)}
+            self.check_names(parsed, names, inputs)
             self.used |= {*parsed.names}
-            if parsed.names == (entry.strip(),) and self.units.get(entry.strip(), "") is None:
-                self.units[entry.strip()] = names[entry.strip()] = unit
+            name = entry.strip()
+            if parsed.names == (name,) and self.units.get(name, "") is None:
+                self.units[name] = names[name] = unit
                 self.derived_dimensions = None
             checked_dimension(parsed.text, self.dimensions(names), unit)
             for width in parsed.widths:
-                if moving := {*width.of.names} & ({*self.inputs} | {*(motion or {})}) or {*width.of.tables}:
+                moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
+                if moving:
                     raise InputError(
                         f"is {shown(entry)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
                         "must be a number or an expression of parameters; a ramp that begins at such a value a is "
@@ -192,10 +220,27 @@ class EntryReader(Entry):
             return entry
         return math.nan
 
-    def dimensions(self, units: Known) -> Dimensions:
+    def check_names(self, parsed: Expression, names: NameUnits, inputs: bool) -> None:
+        """Refuse an expression with a name that is not among the `names`, or of an input without leave.
+
+        Raises
+        ------
+        InputError
+            in one line.
+        """
+        for name in parsed.names:
+            if name not in names and name not in self.derived:
+                raise InputError(f"is {shown(parsed.text)}; {name} is no parameter{self.note(name, names)}")
+            if name in self.inputs and not inputs:
+                raise InputError(
+                    f"is {shown(parsed.text)}; {name} is an input, and lengths cannot change in a run; use a "
+                    "parameter"
+                )
+
+    def dimensions(self, units: NameUnits) -> Dimensions:
         """The dimensions of names with these `units`, and of the parameters that are expressions of others."""
 
-        def of_units(units: Known) -> Dimensions:
+        def of_units(units: NameUnits) -> Dimensions:
             return {name: None if unit is None else dimension_of_unit(unit) for name, unit in units.items()}
 
         if self.derived_dimensions is None:
@@ -234,7 +279,7 @@ class EntryReader(Entry):
         Raises
         ------
         InputError
-            in one line, where the entry cannot have them.
+            in one line, if the entry cannot have them.
         """
         if parsed.extremes or parsed.tables:
             raise InputError(
@@ -249,7 +294,7 @@ class EntryReader(Entry):
         return near_name(name, names)
 
     def vector(
-        self, key: str, entry: Any, unit: str, motion: Known | None = None, inputs: bool = False
+        self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False
     ) -> list[Any]:
         """Two entries."""
         if not isinstance(entry, list) or len(entry) != 2:
@@ -265,26 +310,21 @@ class EntryReader(Entry):
     def common(self) -> dict[str, float]:
         """Start values of the parameters that every linkage has."""
         common = {}
-        keys = {"gravity": "g", "ratio": "ratio"}
-        tables = {
-            "pins": ("friction", "diameter", "w_smooth", "damping"),
-            "guides": ("friction", "v_smooth", "damping"),
-        }
-        declared = {v.name: v for v in Layout(CommonParameters).variables}
-        entries = [(key, name, self.data.get(key)) for key, name in keys.items()]
-        for table, names in tables.items():
-            entries_of_table = self.table(table)
-            self.keys(table, entries_of_table, names)
-            entries += [(f"{table}.{key}", f"{table}.{key}", entries_of_table.get(key)) for key in names]
-        for key, name, value in entries:
+        variables = Layout(CommonParameters).variables
+        for table in ("pins", "guides"):
+            names = [v.name.removeprefix(f"{table}.") for v in variables if v.name.startswith(f"{table}.")]
+            self.keys(table, self.table(table), names)
+        for variable in variables:
+            key, quantity = "gravity" if variable.name == "g" else variable.name, variable.quantity
+            table, _, name = key.rpartition(".")
+            value = (self.table(table) if table else self.data).get(name)
             if value is not None:
                 with self.at(key):
-                    quantity = declared[name].quantity
                     x = self.number("", value, quantity.unit)
                     if not quantity.admits(x):
                         raise InputError(f"is {shown(value)}; must be {quantity.allowed_range}")
-                    self.doubt(replace(declared[name], name=key), value, x)
-                    common[name] = quantity.within_bounds(x)
+                    self.doubt(replace(variable, name=key), value, x)
+                    common[variable.name] = quantity.within_bounds(x)
         return common
 
     def about(self) -> dict[str, str]:
@@ -293,23 +333,6 @@ class EntryReader(Entry):
         names = tuple(field.name for field in fields(About))
         self.keys("about", table, names)
         return {key: printable(self.text(f"about.{key}", "", table), 1000) for key in table if key in names}
-
-    def check_parameter(self, key: str, entry: Any, text: str) -> None:
-        """Fault a parameter that is a wrong expression of other parameters.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
-        if isinstance(entry, Mapping):
-            self.keys(key, entry, ("value", "description"))
-        parsed = expression(text)
-        self.further_units(parsed, False)
-        for name in parsed.names:
-            if (name not in self.units and name not in self.derived) or name in self.inputs:
-                raise InputError(f"is {shown(text)}; {name} is no parameter{near_name(name, self.units)}")
-        self.used |= {*parsed.names}
 
     def expressions(self, table: Mapping[str, Any]) -> None:
         """Take up the parameters that are expressions of others, in any order, and check each."""
@@ -323,20 +346,37 @@ class EntryReader(Entry):
             order.prepare()
         while ready := order.get_ready():
             for name in ready:
-                key, is_right = f"parameters.{name}", False
+                self.derived[name] = "0"
+                self.refused.add(name)
                 if not self.refused & words_in(texts[name]):
-                    with self.at(key):
-                        self.check_parameter(key, table[name], texts[name])
-                        is_right = True
-                self.derived[name] = texts[name] if is_right else "0"
-                self.refused |= set() if is_right else {name}
+                    with self.at(f"parameters.{name}"):
+                        self.check_parameter(name, table[name], texts[name])
+                        self.derived[name] = texts[name]
+                        self.refused.discard(name)
             order.done(*ready)
         waiting = [name for name in texts if name not in self.derived]
         for name in waiting:
-            words_on_loop = f"refers to itself by way of {', '.join(waiting)}; give one of them a number"
-            self.fault(f"parameters.{name}", words_on_loop)
+            loop = ", ".join(waiting)
+            self.fault(f"parameters.{name}", f"refers to itself by way of {loop}; give one of them a number")
             self.derived[name] = "0"
         self.dimensions({})
+
+    def check_parameter(self, name: str, entry: Any, text: str) -> None:
+        """Refuse a parameter that is a wrong expression of other parameters.
+
+        Raises
+        ------
+        InputError
+            in one line.
+        """
+        if isinstance(entry, Mapping):
+            self.keys(f"parameters.{name}", entry, ("value", "description"))
+        parsed = expression(text)
+        self.further_units(parsed, False)
+        for used in parsed.names:
+            if (used not in self.units and used not in self.derived) or used in self.inputs:
+                raise InputError(f"is {shown(text)}; {used} is no parameter{near_name(used, self.units)}")
+        self.used |= {*parsed.names}
 
     def quantities(self, kind: str) -> list[dict[str, Any]]:
         """Parameters or inputs; parameters that are expressions of others are taken up apart."""
@@ -346,35 +386,34 @@ class EntryReader(Entry):
         for name, entry in table.items():
             if kind == "parameters" and is_expression(entry):
                 continue
-            key = f"{kind}.{name}"
             if name in (*WORDS, *CONSTANTS, *MOTION):
                 self.refused.add(name)
             whole = entry if isinstance(entry, Mapping) else {"value": entry}
-            self.keys(key, whole, ("value", "unit", "min", "max", "description", "tunable"))
-            with self.at(key):
+            self.keys(f"{kind}.{name}", whole, ("value", "unit", "min", "max", "description", "tunable"))
+            with self.at(f"{kind}.{name}"):
                 value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
                 limits = {end: self.limit(end, whole, unit or "1") for end in ("min", "max") if end in whole}
                 if not limits.get("min", -math.inf) <= value <= limits.get("max", math.inf):
                     ends = [f"{end} = {shown(whole[end])}" for end in limits]
                     raise InputError(f"is {shown(whole['value'])}; must be within {' and '.join(ends)}")
                 self.units[name] = unit
-                entries.append(
-                    {
-                        "name": name,
-                        "value": value,
-                        "unit": unit,
-                        "description": str(whole.get("description", "")),
-                        "tunable": bool(whole.get("tunable", False)),
-                        **limits,
-                    }
-                )
+                described = {"name": name, "value": value, "unit": unit}
+                described["description"] = str(whole.get("description", ""))
+                described["tunable"] = bool(whole.get("tunable", False))
+                entries.append(described | limits)
             self.units.setdefault(name, None)
         if kind == "parameters":
             self.expressions(table)
         return entries
 
     def with_unit(self, entry: Any, unit: Any) -> tuple[float, str | None]:
-        """A value in SI units, and its unit; None where it is told by the first use."""
+        """A value in SI units, and its unit; None if its first use tells it.
+
+        Raises
+        ------
+        InputError
+            in one line.
+        """
         if unit is not None:
             fits = [si_unit for si_unit in UNITS if _same_unit(str(unit), si_unit)]
             if not fits:
@@ -386,14 +425,15 @@ class EntryReader(Entry):
             raise InputError(
                 f"is {shown(entry)}; must be a number with a unit; a parameter may be an expression"
             )
-        if isinstance(entry, str) and (parts := units.split(entry)) and parts[1]:
-            for si_unit in UNITS:
-                if units.converts(parts[1], si_unit):
-                    return within(units.convert(*parts, si_unit), entry), si_unit
-            hints = [units.spelling(entry, si_unit) for si_unit in UNITS]
-            unknown = f"; the unit is not known; write it as in {_like('m')}"
-            raise InputError(f"is {shown(entry)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
-        return self.number("", entry, "1"), None
+        parts = units.split(entry) if isinstance(entry, str) else None
+        if parts is None or not parts[1]:
+            return self.number("", entry, "1"), None
+        for si_unit in UNITS:
+            if units.converts(parts[1], si_unit):
+                return within(units.convert(*parts, si_unit), entry), si_unit
+        hints = [units.spelling(entry, si_unit) for si_unit in UNITS]
+        unknown = f"; the unit is not known; write it as in {_like('m')}"
+        raise InputError(f"is {shown(entry)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
 
 
 def sized(key: str, unit: str, usual: tuple[float, float] | None, description: str = "") -> Variable:
@@ -427,17 +467,13 @@ def _is_quantity(text: str) -> bool:
         return False
     if parts[1].startswith(",") and re.search(r"[+*/()]", parts[1]):
         raise InputError(f"is {shown(text)}; {units.COMMA}")
-    if re.search(r"[+*()]|\s[-/]\s", parts[1]) and not _is_unit(parts[1]):
+    is_unit = any(units.converts(parts[1], unit) for unit in UNITS)  # such as kg*m2 or N/(m s)
+    if re.search(r"[+*()]|\s[-/]\s", parts[1]) and not is_unit:
         raise InputError(
             f"is {shown(text)}; an expression has no units inside: write its numbers in SI units, such as "
             "2 * r + 0.01"
         )
     return True
-
-
-def _is_unit(text: str) -> bool:
-    """Whether a text is a unit of a linkage, such as kg*m2 or N/(m s)."""
-    return any(units.converts(text, unit) for unit in UNITS)
 
 
 def within(value: float, entry: Any) -> float:

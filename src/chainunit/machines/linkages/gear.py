@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from ...core.errors import InputError, shown
 from ...core.planar import ZERO, Link, Motion, Vec2, mirrored, rotated
@@ -21,8 +21,11 @@ from ...groups.body import Bar, Load
 from ...groups.group import Group, SolvedGroup
 from ...groups.joints import Hinge, HingeData, JointData, LinkageInMotion, Placed, Rates, Third
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
-from .joint_kind import JointEntry, JointParts, JointReader, JointTable, SingleLinkKind
+from .joint_kind import JointEntry, JointParts, JointTable, SingleLinkKind
 from .points import connected, owners_of
+
+if TYPE_CHECKING:
+    from .entries import EntryReader
 
 _AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
 _MOST = 12
@@ -184,7 +187,7 @@ class GearKind(SingleLinkKind):
     equations = 1
     alone = "geared link"
 
-    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add the teeth."""
         teeth: Any = table.get("teeth")
         internal = table.get("internal", False)
@@ -205,7 +208,7 @@ class GearKind(SingleLinkKind):
             )
         joint |= {"teeth": teeth, "internal": internal}
 
-    def complete(self, reader: JointReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+    def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
         """Add the arm with its points at the centres, and the pitch point, which it carries by the name of the
         joint."""
         key, wheels = f"joints.{joint['name']}", (joint["on"][0], joint["by"][0])

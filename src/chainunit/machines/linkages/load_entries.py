@@ -14,8 +14,7 @@ from ...core.errors import InputError, meant, near_name, shown
 from ...core.inputs import cells_of, file_text, lines_of_table
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import Expression, expression
-from .checks import name_fault
-from .entries import EntryReader, Known, is_among, is_given, within
+from .entries import EntryReader, NameUnits, is_among, is_given, name_fault, within
 from .loads import parts_of_extreme
 
 MOST_POINTS = 200
@@ -29,8 +28,8 @@ LOADS = {
     "spring": ("type", "on", "by", "stiffness", "length", "damping"),
 }
 """Keys of each type of load."""
-_OF_LINK: Known = {"phi": "rad", "w": "rad/s", "angle": "rad", "angle_rate": "rad/s"}
-_OF_FORCE: Known = {**_OF_LINK, "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
+_OF_LINK: NameUnits = {"phi": "rad", "w": "rad/s", "angle": "rad", "angle_rate": "rad/s"}
+_OF_FORCE: NameUnits = {**_OF_LINK, "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
 _AXES = {"x": "m", "y": "m", "angle": "rad"}
 _OWN = re.compile(r"\b(min|max|stroke)\(\s*(x|y|angle)\s*\)")
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
@@ -230,7 +229,7 @@ class LoadReader(EntryReader):
 
     # loads
 
-    def load(self, name: str, written: Any) -> dict[str, Any]:
+    def load(self, name: str) -> dict[str, Any]:
         """A load."""
         key = f"loads.{name}"
         table = self.table(key, self.table("loads"))
@@ -280,7 +279,7 @@ class LoadReader(EntryReader):
         with self.at(key):
             self.count(*(expression(entry) for entry in entries if isinstance(entry, str)))
 
-    def known(self, motion: Known) -> Known:
+    def known(self, motion: NameUnits) -> NameUnits:
         """The units of the names that a load knows beside parameters and inputs."""
         way = {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
         return {**motion, **way, **self.table_units}

@@ -14,8 +14,10 @@ from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from .joint_kind import JointEntry
 
-Point = tuple[float, float]
-Pose = tuple[float, float, float]
+Point = tuple[float, ...]
+"""A place: x, y [m]."""
+Pose = tuple[float, ...]
+"""x, y [m] and the angle [rad] of a frame."""
 
 
 class StartPose:
