@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from chainunit import ChainUnitMachine, InputError, SideLoads
+from chainunit import EMPTY, ChainUnitMachine, InputError, SideLoads
+from chainunit.machines.api import FREE
+from chainunit.machines.chain_unit import Inputs
 
 
 def random_machine(rng: np.random.Generator, *, lossless: bool = False) -> ChainUnitMachine:
@@ -58,3 +60,20 @@ def random_state(rng: np.random.Generator, machine: ChainUnitMachine) -> tuple[f
         machine.p.ratio * w,
         machine.p.ratio * rng.uniform(-100.0, 100.0),
     )
+
+
+def torque_by_reactions(machine, phi, w=0.0, a=0.0, left=EMPTY, right=EMPTY, stop=FREE):
+    """The motor torque of a chain unit without friction, from the force passes group by group: the second route."""
+    return (
+        _state(machine, phi, w, left, right, stop).torque_by_reactions(a / machine.p.ratio) / machine.p.ratio
+    )
+
+
+def friction_torque(machine, phi, w, left=EMPTY, right=EMPTY, stop=FREE):
+    """The part of the motor torque of a chain unit against pin friction and joint damping."""
+    return _state(machine, phi, w, left, right, stop).effects["pins"].dissipative / machine.p.ratio
+
+
+def _state(machine, phi, w, left, right, stop):
+    inputs = Inputs(phi=phi, w=w, left=left, right=right, stop=stop)
+    return machine.state(machine.inputs(machine.model.input_layout.by_name(inputs)))

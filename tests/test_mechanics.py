@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from machines import random_loads, random_machine, random_state
+from machines import friction_torque, random_loads, random_machine, random_state, torque_by_reactions
 
 from chainunit import EMPTY, ChainUnitMachine, GeometryError, InputError, SideLoads
 from chainunit.core import engines
@@ -50,8 +50,8 @@ def test_two_routes_agree_on_1000_machines():
     for seed in SEEDS:
         machine, phi, w, a, left, right = draw(seed)
         point = (phi, w, a, left, right)
-        by_work = machine.forces(*point).tau - machine.friction_torque(phi, w, left, right)
-        error = abs(float(by_work - machine.torque_by_reactions(*point)))
+        by_work = machine.forces(*point).tau - friction_torque(machine, phi, w, left, right)
+        error = abs(float(by_work - torque_by_reactions(machine, *point)))
         worst = max(worst, error / scale_of(machine, *point))
     assert worst < 1e-9
 
@@ -88,8 +88,8 @@ def test_a_stop_holds_and_keeps_every_balance():
         out, free = machine.forces(*point), machine.forces(*point[:-1])
         held = stop.stiffness * (out.rocker.psi - stop.psi) + stop.damping * out.rocker.w
         size = scale_of(machine, *point)
-        by_work = out.tau - machine.friction_torque(phi, w, left, right, stop)
-        assert abs(float(by_work - machine.torque_by_reactions(*point))) < 1e-9 * size
+        by_work = out.tau - friction_torque(machine, phi, w, left, right, stop)
+        assert abs(float(by_work - torque_by_reactions(machine, *point))) < 1e-9 * size
         u = ChamberForces.Inputs(
             phi=engines.Dual(phi, w), w=engines.Dual(w, a), a=0.0, left=left, right=right, stop=stop
         )
@@ -332,7 +332,7 @@ def test_a_machine_that_is_narrower_than_its_swing_turns(l1, l2, z):
     phi = np.linspace(0.0, 2.0 * np.pi, 721)
     out = machine.forces(phi, 2.0, 0.0, SideLoads(material_mass=30.0, processing_force=0.0), EMPTY)
     assert np.all(np.isfinite(out.tau)) and float(np.min(out.margin)) > 0.01
-    assert np.allclose(machine.torque_by_reactions(phi, 0.0), machine.forces(phi).tau, atol=1e-9)
+    assert np.allclose(torque_by_reactions(machine, phi), machine.forces(phi).tau, atol=1e-9)
 
 
 def test_a_gap_of_half_widths_is_refused_with_its_limits():
@@ -397,8 +397,6 @@ def test_loads_out_of_bounds_are_refused_by_name(name, value, told):
     for call in (
         lambda: machine.forces(0.5, 3.0, left=loads),
         lambda: machine.slopes(0.5, 3.0, left=loads),
-        lambda: machine.torque_by_reactions(0.5, 3.0, left=loads),
-        lambda: machine.friction_torque(0.5, 3.0, left=loads),
         lambda: machine.chamber(0.1, left=loads),
         lambda: machine.hanging("left", 0.1, loads),
         lambda: machine.evaluate({f"left.{name}": value}),

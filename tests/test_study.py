@@ -15,6 +15,7 @@ import xarray as xr
 from command import chainunit
 from event_tables import STANDARD, event_line
 from fmpy.validation import validate_fmu
+from machines import friction_torque, torque_by_reactions
 from reports import write
 
 from chainunit import EMPTY, ChainUnitMachine, SideLoads
@@ -479,8 +480,8 @@ def test_what_sizes_the_drive_is_the_feed_on_one_side_with_both_organs():
     crank = {}
     for name, of in loads.items():
         turning = (phi, speed * machine.p.ratio)
-        free = machine.torque_by_reactions(*turning, 0.0, *of)
-        crank[name] = np.max(np.abs(free + machine.friction_torque(*turning, *of)))
+        free = torque_by_reactions(machine, *turning, 0.0, *of)
+        crank[name] = np.max(np.abs(free + friction_torque(machine, *turning, *of)))
     results = {side: overload_factors(machine, speed, FEED, side) for side in ("left", "right")}
     for side, of in results.items():
         assert of.feed_crank_torque == pytest.approx(crank[side] / crank["both"], rel=1e-9)

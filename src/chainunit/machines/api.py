@@ -145,26 +145,6 @@ class ChainUnitMachine(Machine):
         u = self._inputs(phi, w, 0.0, left, right, stop)
         return ChamberForces.parts[1].equations(_XP, self.p, u, None, self.state(u))
 
-    def torque_by_reactions(
-        self,
-        phi: Any,
-        w: Any = 0.0,
-        a: Any = 0.0,
-        left: SideLoads = EMPTY,
-        right: SideLoads = EMPTY,
-        stop: Stop = FREE,
-    ) -> Any:
-        """The motor torque without friction [N m], from the force passes group by group: the second route."""
-        u = self._inputs(phi, w, a, left, right, stop)
-        return self.state(u).torque_by_reactions(u.a / self.p.ratio) / self.p.ratio
-
-    def friction_torque(
-        self, phi: Any, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, stop: Stop = FREE
-    ) -> Any:
-        """The part of `tau` against pin friction and joint damping [N m]."""
-        state = self.state(self._inputs(phi, w, 0.0, left, right, stop))
-        return state.effects["pins"].dissipative / self.p.ratio
-
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of one kilogram of material on the `side` ("left" or "right") [J/kg]: dE/dm,
         the factor of the feed in an energy balance (the energy is linear in the mass)."""

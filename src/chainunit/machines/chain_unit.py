@@ -387,38 +387,26 @@ def _organs_on_rocker(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any) -> MachineS
     return MachineState(xp, Mechanism(xp, linkage, math.pi - psi), -psi_w)
 
 
-ON_DRIVE = {
-    "crank_bearing": ("O1", "crank"),
-    "crank_pin": ("A", "coupler"),
-    "coupler_pin": ("Bd", "coupler"),
-    "pivot": ("C", "rocker"),
-}
-ON_SIDE = {
-    f"{side}.{output}": joint
-    for side, names in NAMES.items()
-    for output, joint in (
-        ("rocker_joint", ("A2", names.web)),
-        ("hinge", (names.b, names.wall)),
-        ("support", (names.a1, names.wall)),
+_ON_DRIVE = (
+    ("O1 crank bearing", "crank_bearing", "O1", "crank"),
+    ("A crank pin", "crank_pin", "A", "coupler"),
+    ("Bd coupler pin", "coupler_pin", "Bd", "coupler"),
+    ("C rocker pivot", "pivot", "C", "rocker"),
+)
+_ON_SIDE = tuple(
+    row
+    for side, (a1, b, wall, web, *_) in NAMES.items()
+    for row in (
+        (f"A2 {side} web at rocker", f"{side}.rocker_joint", "A2", web),
+        (f"B {side} hinge", f"{side}.hinge", b, wall),
+        (f"A1 {side} support", f"{side}.support", a1, wall),
     )
-}
+)
+"""Title, output, pin and link of each bearing."""
+ON_DRIVE, ON_SIDE = ({output: (pin, link) for _, output, pin, link in rows} for rows in (_ON_DRIVE, _ON_SIDE))
 JOINTS = {**ON_DRIVE, **ON_SIDE}
 """The joint of each reaction, by output."""
-PINS = {
-    "O1 crank bearing": "crank_bearing",
-    "A crank pin": "crank_pin",
-    "Bd coupler pin": "coupler_pin",
-    "C rocker pivot": "pivot",
-    **{
-        title: f"{side}.{output}"
-        for side in SIDES
-        for title, output in (
-            (f"A2 {side} web at rocker", "rocker_joint"),
-            (f"B {side} hinge", "hinge"),
-            (f"A1 {side} support", "support"),
-        )
-    },
-}
+PINS = {title: output for title, output, _, _ in (*_ON_DRIVE, *_ON_SIDE)}
 """The output of each bearing, by title."""
 
 

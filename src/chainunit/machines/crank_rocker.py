@@ -182,10 +182,3 @@ class CrankRocker:
                 f"< {1.0 / math.sin(0.5 * eta):g}"
             )
         return cls(r, l, h, parallel_frame(MATH, r, l, h))
-
-
-def longest_rocker(eta: float, admissible: float) -> float:
-    """The largest lam = h/l at which a crank-rocker with K = 1 and the swing `eta` [rad] keeps its pressure angle
-    within `admissible` [rad]; 0 if there is none (the pressure angle is never below half the swing)."""
-    s, c = math.sin(0.5 * eta), math.cos(0.5 * eta)
-    return math.sqrt(max((math.sin(admissible) / s) ** 2 - 1.0, 0.0)) / c

@@ -26,7 +26,6 @@ from ..core.model import FmuData, Requirement, StartProblem
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
-from ..mechanism.linkage import Linkage
 from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration
 from .chain_organs import LEAST, MOST, Organs, Parameters, both
 from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
@@ -69,16 +68,18 @@ class ChainedModel(LinkageModel):
     never_repeats: str = "chains do not repeat a turn"
 
     def __post_init__(self) -> None:
-        unknowns = self.organs.unknowns
+        organs, unknowns = self.organs, self.organs.unknowns
         self.follow(
             controlled=True,
             start_problem=StartProblem(unknowns, 100 if unknowns else 0, _HANGS),
-            linkage=_drive_alone,
-            internal_step=_internal_step,
-            tolerance=_tolerance,
-            start_limits=self._start_limits,
-            start_guess=self._start_guess,
-            improve_start=self._improved_start,
+            # the drive alone: the places of the chains follow from their states
+            linkage=lambda xp, p, u: drive(p, u, (), {}),
+            # 20 ms, a quarter of a radian of the crank at 12 rad/s
+            internal_step=lambda xp, p: 0.02,
+            tolerance=lambda xp, p: p.tolerance,
+            start_limits=lambda xp, p, u, x: organs.start_limits(xp, p, u, x, self.at_crank(p, u, x)[0]),
+            start_guess=lambda xp, p, u: organs.guess(xp, p, u, self.at_crank(p, u)[0]),
+            improve_start=lambda xp, p, u, z: organs.improved(xp, p, u, self.at_crank(p, u)[0], z),
             start_states=self._start_states,
             constrained_states=self._closed,
             shared=self._with_chains,
@@ -89,16 +90,6 @@ class ChainedModel(LinkageModel):
     def at_crank(self, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank; without states `x`, those at the start."""
         raise NotImplementedError
-
-    def _start_limits(self, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The limits at the start: closed chains, and rods off their stops."""
-        return self.organs.start_limits(xp, p, u, x, self.at_crank(p, u, x)[0])
-
-    def _start_guess(self, xp: Any, p: Any, u: Any) -> list[Any]:
-        return self.organs.guess(xp, p, u, self.at_crank(p, u)[0])
-
-    def _improved_start(self, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
-        return self.organs.improved(xp, p, u, self.at_crank(p, u)[0], z)
 
     def _start_states(self, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
         """States of both organs at the start."""
@@ -116,21 +107,6 @@ class ChainedModel(LinkageModel):
     def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
         raise NotImplementedError
-
-
-def _drive_alone(xp: Any, p: Any, u: Any) -> Linkage:
-    """The drive without the chains: their places follow from their states."""
-    return drive(p, u, (), {})
-
-
-def _internal_step(xp: Any, p: Any) -> Any:
-    """Longest internal step: 20 ms, a quarter of a radian of the crank at 12 rad/s."""
-    return 0.02
-
-
-def _tolerance(xp: Any, p: Any) -> Any:
-    """The parameter `tolerance`."""
-    return p.tolerance
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
