@@ -227,9 +227,10 @@ class _LinkageReader(LoadReader):
             *(f"parameters.{name}" for name in self.derived),
             *(f"tables.{name}" for name in tables),
         ]
+        is_faulty = bool(self.errors)
         for key in keys:
             table, _, name = key.partition(".")
-            is_meant = self.errors and (name in texts or near_name(name, texts))
+            is_meant = is_faulty and (name in texts or near_name(name, texts))
             if name not in self.used | self.refused and not is_meant:
                 user = "no load" if table == "tables" else "nothing"
                 self.fault(key, f"{user} uses it; use it, or take it out")

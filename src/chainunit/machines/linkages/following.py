@@ -16,7 +16,6 @@ from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
 from .closing import LEAST_MARGIN, dead_group, open_group
 from .outputs import DescribedLinkage
-from .probes import description_axis
 from .structure import Structure
 from .way import WHOLE, DriverWay
 
@@ -52,6 +51,8 @@ class FollowedLinkage:
         self.structure, self.way, self.linkage = structure, way, linkage
         self._drivers = len(structure.groups) - len(linkage.groups)
         """1 if the first group of the structure is the driver of the linkage, a cylinder; else 0"""
+        self.signs: list[float] = []
+        """the signs of the margins at the first place of the way, once it is followed"""
 
     @cached_property
     def derived(self) -> Sequence[float]:
@@ -60,11 +61,6 @@ class FollowedLinkage:
             return derived_numbers(MATH, self.linkage)
         except (ArithmeticError, ValueError):
             return ()
-
-    @cached_property
-    def signs(self) -> list[float]:
-        """The signs of the margins at the first place of the way."""
-        return signs_of(self.at(self.way.places()[0]).margins())
 
     def at(self, q: float) -> Mechanism:
         """The links with the driver at the place `q`.
@@ -94,6 +90,7 @@ class FollowedLinkage:
             check_triads(self.linkage, self.derived)
             for q in places:
                 m = self.at(q)
+                self.signs = self.signs or signs_of(m.margins())
                 margins.append(signed(m.margins(), self.signs))
                 for group, margin in zip(self.structure.groups, margins[-1], strict=True):
                     if not margin > LEAST_MARGIN:
@@ -118,9 +115,7 @@ class FollowedLinkage:
     def _add_angles(self, angles: dict[str, list[float]], m: Mechanism) -> None:
         """Add the angle of each link, without a jump from the one before."""
         for name, course in angles.items():
-            axis = description_axis(m.links[name].u, self.linkage.parts.frames[name])
-            angle = math.atan2(axis.y, axis.x)
-            course.append(course[-1] + math.remainder(angle - course[-1], WHOLE))
+            course.append(course[-1] + math.remainder(self.linkage.angle(name, m) - course[-1], WHOLE))
 
     # where it does not close
 

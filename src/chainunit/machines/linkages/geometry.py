@@ -38,6 +38,11 @@ class LinkFrame(NamedTuple):
         """The components of a vector in this frame."""
         return Vec2(self.axis.dot(v), self.axis.cross(v))
 
+    def x_axis(self, u: Vec2) -> Vec2:
+        """The x axis of the description, from the direction `u` of this frame."""
+        e = self.axis
+        return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)
+
 
 OWN = LinkFrame(ZERO, ALONG_X)
 

@@ -51,7 +51,6 @@ from .loads import (
 )
 from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
-from .probes import constant_outputs, description_axis, notes_on, repeated_outputs
 from .structure import Structure, check_groups
 from .way import DriverWay
 
@@ -226,7 +225,7 @@ class LinkageDescription(LinkageOutputs):
         def coordinate(xp: Any, m: Any) -> tuple[Any, Any, Any]:
             moving = m.links[link]
             if axis == "angle":
-                return self.angle(xp, link, description_axis(moving.u, frame), m.q), moving.t1, moving.t2
+                return self.angle(xp, link, frame.x_axis(moving.u), m.q), moving.t1, moving.t2
             k = moving.beside(place.x, place.y)
             return getattr(k.p, axis), getattr(k.p1, axis), getattr(k.p2, axis)
 
@@ -308,7 +307,7 @@ class LinkageDescription(LinkageOutputs):
         if not any(isinstance(entry, str) and "angle" in expression(entry).names for entry in entries):
             return None
         frame = parts.frames[link]
-        return lambda xp, m: self.angle(xp, link, description_axis(m.links[link].u, frame), m.q)
+        return lambda xp, m: self.angle(xp, link, frame.x_axis(m.links[link].u), m.q)
 
     def _tables_for(self, entries: Sequence[float | str]) -> dict[str, TableCurve]:
         """The tables over the coordinate that a load takes."""
@@ -420,8 +419,8 @@ class LinkageDescription(LinkageOutputs):
             direct_description=words_on_motion(f"{title}, moving by itself", self.port),
             made=(machine_of, (data,)),
             fmu_data=FmuData(self.notes, About(**data.get("about", {}))),
-            repeated=repeated_outputs(self.structure, self.variable),
-            constant=constant_outputs(self.structure, self.variable),
+            repeated=self.repeated,
+            constant=self.constant,
             driver_port=self.port,
             span=self.span,
             turns=self.way.turns,
@@ -466,7 +465,23 @@ class LinkageDescription(LinkageOutputs):
 
     @property
     def notes(self) -> str:
-        """Words for the description of the FMU."""
+        """Paragraphs for the description of the FMU on frame, signs and limits, each after an empty line."""
+        driver, span = self.structure.driver, self.way.limits
+        if driver.linear:
+            effort, unit, counts = "force", "m", f"phi is the way of {driver.joint}"
+        else:
+            effort, unit = "torque", "deg"
+            counts = f"The angle of {driver.link} is phi/ratio and counts {self.angle_counts}"
+        if span:
+            low, high = span if driver.linear else map(math.degrees, span)
+            counts += f", from {low:g} {unit} to {high:g} {unit}: beyond, the linkage was not checked and may not close"
         kinds = dict.fromkeys(joint.kind for joint in self.structure.joints.values())
         limits = "".join(f" {KINDS[kind].limits}" for kind in kinds if KINDS[kind].limits)
-        return notes_on(self.structure.driver, self.way.limits, self.angle_counts) + limits
+        return (
+            "\n\nFrame and signs: x points right, y up; the angle of a link counts counter-clockwise from the x "
+            f"axis. {counts}. The {effort} tau is the one that the machine needs. The reaction of a joint is the "
+            "force on the link that its description names first."
+            "\n\nLimits: links are rigid, and joints have no play; a joint pushes and pulls. Static friction is not "
+            "modelled. Lengths are fixed before the initialization, where lengths for which the linkage does not "
+            f"close are refused.{limits}"
+        )

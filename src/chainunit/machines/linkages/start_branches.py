@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,6 @@ from ...mechanism.assur import AssurGroup
 from ...mechanism.machine import Mechanism
 from .geometry import TWO_WAYS
 from .model import LinkageDescription
-from .probes import description_axis
 from .structure import CYLINDER
 
 _AS_FAR = 0.8
@@ -30,22 +30,24 @@ def check_start(described: LinkageDescription) -> None:
     InputError
         in one line, with both places of the pin, or both angles of the link, that the start may give.
     """
-    for group in described.structure.groups:
+    structure = described.structure
+    here = described.followed.at(structure.start)
+    for group in structure.groups:
         if group.kind in TWO_WAYS:
-            _check(described, group)
+            _check(described, group, [here, _other_way(described, group)])
 
 
-def _both_ways(described: LinkageDescription, group: AssurGroup) -> list[Mechanism]:
-    """The start of the linkage up to a dyad, with the dyad as it is assembled, and in the other way."""
+def _other_way(described: LinkageDescription, group: AssurGroup) -> Mechanism:
+    """The start of the linkage up to a dyad that is assembled in the other way."""
     structure, linkage = described.structure, described.at_start
     # a cylinder is the driver, and no group of the linkage
     count = structure.groups.index(group) + 1 - (len(structure.groups) - len(linkage.groups))
-    one = linkage.before(count)
+    part = linkage.before(count)
     if group.kind == CYLINDER:
-        other = replace(one, driver=_turned(one.driver))
+        part = replace(part, driver=_turned(part.driver))
     else:
-        other = replace(one, groups=(*one.groups[:-1], _turned(one.groups[-1])))
-    return [Mechanism(MATH, way, structure.start, described.start_derived) for way in (one, other)]
+        part = replace(part, groups=(*part.groups[:-1], _turned(part.groups[-1])))
+    return Mechanism(MATH, part, structure.start, described.start_derived)
 
 
 def _turned(dyad: Any) -> Any:
@@ -53,14 +55,12 @@ def _turned(dyad: Any) -> Any:
     return replace(dyad, side=-dyad.side)
 
 
-def _check(described: LinkageDescription, group: AssurGroup) -> None:
-    structure, parts = described.structure, described.at_start.parts
+def _check(described: LinkageDescription, group: AssurGroup, assembled: Sequence[Mechanism]) -> None:
+    """Refuse a start that does not tell in which of both ways a dyad is assembled."""
+    structure, linkage = described.structure, described.at_start
     joint = structure.joints[group.joints[1].name]
-    angles, pins = [], []
-    for m in _both_ways(described, group):
-        axes = (description_axis(m.links[link].u, parts.frames[link]) for link in group.links)
-        angles.append([math.atan2(axis.y, axis.x) for axis in axes])
-        pins.append(m.pins.get(parts.pin(*joint.by)))
+    angles = [[linkage.angle(link, m) for link in group.links] for m in assembled]
+    pins = [m.pins.get(linkage.parts.pin(*joint.by)) for m in assembled]
     rough = [structure.poses[link][2] for link in group.links]
     near, far = (
         sum(
