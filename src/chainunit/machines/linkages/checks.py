@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -12,11 +10,9 @@ from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
 from .declarations import RESERVED
-from .entries import name_fault
 from .joint_kind import JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
-from .points import owners_of
 from .structure import DriverEntry, groups_of
 
 Fault = tuple[str, str]
@@ -25,14 +21,6 @@ Entries = Sequence[Mapping[str, Any]]
 POINT_NAMES = ("angle", "w", "a", "centroid", "mass", "inertia")
 """Names that the variables of a link have already."""
 _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
-
-
-def model_name(stem: str) -> str:
-    """The name of a machine whose file states none, from the name of the file: ``60 kN press`` gives
-    ``linkage_60_kN_press``, ``größer`` gives ``grosser``. It is an identifier of C, as FMUs need one."""
-    plain = unicodedata.normalize("NFKD", stem.replace("ß", "ss"))
-    name = re.sub(r"[^A-Za-z0-9_]", "_", "".join(c for c in plain if not unicodedata.combining(c)))
-    return f"linkage_{name}" if name_fault(name) else name
 
 
 def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
@@ -89,33 +77,6 @@ def spring_faults(loads: Entries, joints: Entries) -> Iterator[Fault]:
             yield key, f"both ends are on {link}; give points of two links, or of one and the ground"
         elif ends in pins:
             yield key, f"both ends are in the joint {pins[ends]}; give points that move apart"
-
-
-def alike_points(points: Mapping[str, Iterable[str]], used: set[tuple[str, ...]]) -> str:
-    """Words on a point that nothing joins, whose name looks like that of a point of another link: a pin that was
-    meant. `used` are the points that joints, loads and masses name, by link."""
-    owners = owners_of(points)
-    for link, names in points.items():
-        for point in names:
-            if owners[point] != [link] or (link, point) in used:
-                continue
-            for other, those in owners.items():
-                if those != [link] and other != point and _alike(point, other):
-                    return (
-                        f"; the names of the points {link}.{point} and {those[0]}.{other} look alike: a pin joins "
-                        "points of one name"
-                    )
-    return ""
-
-
-def _alike(first: str, second: str) -> bool:
-    """Whether two names may be meant to be one: but for capitals and signs between, or a letter more."""
-    a, b = (name.replace("_", "").lower() for name in (first, second))
-    if a == b:
-        return True
-    digits = [re.sub(r"\D", "", name) for name in (a, b)]
-    short, long = sorted((a, b), key=len)
-    return digits[0] == digits[1] and len(long) == len(short) + 1 and long.startswith(short)
 
 
 def freedom_faults(

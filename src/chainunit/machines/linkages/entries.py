@@ -4,7 +4,6 @@ its key, with all faults collected."""
 from __future__ import annotations
 
 import contextlib
-import keyword
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -22,6 +21,7 @@ from ...reading.tables import UnusualValue
 from .declarations import CommonParameters
 from .dimensions import Dimensions, checked_dimension, dimension_of_unit
 from .loads import MOTION, OF_POINT
+from .names import name_fault, words_in
 from .way import WHOLE
 
 UNITS = (
@@ -38,25 +38,6 @@ LARGEST = 1e30
 """Largest size of a value in SI units."""
 NameUnits = Mapping[str, str | None]
 """The units of quantities by name, None for one that its first use tells."""
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_WORD = re.compile(r"[^\W\d]\w*")
-
-
-def words_in(entry: Any) -> set[str]:
-    """All words in the texts of a table."""
-    if isinstance(entry, str):
-        return {*_WORD.findall(entry)}
-    inside = entry.values() if isinstance(entry, Mapping) else entry if isinstance(entry, list) else ()
-    return set().union(*map(words_in, inside))
-
-
-def name_fault(name: str) -> str:
-    """What is wrong with a name; empty if nothing is."""
-    if not _NAME.fullmatch(name):
-        return "a name has letters, digits and _, and begins with a letter"
-    if keyword.iskeyword(name):
-        return f"{name} is a word of programming languages; choose another name, such as {name}_1"
-    return ""
 
 
 class EntryReader(Entry):

@@ -22,22 +22,21 @@ from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
 from .checks import (
     POINT_NAMES,
-    alike_points,
     freedom_faults,
     guide_faults,
     length_faults,
-    model_name,
     quantity_names,
     spring_faults,
     study_fault,
     usual_distance,
     usual_inertia,
 )
-from .entries import is_among, is_given, name_fault, sized, words_in
+from .entries import is_among, is_given, sized
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
+from .names import alike_points, model_name, name_fault, words_in
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start

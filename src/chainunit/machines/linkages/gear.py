@@ -22,7 +22,7 @@ from ...groups.group import Group, SolvedGroup
 from ...groups.joints import Hinge, HingeData, JointData, LinkageInMotion, Placed, Rates, Third
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from .joint_kind import JointEntry, JointParts, JointTable, SingleLinkKind
-from .points import connected, owners_of
+from .names import connected, owners_of
 
 if TYPE_CHECKING:
     from .entries import EntryReader

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ from ...core.errors import InputError, meant, near_name, shown
 from ...core.inputs import cells_of, file_text, lines_of_table
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import Expression, expression
-from .entries import EntryReader, NameUnits, is_among, is_given, name_fault, within
+from .entries import EntryReader, NameUnits, is_among, is_given, within
 from .loads import parts_of_extreme
+from .names import name_fault
 
 MOST_POINTS = 200
 """Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
@@ -243,46 +244,42 @@ class LoadReader(EntryReader):
             on = table.get("on")
             if not is_among(on, self.points) or on == GROUND:
                 self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
-                return load
-            torque = _placed(table.get("torque"), [str(on)])
-            entry = self.entry(f"{key}.torque", torque, "N.m", self.known(_OF_LINK), True)
-            self.count_in(key, [entry])
-            return load | {"on": [on], "torque": entry}
-        for end in ("on", "by") if kind == "spring" else ("on",):
-            with self.at(f"{key}.{end}"):
-                load[end] = self.end(table.get(end))
-                if kind != "spring" and load[end][0] == GROUND:
-                    raise InputError("acts on the ground; give a point of a link")
+            else:
+                load["on"] = [on]
+        else:
+            for end in ("on", "by") if kind == "spring" else ("on",):
+                with self.at(f"{key}.{end}"):
+                    load[end] = self.end(table.get(end))
+                    if kind != "spring" and load[end][0] == GROUND:
+                        raise InputError("acts on the ground; give a point of a link")
         if kind == "spring":
-            if "stiffness" not in table and "damping" not in table:
-                self.fault(key, "has neither stiffness nor damping; give one of them, or take the spring out")
-            if "stiffness" in table and "length" not in table:
-                self.fault(
-                    f"{key}.length",
-                    'is missing; must be the length at which the spring has no force, such as "200 mm", or 0 for '
-                    "one that pulls at every length",
-                )
-            for quantity, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
-                load[quantity] = self.positive(f"{key}.{quantity}", table.get(quantity, 0.0), unit)
-            return load
-        if "on" not in load:
-            return load
-        force = table.get("force")
-        if isinstance(force, list):
-            force = [_placed(component, load["on"]) for component in force]
-        load["force"] = self.vector(f"{key}.force", force, "N", self.known(_OF_FORCE), True)
-        self.count_in(key, load["force"])
+            self.spring(key, table, load)
+        elif "on" in load:
+            motion = {**(_OF_LINK if kind == "torque" else _OF_FORCE), **self.table_units}
+            motion |= {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
+            if kind == "torque":
+                torque = _placed(table.get("torque"), load["on"])
+                load["torque"] = self.entry(f"{key}.torque", torque, "N.m", motion, True)
+            else:
+                force = _placed(table.get("force"), load["on"])
+                load["force"] = self.vector(f"{key}.force", force, "N", motion, True)
+            entries = load["force"] if kind != "torque" else [load["torque"]]
+            with self.at(key):
+                self.count(*(expression(entry) for entry in entries if isinstance(entry, str)))
         return load
 
-    def count_in(self, key: str, entries: Sequence[float | str]) -> None:
-        """Count the points of the tables in a load; faults where they are too many."""
-        with self.at(key):
-            self.count(*(expression(entry) for entry in entries if isinstance(entry, str)))
-
-    def known(self, motion: NameUnits) -> NameUnits:
-        """The units of the names that a load knows beside parameters and inputs."""
-        way = {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
-        return {**motion, **way, **self.table_units}
+    def spring(self, key: str, table: Mapping[str, Any], load: dict[str, Any]) -> None:
+        """Add stiffness, length and damping of a spring."""
+        if "stiffness" not in table and "damping" not in table:
+            self.fault(key, "has neither stiffness nor damping; give one of them, or take the spring out")
+        if "stiffness" in table and "length" not in table:
+            self.fault(
+                f"{key}.length",
+                'is missing; must be the length at which the spring has no force, such as "200 mm", or 0 for one '
+                "that pulls at every length",
+            )
+        for quantity, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
+            load[quantity] = self.positive(f"{key}.{quantity}", table.get(quantity, 0.0), unit)
 
     def end(self, entry: Any) -> list[str]:
         """A point of a link, as "link.point" or a list of two."""
@@ -304,7 +301,9 @@ class LoadReader(EntryReader):
 
 
 def _placed(entry: Any, place: list[str]) -> Any:
-    """An expression in which extremes of the load's own place have the name of this place."""
+    """An expression, or a list of some, in which extremes of the load's own place have the name of this place."""
+    if isinstance(entry, list):
+        return [_placed(component, place) for component in entry]
     if not isinstance(entry, str):
         return entry
     return _OWN.sub(lambda m: f"{m[1]}({'.'.join([place[0]] if m[2] == 'angle' else place)}.{m[2]})", entry)

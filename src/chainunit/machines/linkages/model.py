@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, cast
@@ -29,7 +29,7 @@ from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
-from ...mechanism.expressions import expression, value_of
+from ...mechanism.expressions import value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, words_on_motion
@@ -40,7 +40,6 @@ from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
 from .loads import (
     ForceLaw,
-    LinkAngle,
     SpringDamper,
     TorqueLaw,
     checked_widths,
@@ -250,26 +249,26 @@ class LinkageDescription(LinkageOutputs):
                 )
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
-        kind, link = load["type"], load["on"][0]
-        if kind == "torque":
-            angle = self._angle_for([load["torque"]], link, parts)
-            tables = self._tables_for([load["torque"]])
-            return TorqueLaw(link, load["torque"], parts.geometry.values, tables, angle)
+        kind, (link, *point), geometry = load["type"], load["on"], parts.geometry
         if kind == "spring":
-            ends = [
+            one, other = (
                 (None if link == GROUND else link, parts.pin_on(link, point))
                 for link, point in (load["on"], load["by"])
-            ]
-            stiffness, length, damping = (
-                parts.geometry.number(load[key]) for key in ("stiffness", "length", "damping")
             )
-            return SpringDamper((ends[0], ends[1]), stiffness, length, damping)
-        pin = parts.pin_on(link, load["on"][1])
-        axis = parts.frames[link].axis if kind == "follower" else None
+            return SpringDamper(
+                (one, other), *(geometry.number(load[key]) for key in ("stiffness", "length", "damping"))
+            )
+        frame = parts.frames[link]
+
+        def angle(xp: Any, m: Any) -> Any:
+            return self.angle(xp, link, frame.x_axis(m.links[link].u), m.q)
+
+        law = geometry.values, self.tables, angle
+        if kind == "torque":
+            return TorqueLaw(link, load["torque"], *law)
+        axis = frame.axis if kind == "follower" else None
         fx, fy = load["force"]
-        angle = self._angle_for([fx, fy], link, parts)
-        tables = self._tables_for([fx, fy])
-        return ForceLaw(link, pin, (fx, fy), axis, parts.geometry.values, tables, angle)
+        return ForceLaw(link, parts.pin_on(link, *point), (fx, fy), axis, *law)
 
     def check_loads(self, p: Any, speed: float) -> None:
         """Refuse a force or a torque that has no value, or an infinite one, at a place of the way.
@@ -301,18 +300,6 @@ class LinkageDescription(LinkageOutputs):
             raise InputError(
                 f"has no value, or an infinite one, at {place} and a speed of {speed:.6g} {unit}", key=key
             )
-
-    def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
-        """The angle of a link for a load; None where the load does not depend on it."""
-        if not any(isinstance(entry, str) and "angle" in expression(entry).names for entry in entries):
-            return None
-        frame = parts.frames[link]
-        return lambda xp, m: self.angle(xp, link, frame.x_axis(m.links[link].u), m.q)
-
-    def _tables_for(self, entries: Sequence[float | str]) -> dict[str, TableCurve]:
-        """The tables over the coordinate that a load takes."""
-        names = {name for entry in entries if isinstance(entry, str) for name in expression(entry).names}
-        return {name: curve for name, curve in self.tables.items() if name in names}
 
     # the way of the driver
 
@@ -474,7 +461,8 @@ class LinkageDescription(LinkageOutputs):
             counts = f"The angle of {driver.link} is phi/ratio and counts {self.angle_counts}"
         if span:
             low, high = span if driver.linear else map(math.degrees, span)
-            counts += f", from {low:g} {unit} to {high:g} {unit}: beyond, the linkage was not checked and may not close"
+            ends = f"from {low:g} {unit} to {high:g} {unit}"
+            counts += f", {ends}: beyond, the linkage was not checked and may not close"
         kinds = dict.fromkeys(joint.kind for joint in self.structure.joints.values())
         limits = "".join(f" {KINDS[kind].limits}" for kind in kinds if KINDS[kind].limits)
         return (

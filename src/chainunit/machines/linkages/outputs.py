@@ -20,8 +20,8 @@ from ..parts import Force, force
 from .declarations import RESERVED, GuideReaction, LinkTurning, PointMotion, Running, WayRunning
 from .joint_kind import JointEntry
 from .loads import name_of_load
+from .names import LinkPoint, connected
 from .parts import LinkageParts
-from .points import LinkPoint, connected
 from .structure import LinkEntry, Structure
 
 _PLACE, _SPEEDS, _TURNING, _CENTROID = ("x", "y"), ("vx", "vy", "ax", "ay"), ("w", "a"), "centroid"

@@ -8,7 +8,7 @@ from typing import Any
 from ...mechanism.assur import GROUND, REVOLUTE, in_order_of_motion
 from .joint_kind import JointEntry
 from .joint_kinds import in_decomposition
-from .points import owners_of
+from .names import owners_of
 
 
 def shared_pins(

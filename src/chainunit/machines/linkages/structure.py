@@ -11,7 +11,7 @@ from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
 from .joint_kind import Entry, JointEntry
 from .joint_kinds import SINGLES, in_decomposition
-from .points import LinkPoint, connected, owners_of
+from .names import LinkPoint, connected, owners_of
 
 
 @dataclass(frozen=True)
