@@ -209,13 +209,11 @@ class ChainUnitMachine(Machine):
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
         _check_side(side)
-        p, organ = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
-        on_web = p.web_share * loads.material_mass
-        masses = organ.wall_mass + loads.material_mass - on_web, organ.web_mass + on_web
-        counts = split((p.l1, p.l2), number)
-        lengths, shares = ([x / n for x, n in zip(xs, counts, strict=True)] for xs in ((p.l1, p.l2), masses))
-        return np.repeat(lengths, counts), np.repeat(shares, counts)
+        lengths, masses = (self.p.l1, self.p.l2), chain_unit.organ_masses(self.p, side, loads)
+        counts = split(lengths, number)
+        length, mass = (np.repeat(np.divide(parts, counts), counts) for parts in (lengths, masses))
+        return length, mass
 
     def hanging(self, side: str, psi: float, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> Hanging:
         """An organ at rest as a chain of `number` rods, at the rocker angle `psi` [rad]. The right organ is returned

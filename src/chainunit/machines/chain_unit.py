@@ -259,13 +259,18 @@ NAMES: dict[SideName, OrganNames] = {
 }
 
 
+def organ_masses(p: Any, side: str, loads: Any) -> tuple[Any, Any]:
+    """The masses of wall and web of an organ with the material of these loads on them [kg]."""
+    masses, on_web = getattr(p, side), p.web_share * loads.material_mass
+    return masses.wall_mass + (loads.material_mass - on_web), masses.web_mass + on_web
+
+
 def organ(p: Any, u: Any, side: SideName) -> Dyad:
     """A working organ as two bars: wall (A1-B) and web (A2-B) with the material on it."""
-    masses, loads, names = getattr(p, side), getattr(u, side), NAMES[side]
-    on_web = p.web_share * loads.material_mass
-    wall = _rod(p, masses.wall_mass + (loads.material_mass - on_web), p.l1)
-    web = _rod(p, masses.web_mass + on_web, p.l2)
-    return Dyad(names.b, Bar(names.wall, names.a1, p.l1, wall), Bar(names.web, "A2", p.l2, web), -names.hand)
+    names, (on_wall, on_web) = NAMES[side], organ_masses(p, side, getattr(u, side))
+    wall = Bar(names.wall, names.a1, p.l1, _rod(p, on_wall, p.l1))
+    web = Bar(names.web, "A2", p.l2, _rod(p, on_web, p.l2))
+    return Dyad(names.b, wall, web, -names.hand)
 
 
 def _rod(p: Any, mass: Any, length: Any) -> Mass:

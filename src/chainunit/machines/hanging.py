@@ -51,9 +51,13 @@ def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
     l, W = np.asarray(lengths, float), np.asarray(weights, float)
     before = np.concatenate([[0.0], np.cumsum(W)[:-1]]) + 0.5 * W
 
-    def parts(p: Any) -> tuple[float, Any, Any]:
+    def means(p: Any) -> tuple[Any, Any]:
+        """The means of the forces at the ends of the rods, and their sizes."""
         m = np.stack([np.full_like(before, p[0]), p[1] - before])
-        size = np.hypot(*m)
+        return m, np.hypot(*m)
+
+    def parts(p: Any) -> tuple[float, Any, Any]:
+        m, size = means(p)
         unit = m / size
         hessian = np.einsum("k,ik,jk->ij", -l / size, unit, unit) + np.eye(2) * np.sum(l / size)
         return float(l @ size), unit @ l, hessian
@@ -68,8 +72,7 @@ def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
                 "lie across between two parts that hang straight, without force; must be larger, or the rods shorter"
             )
     p = _least(parts, reach, float(np.sum(l)), float(np.sum(W)))
-    m = np.stack([np.full_like(before, p[0]), p[1] - before])
-    size = np.hypot(*m)
+    m, size = means(p)
     total = float(np.sum(W))
     return Hanging(p, np.array([-p[0], total - p[1]]), np.arctan2(-m[0], m[1]), size)
 

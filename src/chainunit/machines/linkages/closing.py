@@ -11,6 +11,7 @@ from ...groups.dyad import RRP, Dyad
 from ...groups.group import Group
 from ...mechanism.assur import AssurGroup
 from ...mechanism.machine import Mechanism
+from ..admissible import rounded_inward
 from .joint_kinds import SINGLES
 
 LEAST_MARGIN = 1e-3
@@ -129,8 +130,5 @@ def _gap_hint(group: Dyad | RRP, apart: Sequence[float]) -> str:
 
 
 def _mm(length: float, sense: float = 0.0) -> str:
-    """A length in four digits, rounded upward if `sense` is +1, downward if it is -1."""
-    if sense and length > 0.0:
-        unit = 10.0 ** (math.floor(math.log10(length)) - 3)
-        length = (math.ceil if sense > 0.0 else math.floor)(length / unit) * unit
-    return f"{1e3 * length:.4g} mm"
+    """A length in four digits; as a limit that is rounded upward if `sense` is +1, downward if it is -1."""
+    return f"{1e3 * (rounded_inward(length, sense) if sense else length):.4g} mm"

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial, reduce
 from typing import Any, cast
 
 import numpy as np
@@ -88,13 +88,6 @@ class FileMachine(InverseMachine):
         return self.described_by.at_start
 
 
-def _places_without(effect: Any, q: Any) -> Any:
-    """The numbers of the places `q` at which a load has no value, or an infinite one, ascending."""
-    numbers = [x for w in effect.wrenches for x in (w.force.x, w.force.y, w.moment)]
-    finite = [np.broadcast_to(np.isfinite(x), q.shape) for x in numbers]
-    return np.flatnonzero(~np.all(finite, axis=0))
-
-
 class LinkageDescription(LinkageOutputs):
     """The description of a linkage with its structure: what all values of its parameters share."""
 
@@ -130,7 +123,6 @@ class LinkageDescription(LinkageOutputs):
         self.sides |= turns_of_triads(self.at_start)
         self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
-        self._check_extremes()
         self.start_derived = self.followed.derived
         if self.extremes:
             self.start_derived = derived_numbers(MATH, self.at_start)
@@ -189,13 +181,10 @@ class LinkageDescription(LinkageOutputs):
 
     # the linkage
 
-    def parts(self, xp: Any, p: Any, u: Any) -> LinkageParts:
-        """The groups with the values of parameters and inputs."""
-        return LinkageParts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), self.sides)
-
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
-        return self._loaded(self.parts(xp, p, u), p)
+        geometry = LinkGeometry(xp, self.structure, self.values(xp, p, u))
+        return self._loaded(LinkageParts(geometry, self.sides), p)
 
     def _loaded(self, parts: LinkageParts, p: Any) -> DescribedLinkage:
         """The linkage of these parts, with the loads on it."""
@@ -228,25 +217,7 @@ class LinkageDescription(LinkageOutputs):
             k = moving.beside(place.x, place.y)
             return getattr(k.p, axis), getattr(k.p1, axis), getattr(k.p2, axis)
 
-        return MotionExtreme(coordinate, self.places(), 1.0 if kind == "max" else -1.0, ends)
-
-    def _check_extremes(self) -> None:
-        """Refuse extremes of the angle of a link that turns round.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
-        for name in self.extremes:
-            extreme = parts_of_extreme(name)
-            link = extreme.link
-            if extreme.axis == "angle" and self.way.turns and self.link_turns[link][0]:
-                raise InputError(
-                    f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
-                    "point, or of a link that swings",
-                    key=f"links.{link}",
-                )
+        return MotionExtreme(coordinate, self.way.places(), 1.0 if kind == "max" else -1.0, ends)
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
         kind, (link, *point), geometry = load["type"], load["on"], parts.geometry
@@ -283,22 +254,27 @@ class LinkageDescription(LinkageOutputs):
         InputError
             in one line, for the first such load.
         """
-        xp, q = numpy_(), np.array(self.places())
-        linkage = self.linkage(xp, p, self.Inputs())
-        loads = {load["name"]: linkage.loads[name_of_load(load)] for load in self.data["loads"]}
-        laws = {name: law for name, law in loads.items() if isinstance(law, ForceLaw | TorqueLaw)}
+        xp, q = numpy_(), np.array(self.way.places())
+        laws = {load["name"]: load for load in self.data["loads"] if load["type"] != "spring"}
         if not laws:
             return
+        linkage = self.linkage(xp, p, self.Inputs())
+        first_wrong: dict[str, int] = {}
         with np.errstate(all="ignore"):
             m = Mechanism(xp, linkage, q, getattr(p, "derived", ()))
-            faults = {name: _places_without(law.effect(xp, m, speed, {}), q) for name, law in laws.items()}
-        first = min(faults, key=lambda name: faults[name][:1].tolist() or [len(q)])
-        if faults[first].size:
+            for name, load in laws.items():
+                wrenches = linkage.loads[name_of_load(load)].effect(xp, m, speed, {}).wrenches
+                total = sum(abs(x) for w in wrenches for x in (w.force.x, w.force.y, w.moment))
+                wrong = ~np.isfinite(np.broadcast_to(total, q.shape))
+                if np.any(wrong):
+                    first_wrong[name] = int(np.argmax(wrong))
+        if first_wrong:
+            name = min(first_wrong, key=first_wrong.__getitem__)
             unit = "m/s" if self.way.linear else "rad/s"
-            key = f"loads.{first}.{'torque' if isinstance(laws[first], TorqueLaw) else 'force'}"
-            place = self.way.words(float(q[faults[first][0]]))
+            place = self.way.words(float(q[first_wrong[name]]))
             raise InputError(
-                f"has no value, or an infinite one, at {place} and a speed of {speed:.6g} {unit}", key=key
+                f"has no value, or an infinite one, at {place} and a speed of {speed:.6g} {unit}",
+                key=f"loads.{name}.{'torque' if laws[name]['type'] == 'torque' else 'force'}",
             )
 
     # the way of the driver
@@ -312,11 +288,10 @@ class LinkageDescription(LinkageOutputs):
     def angle_counts(self) -> str:
         """How the angle of the driver counts, in words."""
         driver = self.structure.driver
-        return driver.angle_counts(self.at_start.parts.geometry.number(driver.zero))
-
-    def places(self) -> list[float]:
-        """Places of the driver from the start on, around or over its range."""
-        return self.way.places()
+        degrees = round(math.degrees(self.at_start.parts.geometry.number(driver.zero)), 6)
+        named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
+        way = "counter-clockwise" if driver.sense > 0.0 else "clockwise"
+        return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
 
     def _followed(self, linkage: DescribedLinkage) -> FollowedLinkage:
         """The linkage over the way of its driver."""
@@ -324,11 +299,27 @@ class LinkageDescription(LinkageOutputs):
         return FollowedLinkage(self.structure, self.way, replace(linkage, extremes=()))
 
     def _turns(self) -> dict[str, tuple[float, float]]:
-        """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes."""
+        """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes. Refuse
+        extremes of the angle of a link that turns round, too.
+
+        Raises
+        ------
+        InputError
+            in one line.
+        """
         try:
-            return self.followed.turns()
+            turns = self.followed.turns()
         except InputError as error:
             raise InputError(f"{error}{self.followed.range_words()}", key=error.key) from None
+        for name in self.extremes:
+            _, link, _, axis = parts_of_extreme(name)
+            if axis == "angle" and self.way.turns and turns[link][0]:
+                raise InputError(
+                    f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
+                    "point, or of a link that swings",
+                    key=f"links.{link}",
+                )
+        return turns
 
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
@@ -357,7 +348,7 @@ class LinkageDescription(LinkageOutputs):
             return None
         states = [
             MachineState(MATH, Mechanism(MATH, self.at_start, q, self.start_derived), 0.0)
-            for q in self.places()
+            for q in self.way.places()
         ]
         mass = max(state.J for state in states)
         low, high = self.span
@@ -373,29 +364,7 @@ class LinkageDescription(LinkageOutputs):
         """The model."""
         data = self.data
         receivers = self.at_start.parts.receivers
-        bearings = {self.variable("joint", name): receivers[name][0] for name in self.structure.joints}
-        titles = {name: self.variable("joint", name) for name in self.structure.joints}
-        names = tuple(parameter["name"] for parameter in data.get("parameters", ()))
-        groups = self.structure.groups
-        triads = [assur_group for assur_group in groups if assur_group.kind == "triad"]
-        demands = (
-            (
-                groups,
-                "least margin of the group of {} over the way of the driver",
-                "the linkage does not close all the way, or comes to a dead position",
-            ),
-            (
-                triads,
-                "largest misfit of a leg of the group of {} over the turn of the driver, in parts of its length",
-                "the group does not close all the way round from the start pose, or moves too sharply to be followed",
-            ),
-        )
-        required = tuple(
-            Requirement(subject.format(", ".join(assur_group.links)), "1", why, names)
-            for members, subject, why in demands
-            for assur_group in members
-        ) + tuple(requirement_of_width(*width, names) for width in self.widths)
-
+        variables = {name: self.variable("joint", name) for name in self.structure.joints}
         title = data["title"] or data["name"]
         return FileMachine(
             name=data["name"],
@@ -417,33 +386,58 @@ class LinkageDescription(LinkageOutputs):
             Parameters=self.Parameters,
             Inputs=self.Inputs,
             Outputs=self.outputs,
-            joints=bearings,
-            pins=titles,
+            joints={variable: receivers[name][0] for name, variable in variables.items()},
+            pins=variables,
             usual_speed=(0.05, 200.0),
             described_by=self,
             linkage=self.linkage,
             probes=self.probes,
-            required=required,
+            required=self.required,
             requirements=self.limits,
             obstacle=self.obstacle,
         )
 
+    @property
+    def required(self) -> tuple[Requirement, ...]:
+        """The requirements whose values and limits `limits` gives."""
+        names = tuple(parameter["name"] for parameter in self.data.get("parameters", ()))
+        groups = {", ".join(assur.links): assur.kind for assur in self.structure.groups}
+        margins = (
+            Requirement(
+                f"least margin of the group of {links} over the way of the driver",
+                "1",
+                "the linkage does not close all the way, or comes to a dead position",
+                names,
+            )
+            for links in groups
+        )
+        fits = (
+            Requirement(
+                f"largest misfit of a leg of the group of {links} over the turn of the driver, in parts of its "
+                "length",
+                "1",
+                "the group does not close all the way round from the start pose, or moves too sharply to be followed",
+                names,
+            )
+            for links, kind in groups.items()
+            if kind == "triad"
+        )
+        return (*margins, *fits, *(requirement_of_width(*width, names) for width in self.widths))
+
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad, with
         their limits."""
-        u = self.Inputs()
-        linkage = self.linkage(xp, p, u)
+        linkage = self.linkage(xp, p, self.Inputs())
         derived = getattr(p, "derived", ())
-        least: list[Any] = []
-        for q in self.places():
+        course = []
+        for q in self.way.places():
             try:
                 margins = Mechanism(xp, linkage, q, derived).margins()
             except (ArithmeticError, ValueError):
                 margins = [math.nan] * len(self.structure.groups)
-            margins = signed(margins, self.followed.signs)
-            least = margins if not least else [lesser(xp, *pair) for pair in zip(least, margins, strict=True)]
-        for margin in least:
-            yield margin, LEAST_MARGIN, math.inf
+            course.append(signed(margins, self.followed.signs))
+        for margins_of_group in zip(*course, strict=True):
+            yield reduce(partial(lesser, xp), margins_of_group), LEAST_MARGIN, math.inf
         for _, misfit in misfits(linkage, derived):
             yield misfit, -math.inf, MOST_MISFIT
         values = linkage.parts.geometry.values

@@ -45,13 +45,6 @@ class DriverEntry:
     sense: float = 1.0
     swings: bool = False
 
-    def angle_counts(self, zero: float) -> str:
-        """How its angle counts, in words, where `zero` has this value [rad]."""
-        named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
-        degrees = round(math.degrees(zero), 6)
-        way = "counter-clockwise" if self.sense > 0.0 else "clockwise"
-        return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
-
 
 def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: DriverEntry) -> list[AssurGroup]:
     """The groups of a linkage.
