@@ -221,7 +221,7 @@ CHANGES = [
     ([('zero = "0 deg"', 'range = ["30 deg", "90 deg"]')],
      [(36, "start.phi", 'is "20 deg"; must be an angle in driver.range, from 30 deg to 90 deg')]),
     ([('zero = "0 deg"', 'range = ["30 deg", "90 deg"]'), ('phi = "20 deg"\n', "")],
-     [(35, "start.phi", "is 0 where it is not given; must be an angle in driver.range")]),
+     [(35, "start.phi", "is 0 if it is not given; must be an angle in driver.range")]),
     # drivers of other programs
     ([("[driver]", "[[driver]]"), ("[links.crank]", '[[driver]]\nlink = "rod"\n[links.crank]')],
      [(14, "driver", "stands there 2 times: a linkage has one driver, and a second one is not possible yet")]),

@@ -1,4 +1,4 @@
-"""The range of one parameter in which a machine works, with all others as they are: the remedy where a length is
+"""The range of one parameter in which a machine works, with all others as they are: the remedy if a length is
 refused that another one spoils."""
 
 from __future__ import annotations

@@ -171,7 +171,7 @@ class ChainUnitMachine(Machine):
         """Loads of the organs at a rocker angle `psi` [rad], with speed `w` and acceleration `a` of the rocker,
         independent of the drive: for the papers' statics at +-12 degrees, beyond this drive's swing.
 
-        For an array of angles, the loads of a side and of the rocker are NaN where that side cannot be assembled: the
+        For an array of angles, the loads of a side and of the rocker are NaN if that side cannot be assembled: the
         array may pass the limit.
 
         Raises
@@ -222,7 +222,7 @@ class ChainUnitMachine(Machine):
         Raises
         ------
         GeometryError
-            where the organ does not hang.
+            if the organ does not hang.
         """
         lengths, masses = self.organ_rods(side, loads, number)
         return rods(lengths, masses * self.p.g, self._reach(side, one_number(_ROCKER["psi"], psi)))
@@ -283,7 +283,7 @@ class ChainUnitMachine(Machine):
         self, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
     ) -> Any:
         """The least pull at an end of the webs [N] over `points` angles of a crank turn at constant motor speed `w`,
-        for each speed in `w`; infinite where no side is loaded."""
+        for each speed in `w`; infinite if no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
         w = np.asarray(in_declared_unit(_SPEED, w))
         out = self.forces(phi, w[..., None], 0.0, left, right)

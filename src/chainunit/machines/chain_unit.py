@@ -376,7 +376,7 @@ def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chambe
 
 def organ_pulls(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Pulls:
     """Axial pull in each rod just inside its pins [N], with the arguments of `chamber`: by side, rod ("web", "wall")
-    and pin. Web: A2 and B; wall: A1 and B. Negative where the rod is pushed. The mean of both ends is the mean pull
+    and pin. Web: A2 and B; wall: A1 and B. Negative if the rod is pushed. The mean of both ends is the mean pull
     of the rod: below zero a chain is slack."""
     s = _organs_on_rocker(xp, p, u, psi, psi_w)
     return _pulls(s, s.reactions(-psi_a))

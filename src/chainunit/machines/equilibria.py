@@ -88,7 +88,7 @@ class Holding:
 class Rest(NamedTuple):
     """A machine at rest at places of its driver, arrays of shape (n,) in units of a driver that turns: the place `q`
     [rad], the `holding` torque and that which `friction` of pins and guides holds [N m], the `inertia` [kg m2], and
-    the `potential` above its least one [J], None where it does not close in a turn."""
+    the `potential` above its least one [J], None if it does not close in a turn."""
 
     q: Any
     holding: Any

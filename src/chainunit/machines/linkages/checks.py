@@ -24,19 +24,13 @@ _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
 
 
 def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
-    """The fault of a table of guides where no joint slides."""
+    """The fault of a table of guides if no joint slides."""
     if "guides" in data and not any(joint["type"] == PRISMATIC for joint in joints):
         yield "guides", "no joint of the linkage slides; leave the table out"
 
 
 def study_fault(data: Mapping[str, Any]) -> None:
-    """Refuse a study file.
-
-    Raises
-    ------
-    InputError
-        in one line.
-    """
+    """Refuse a study file."""
     study_tables = [key for key in _STUDY if key in data]
     if study_tables and "links" not in data:
         raise InputError(

@@ -41,7 +41,8 @@ NameUnits = Mapping[str, str | None]
 
 
 class EntryReader(Entry):
-    """The reader of the entries of one file."""
+    """The reader of the entries of one file. Its methods collect the fault of a wrong entry, or raise an InputError
+    in one line, which a block `with self.at(key)` collects."""
 
     def __init__(self, data: Mapping[str, Any], name: str) -> None:
         super().__init__("", data)
@@ -114,13 +115,7 @@ class EntryReader(Entry):
 
     def number(self, key: str, entry: Any, unit: str, description: str = "") -> float:
         """A number, or a text with a unit, in the SI `unit`; one of an unusual size is noted by its key and this
-        `description`, if the key is not empty.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
+        `description`, if the key is not empty."""
         parts = units.split(entry) if isinstance(entry, str) else None
         if isinstance(entry, bool) or (not isinstance(entry, int | float) and parts is None):
             hint = units.spelling(entry, unit) if isinstance(entry, str) else ""
@@ -146,13 +141,7 @@ class EntryReader(Entry):
         return value
 
     def numbers(self, key: str, entry: Any, listed: Sequence[str], must: str) -> tuple[float, ...]:
-        """A list of numbers in the `listed` units; `must` are the words on what it must be.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
+        """A list of numbers in the `listed` units; `must` are the words on what it must be."""
         if not isinstance(entry, list) or len(entry) != len(listed):
             raise InputError(f"{is_given(entry)}; must be {must}")
         return tuple(self.number(key, x, unit) for x, unit in zip(entry, listed, strict=True))
@@ -202,13 +191,7 @@ class EntryReader(Entry):
         return math.nan
 
     def check_names(self, parsed: Expression, names: NameUnits, inputs: bool) -> None:
-        """Refuse an expression with a name that is not among the `names`, or of an input without leave.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
+        """Refuse an expression with a name that is not among the `names`, or of an input without leave."""
         for name in parsed.names:
             if name not in names and name not in self.derived:
                 raise InputError(f"is {shown(parsed.text)}; {name} is no parameter{self.note(name, names)}")
@@ -255,13 +238,7 @@ class EntryReader(Entry):
         return values
 
     def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
-        """The units of extremes and tables of an expression, by name.
-
-        Raises
-        ------
-        InputError
-            in one line, if the entry cannot have them.
-        """
+        """The units of extremes and tables of an expression, by name."""
         if parsed.extremes or parsed.tables:
             raise InputError(
                 f"is {shown(parsed.text)}; extremes and tables over x belong into the force or torque of a load"
@@ -343,13 +320,7 @@ class EntryReader(Entry):
         self.dimensions({})
 
     def check_parameter(self, name: str, entry: Any, text: str) -> None:
-        """Refuse a parameter that is a wrong expression of other parameters.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
+        """Refuse a parameter that is a wrong expression of other parameters."""
         if isinstance(entry, Mapping):
             self.keys(f"parameters.{name}", entry, ("value", "description"))
         parsed = expression(text)
@@ -388,13 +359,7 @@ class EntryReader(Entry):
         return entries
 
     def with_unit(self, entry: Any, unit: Any) -> tuple[float, str | None]:
-        """A value in SI units, and its unit; None if its first use tells it.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
+        """A value in SI units, and its unit; None if its first use tells it."""
         if unit is not None:
             fits = [si_unit for si_unit in UNITS if _same_unit(str(unit), si_unit)]
             if not fits:

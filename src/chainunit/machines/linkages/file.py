@@ -87,7 +87,7 @@ def linkage_in(file: Path) -> tuple[InverseMachine, tuple[UnusualValue, ...]]:
         reader = _LinkageReader(toml(text), file.stem, file.parent)
         try:
             description = reader.description()
-            # what is wrong of a group is told at its first link
+            # the fault of a group belongs to its first link
             with each_refusal(
                 lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")
             ):
@@ -95,13 +95,13 @@ def linkage_in(file: Path) -> tuple[InverseMachine, tuple[UnusualValue, ...]]:
                 check_start(machine.described_by)  # type: ignore[attr-defined]
             return machine, tuple(reader.unusual)
         except InputError as error:
-            # where lengths do not fit together, one may be a slip of the unit
+            # if lengths do not fit together, one may be a slip of the unit
             slips = [InputError(str(value), value.name) for value in reader.unusual if value.meant]
             raise InputError.joined([*error.faults, *slips]) from error
 
 
 def description_of(data: Mapping[str, Any], name: str, folder: Path = Path()) -> dict[str, Any]:
-    """The description of a machine from the tables of a file in a `folder`; `name` is that of the machine where the
+    """The description of a machine from the tables of a file in a `folder`; `name` is that of the machine if the
     file has none.
 
     Raises
@@ -470,7 +470,7 @@ class _LinkageReader(LoadReader):
             if abs(value) > _LARGEST_START:
                 raise InputError(f"is {shown(table['phi'])}; must be <= {_LARGEST_START:g} in size")
             if span and not linear and not span[0] <= value <= span[1]:
-                phi_text = f"is {shown(table['phi'])}" if "phi" in table else "is 0 where it is not given"
+                phi_text = f"is {shown(table['phi'])}" if "phi" in table else "is 0 if it is not given"
                 low, high = (f"{math.degrees(end):g} deg" for end in span)
                 raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)

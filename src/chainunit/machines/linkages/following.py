@@ -295,13 +295,7 @@ def misfits(linkage: Linkage, derived: Sequence[Any]) -> Iterator[tuple[str, Any
 
 
 def check_triads(linkage: Linkage, derived: Sequence[Any]) -> None:
-    """Refuse triads that cannot be followed all the way round.
-
-    Raises
-    ------
-    InputError
-        in one line.
-    """
+    """Refuse triads that cannot be followed all the way round."""
     for name, misfit in misfits(linkage, derived):
         if not misfit <= MOST_MISFIT:
             raise InputError(

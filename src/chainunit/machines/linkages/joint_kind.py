@@ -78,7 +78,7 @@ class JointParts(Protocol):
 
 class JointKind:
     """A kind of joint: its `name` in `type`, its `noun` in reports, the `keys` that it has besides `type`, `on` and
-    `by`, of which the first one tells the kind where `type` is missing, with words on their `use`. `losses` are the
+    `by`, of which the first one tells the kind if `type` is missing, with words on their `use`. `losses` are the
     table of the losses of all such joints, and its keys; `limits` say what is not in their reactions; `equations` is
     their number. `alone` is the kind of the group that a single link forms by such a joint and a pin, if there is
     one."""

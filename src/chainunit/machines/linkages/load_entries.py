@@ -35,8 +35,8 @@ _AXES = {"x": "m", "y": "m", "angle": "rad"}
 _OWN = re.compile(r"\b(min|max|stroke)\(\s*(x|y|angle)\s*\)")
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
 """A number whose comma may stand between thousands."""
-Column = list[tuple[float, str | None]]
-"""A column of a table, each value with its unit."""
+Column = tuple[list[float], str | None]
+"""The values of a column of a table in SI units, and their unit."""
 _HEADING = re.compile(r"\s*([^\[(]*?)\s*(?:[\[(]\s*(.*?)\s*[\])])?\s*")
 
 
@@ -61,16 +61,14 @@ class LoadReader(EntryReader):
             self.refused.add(name)
             with self.at(key):
                 over = "phi" if "phi" in table else "x"
-                places, values = self.columns(key, table, over)
-                of_x, of_value = places[0][1], values[0][1]
-                abscissas = [x for x, _ in places]
+                (abscissas, of_x), (values, of_value) = self.columns(key, table, over)
                 turns = over == "phi" and of_x == "rad" and "range" not in self.table("driver")
                 if any(b <= a for a, b in pairwise(abscissas)):
                     raise InputError(f"{over} must rise" + ", within less than one turn" * turns)
                 if turns and abscissas[-1] - abscissas[0] >= 2.0 * math.pi:
                     raise InputError("phi must rise, within less than one turn: the table repeats itself")
                 self.sizes[name] = len(abscissas)
-                curves[name] = {"over": over, "places": abscissas, "values": [x for x, _ in values]}
+                curves[name] = {"over": over, "places": abscissas, "values": values}
                 if over == "phi":
                     self.table_units[name] = of_value
                 self.curve_units[name] = of_x, of_value
@@ -96,20 +94,17 @@ class LoadReader(EntryReader):
             )
         if len(places) > MOST_POINTS:
             raise InputError(f"has {len(places)} points; {_FEWER}")
-        linear = "joint" in self.table("driver")
-        if over == "phi":
-            unit = "m" if linear else "rad"
-            abscissas: Column = [(self.number(key, x, unit), unit) for x in places]
-        else:
-            abscissas = self.like(places)
-        return abscissas, self.like(values)
+        if over == "x":
+            return self.like(places), self.like(values)
+        unit = "m" if "joint" in self.table("driver") else "rad"
+        return ([self.number(key, x, unit) for x in places], unit), self.like(values)
 
     def like(self, entries: list[Any]) -> Column:
         """Values of one unit, that of the first one."""
-        first = self.with_unit(entries[0], None)
-        if first[1] is None:
-            return [self.with_unit(x, None) for x in entries]
-        return [(self.number("", x, first[1]), first[1]) for x in entries]
+        _, unit = self.with_unit(entries[0], None)
+        if unit is None:
+            return [self.with_unit(x, None)[0] for x in entries], None
+        return [self.number("", x, unit) for x in entries], unit
 
     def columns_of_file(self, name: Any) -> tuple[Column, Column]:
         """The two columns of a CSV file beside the linkage file, with units in a heading ("way [mm], force [kN]")."""
@@ -143,7 +138,7 @@ class LoadReader(EntryReader):
                 f"{name}: {shown(commas[0])} is not clear, as its comma may stand between thousands or before "
                 "decimals; write all numbers with a decimal point and without marks between thousands"
             )
-        columns: tuple[Column, Column] = ([], [])
+        columns: tuple[list[float], list[float]] = ([], [])
         for place, row in enumerate(rows, 1):
             for k, cell in enumerate(row):
                 value = _number(cell)
@@ -151,8 +146,8 @@ class LoadReader(EntryReader):
                     # what begins as no number may be of a file that is no table
                     cited = f" {shown(cell)}" if cell.lstrip()[:1] in (*"+-.0123456789",) else ""
                     raise InputError(f"{name}: row {place} of numbers, column {k + 1}:{cited} is no number")
-                columns[k].append((within(value * scales[k], cell), column_units[k]))
-        return columns
+                columns[k].append(within(value * scales[k], cell))
+        return (columns[0], column_units[0]), (columns[1], column_units[1])
 
     # extremes of the motion
 
@@ -206,7 +201,7 @@ class LoadReader(EntryReader):
         Raises
         ------
         InputError
-            in one line, where the linkage has no such place.
+            in one line, if the linkage has no such place.
         """
         begin = f"is {shown(text)}; in {name} "
         if "." not in name:

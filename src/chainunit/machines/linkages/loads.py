@@ -70,7 +70,7 @@ def loads_by_speed(loads: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
-    """The expressions of forces and torques, each behind its key."""
+    """The key and the text of each expression of a force or a torque."""
     for load in loads:
         for key, entries in (("force", load.get("force", ())), ("torque", (load.get("torque", 0.0),))):
             yield from ((f"loads.{load['name']}.{key}", entry) for entry in entries if isinstance(entry, str))

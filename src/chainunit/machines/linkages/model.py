@@ -65,7 +65,7 @@ def machine_of(data: Mapping[str, Any]) -> InverseMachine:
     Raises
     ------
     InputError
-        where the linkage is not determined, has a group that is not covered, or does not close.
+        if the linkage is not determined, has a group that is not covered, or does not close.
     """
     return _machine_of(json.dumps(data, sort_keys=True))
 
@@ -300,13 +300,7 @@ class LinkageDescription(LinkageOutputs):
 
     def _turns(self) -> dict[str, tuple[float, float]]:
         """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes. Refuse
-        extremes of the angle of a link that turns round, too.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
+        extremes of the angle of a link that turns round, too."""
         try:
             turns = self.followed.turns()
         except InputError as error:
@@ -323,7 +317,7 @@ class LinkageDescription(LinkageOutputs):
 
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
-        parameters; empty where there is none."""
+        parameters; empty if there is none."""
         try:
             self._followed(self.linkage(MATH, p, self.Inputs())).turns()
         except InputError as error:

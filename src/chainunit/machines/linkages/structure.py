@@ -35,7 +35,7 @@ class LinkEntry:
 @dataclass(frozen=True)
 class DriverEntry:
     """The driver as described. A rotation: the link turns about its ground joint, at q = 0 its x axis has the angle
-    `zero` [rad], and q counts counter-clockwise where `sense` is +1; where it `swings`, it has a range. A slide: the
+    `zero` [rad], and q counts counter-clockwise if `sense` is +1; if it `swings`, it has a range. A slide: the
     joint is prismatic, and q is the way in it."""
 
     joint: str
