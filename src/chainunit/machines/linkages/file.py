@@ -463,7 +463,10 @@ class _LinkageReader(LoadReader):
         self.all(length_faults(points, joints, driver["link"]))
         self.doubt_bodies(links, points, joints, number)
         entries = {j["name"]: (JointEntry.from_table(j), number(j.get("angle", 0.0))) for j in joints}
-        pose = StartPose(points, [*entries.values()])
+        in_frames = {
+            link: {name: complex(*place) for name, place in places.items()} for link, places in points.items()
+        }
+        pose = StartPose(in_frames, [*entries.values()])
         value, linear = 0.0, driver["linear"]
         with self.at("start.phi"):
             value = self.number("start.phi", table.get("phi", 0.0), "m" if linear else "rad")
@@ -531,7 +534,7 @@ class _LinkageReader(LoadReader):
                     if point not in self.points.get(link, {}):
                         raise InputError(f"{point} is no point of {link}")
                     must = "a list of two, along x and y"
-                    pose.places[link, point] = self.numbers(key, place, ("m", "m"), must)
+                    pose.places[link, point] = complex(*self.numbers(key, place, ("m", "m"), must))
         for kind in ("angles", "poses"):
             for link, entry in self.table(f"start.{kind}", table).items():
                 key = f"start.{kind}.{link}"
@@ -542,4 +545,5 @@ class _LinkageReader(LoadReader):
                         pose.angles[link] = self.number(key, entry, "rad")
                     else:
                         must = "a list of three: x, y and angle of the frame of the link"
-                        pose.poses[link] = self.numbers(key, entry, ("m", "m", "rad"), must)
+                        x, y, angle = self.numbers(key, entry, ("m", "m", "rad"), must)
+                        pose.poses[link] = complex(x, y), angle

@@ -75,9 +75,9 @@ class LinkageParts:
             points[pin], self._carriers[pin] = (place.x, place.y), link
         return Bar(link, start, length, self.geometry.mass(entry, frame), points)
 
-    def hung(self, link: str, joint: JointEntry) -> Bar:
-        """The bar of a link that starts from the pin of a joint, along its own x axis."""
-        frame = LinkFrame(self.geometry.point(link, joint.at(link)), ALONG_X)
+    def hung(self, link: str, joint: JointEntry, along: Vec2 = ALONG_X) -> Bar:
+        """The bar of a link that starts from the pin of a joint with a link before it, in the direction `along`."""
+        frame = LinkFrame(self.geometry.point(link, joint.at(link)), along)
         return self.bar(link, frame, self.outer(joint, link))
 
     # joints
@@ -87,11 +87,8 @@ class LinkageParts:
         carrier = joint.other_link(link)
         frame = self.frames[carrier]
         place = frame.coordinates(self.geometry.line_through(joint, link, point))
-        return Rail(
-            None if carrier == GROUND else carrier,
-            place,
-            frame.components(self.geometry.direction(joint, carrier)),
-        )
+        along = frame.components(self.geometry.direction(joint, carrier))
+        return Rail(None if carrier == GROUND else carrier, place, along)
 
     def receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
@@ -129,33 +126,22 @@ class LinkageParts:
 
     def _cylinder(self, group: AssurGroup) -> Driver:
         barrel, rod, lever = group.links
-        slide = self.structure.joints[self.structure.driver.joint]
+        geometry, slide = self.geometry, self.structure.joints[self.structure.driver.joint]
         p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
         inner = self._inner(c, rod, lever)
         # from the barrel to the rod
-        along = {link: self.geometry.direction(slide, link) for link in (barrel, rod)}
-        if slide.on[0] == barrel:
-            along = {link: -v for link, v in along.items()}
-        frames = {
-            link: LinkFrame(self.geometry.point(link, joint.at(link)), along[link])
-            for link, joint in ((barrel, p), (rod, c))
-        }
-        (near, far) = (
-            frame.coordinates(self.geometry.point(link, slide.at(link))) for link, frame in frames.items()
+        in_barrel, in_rod = (
+            -line if slide.on[0] == barrel else line
+            for line in (geometry.direction(slide, barrel), geometry.direction(slide, rod))
         )
-        bars = self.bar(barrel, frames[barrel], self.outer(p, barrel)), self.bar(rod, frames[rod])
-        swung = self._rod(lever, q, c)
-        return Cylinder(
-            bars[0],
-            inner,
-            bars[1],
-            swung,
-            near.x - far.x,
-            near.y - far.y,
-            far.y,
-            self._guide(slide, rod),
-            self.sides[barrel],
+        barrel_bar = self.hung(barrel, p, in_barrel)
+        rod_bar = self.bar(rod, LinkFrame(geometry.point(rod, c.at(rod)), in_rod))
+        near, far = (
+            self.frames[link].coordinates(geometry.point(link, slide.at(link))) for link in (barrel, rod)
         )
+        swung, shift = self._rod(lever, q, c), near - far
+        guide, side = self._guide(slide, rod), self.sides[barrel]
+        return Cylinder(barrel_bar, inner, rod_bar, swung, shift.x, shift.y, far.y, guide, side)
 
     # joints by their letters: p and q join a link with those before, b and c are the pin between two links, g and h
     # are guides on links before, s is the slot between two links
@@ -200,21 +186,13 @@ class LinkageParts:
         return RRP(inner, rod, *self._slider(slider, g, c.at(slider)), self.sides[first])
 
     def _rpr(self, first: str, second: str, p: JointEntry, g: JointEntry, q: JointEntry) -> Group:
-        links = ((first, p), (second, q))
-        frames = [
-            LinkFrame(self.geometry.point(link, joint.at(link)), self.geometry.direction(g, link))
-            for link, joint in links
-        ]
+        geometry = self.geometry
+        one = self.hung(first, p, geometry.direction(g, first))
+        other = self.hung(second, q, geometry.direction(g, second))
         block, line = (
-            frame.coordinates(self.geometry.point(link, g.at(link)))
-            for frame, (link, _) in zip(frames, links, strict=True)
+            self.frames[link].coordinates(geometry.point(link, g.at(link))) for link in (first, second)
         )
-        starts = [self.outer(joint, link) for link, joint in links]
-        bars = [
-            self.bar(link, frame, start)
-            for (link, _), frame, start in zip(links, frames, starts, strict=True)
-        ]
-        return RPR(bars[0], bars[1], line.y - block.y, self._guide(g, first), self.sides[first])
+        return RPR(one, other, line.y - block.y, self._guide(g, first), self.sides[first])
 
     def _prp(self, first: str, second: str, g: JointEntry, c: JointEntry, h: JointEntry) -> Group:
         inner = self._inner(c, first, second)
@@ -223,16 +201,14 @@ class LinkageParts:
         return PRP(inner, one, other, one_rail, other_rail, (one_guide, other_guide))
 
     def _rpp(self, block: str, yoke: str, p: JointEntry, s: JointEntry, g: JointEntry) -> Group:
-        pin = self.geometry.point(block, p.at(block))
-        start = self.outer(p, block)
-        along = self.geometry.direction(g, yoke)
-        origin = self.geometry.line_through(s, block, pin)
+        geometry = self.geometry
+        along = geometry.direction(g, yoke)
+        origin = geometry.line_through(s, block, geometry.point(block, p.at(block)))
         rail = self._rail(g, yoke, origin)
-        frame = LinkFrame(origin, along)
-        slot = frame.components(self.geometry.direction(s, yoke))
-        in_block = self.geometry.across(s, along, yoke)
-        bars = self.bar(block, LinkFrame(pin, in_block), start), self.bar(yoke, frame)
-        return RPP(*bars, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
+        one = self.hung(block, p, geometry.across(s, along, yoke))
+        other = self.bar(yoke, LinkFrame(origin, along))
+        slot = self.frames[yoke].components(geometry.direction(s, yoke))
+        return RPP(one, other, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
 
     def _triad(
         self, ternary: str, legs: Sequence[str], outer: Sequence[JointEntry], inner: Sequence[JointEntry]
@@ -242,12 +218,16 @@ class LinkageParts:
         # before the legs: one that slides in it may do so at a point of it
         plate = self.bar(ternary, OWN)
         built = [self._leg(*ends, ternary) for ends in zip(legs, outer, inner, strict=True)]
-        x, y, angle = self.structure.poses[ternary]
-        mass = plate.mass or Mass(0.0, 0.0, 0.0, 0.0)
         first, second, third = built
-        pose = Pose(x, y, angle)
-        turns = self.sides.get(ternary, 0.0)
-        return Triad(ternary, mass, (first, second, third), plate.points, pose, self.structure.start, turns)
+        return Triad(
+            ternary,
+            plate.mass or Mass(0.0, 0.0, 0.0, 0.0),
+            (first, second, third),
+            plate.points,
+            Pose(*self.structure.poses[ternary]),
+            self.structure.start,
+            self.sides.get(ternary, 0.0),
+        )
 
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
         pin = self.pin(ternary, inner.at(ternary))
@@ -258,8 +238,6 @@ class LinkageParts:
                 return RodLeg(self._rod(link, outer, inner), pin, arm)
             bar, rail, guide = self._slider(link, outer, inner.at(link))
             return BlockLeg(bar, pin, arm, rail, guide)
-        point = self.geometry.point(link, outer.at(link))
-        start = self.outer(outer, link)
-        place = self.geometry.line_through(inner, link, point)
-        bar = self.bar(link, LinkFrame(point, self.geometry.direction(inner, link)), start)
+        place = self.geometry.line_through(inner, link, self.geometry.point(link, outer.at(link)))
+        bar = self.hung(link, outer, self.geometry.direction(inner, link))
         return SlotLeg(bar, place, self.geometry.direction(inner, ternary), self._guide(inner, link))
