@@ -162,6 +162,7 @@ class TurningChains(ChainedModel, DirectMachine):
         return [x.w, a, *(v for h in s.chains.values() for v in h.rates(a / p.ratio, CLOSING))]
 
 
+@functools.cache
 def flexible(walls: int, webs: int) -> InverseMachine:
     """The machine with `walls` + `webs` rods an organ; its direct model is `flexible(walls, webs).direct()`.
 
@@ -175,28 +176,6 @@ def flexible(walls: int, webs: int) -> InverseMachine:
             f"{walls + webs} rods an organ, {walls} in the wall and {webs} in the web: must be at least one in each "
             f"and at most {MOST} in all; more need an implicit integrator"
         )
-    return _flexible(walls, webs)
-
-
-def with_rods(number: int, start: Mapping[str, float]) -> InverseMachine:
-    """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
-    are nearest to equal length, by the lengths among the `start` values.
-
-    Raises
-    ------
-    InputError
-        for a number of rods that the model cannot have.
-    """
-    from .hanging import split  # it takes numpy, which the Python of a simulator that runs the FMU may lack
-
-    if not LEAST <= number <= MOST:
-        raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
-    lengths = ChamberForces.Parameters()
-    return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
-
-
-@functools.cache
-def _flexible(walls: int, webs: int) -> InverseMachine:
     organs = Organs(walls, webs)
     return DrivenChains(
         name="ChainUnitFlexible",
@@ -229,6 +208,23 @@ def _flexible(walls: int, webs: int) -> InverseMachine:
         required=(*ChamberForces.required, *_MASSES),
         requirements=_limits,
     )
+
+
+def with_rods(number: int, start: Mapping[str, float]) -> InverseMachine:
+    """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
+    are nearest to equal length, by the lengths among the `start` values.
+
+    Raises
+    ------
+    InputError
+        for a number of rods that the model cannot have.
+    """
+    from .hanging import split  # it takes numpy, which the Python of a simulator that runs the FMU may lack
+
+    if not LEAST <= number <= MOST:
+        raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
+    lengths = ChamberForces.Parameters()
+    return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
 
 
 def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

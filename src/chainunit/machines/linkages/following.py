@@ -53,6 +53,8 @@ class FollowedLinkage:
         """1 if the first group of the structure is the driver of the linkage, a cylinder; else 0"""
         self.signs: list[float] = []
         """the signs of the margins at the first place of the way, once it is followed"""
+        self.margins: list[list[float]] = []
+        """the margins with these signs at all places"""
 
     @cached_property
     def derived(self) -> Sequence[float]:
@@ -85,7 +87,7 @@ class FollowedLinkage:
         """
         places = self.way.closed_places()
         angles = {name: [self.structure.poses[name][2]] for name in self.structure.links}
-        margins: list[list[float]] = []
+        margins = self.margins = []
         try:
             check_triads(self.linkage, self.derived)
             for q in places:

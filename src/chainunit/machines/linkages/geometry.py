@@ -8,7 +8,7 @@ A description places the points of a link in the link's own frame. A group has f
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ...core.errors import InputError
@@ -50,7 +50,7 @@ OWN = LinkFrame(ZERO, ALONG_X)
 class LinkGeometry:
     """The links of a `structure` with values: `xp` is the engine, `values` are the quantities by name."""
 
-    def __init__(self, xp: Any, structure: Structure, values: Mapping[str, Any]) -> None:
+    def __init__(self, xp: Any, structure: Structure, values: dict[str, Any]) -> None:
         self.xp, self.structure, self.values = xp, structure, values
         self._points: dict[str, dict[str, Vec2]] = {}
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial, reduce
 from typing import Any, cast
@@ -87,6 +87,11 @@ class FileMachine(InverseMachine):
         """The linkage with the start values."""
         return self.described_by.at_start
 
+    def _derived(self, xp: Any, p: Any) -> list[Any]:
+        """See `LinkageModel`; the numbers of the start values are known."""
+        described = self.described_by
+        return [*described.start_derived] if described.is_start(xp, p) else super()._derived(xp, p)
+
 
 class LinkageDescription(LinkageOutputs):
     """The description of a linkage with its structure: what all values of its parameters share."""
@@ -124,12 +129,14 @@ class LinkageDescription(LinkageOutputs):
         self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
         self.start_derived = self.followed.derived
+        values = geometry.values
         if self.extremes:
             self.start_derived = derived_numbers(MATH, self.at_start)
-            # loads with extremes have values from here on
-            self.at_start = self.linkage(MATH, self._ready(), u)
-        p = self._ready()
-        self.widths = checked_widths(data["loads"], self.values(MATH, p, u))
+            # the loads know the extremes from here on
+            values |= zip(self.extremes, self.start_derived[-len(self.extremes) :], strict=True)
+        self.widths = checked_widths(data["loads"], values)
+        p = self.Parameters()
+        object.__setattr__(p, "derived", self.start_derived)
         self.check_loads(p, 1.0)
 
     # declarations
@@ -315,6 +322,10 @@ class LinkageDescription(LinkageOutputs):
                 )
         return turns
 
+    def is_start(self, xp: Any, p: Any) -> bool:
+        """Whether the parameters are numbers with the start values, whose linkage is known."""
+        return xp is MATH and p == self.Parameters()
+
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
         parameters; empty if there is none."""
@@ -329,12 +340,6 @@ class LinkageDescription(LinkageOutputs):
         return ""
 
     # the model
-
-    def _ready(self) -> Any:
-        """The start values of the parameters, with the numbers that are derived from them."""
-        p = self.Parameters()
-        object.__setattr__(p, "derived", self.start_derived)
-        return p
 
     def end_stops(self) -> EndStops | None:
         """The usual end stops of a driver with a range, for its start values; None for one that turns round."""
@@ -421,15 +426,13 @@ class LinkageDescription(LinkageOutputs):
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad, with
         their limits."""
-        linkage = self.linkage(xp, p, self.Inputs())
-        derived = getattr(p, "derived", ())
-        course = []
-        for q in self.way.places():
-            try:
-                margins = Mechanism(xp, linkage, q, derived).margins()
-            except (ArithmeticError, ValueError):
-                margins = [math.nan] * len(self.structure.groups)
-            course.append(signed(margins, self.followed.signs))
+        if self.is_start(xp, p):
+            linkage, derived, course = self.at_start, self.start_derived, self.followed.margins
+        else:
+            linkage, derived = self.linkage(xp, p, self.Inputs()), getattr(p, "derived", ())
+            course = [
+                signed(self._margins(xp, linkage, derived, q), self.followed.signs) for q in self.way.places()
+            ]
         for margins_of_group in zip(*course, strict=True):
             yield reduce(partial(lesser, xp), margins_of_group), LEAST_MARGIN, math.inf
         for _, misfit in misfits(linkage, derived):
@@ -437,6 +440,13 @@ class LinkageDescription(LinkageOutputs):
         values = linkage.parts.geometry.values
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
+
+    def _margins(self, xp: Any, linkage: DescribedLinkage, derived: Sequence[Any], q: float) -> list[Any]:
+        """The margins of the groups at a place; NaN if the linkage does not close."""
+        try:
+            return Mechanism(xp, linkage, q, derived).margins()
+        except (ArithmeticError, ValueError):
+            return [math.nan] * len(self.structure.groups)
 
     @property
     def notes(self) -> str:
