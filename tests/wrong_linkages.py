@@ -213,7 +213,7 @@ CHANGES = [
     ([('link = "crank"', 'link = "cronk"')], [(15, "driver.link", 'was "crank" meant?')]),
     ([('link = "crank"', 'link = "rod"')], [(15, "driver.link", "one revolute joint with the ground")]),
     ([('zero = "0 deg"', 'positive = "left"')], [(16, "driver.positive", '"counter-clockwise"')]),
-    ([('zero = "0 deg"', "range = 1")], [(16, "driver.range", "the least and the most angle of the driver")]),
+    ([('zero = "0 deg"', "range = 1")], [(16, "driver.range", "is 1; must be the least and the most angle of the driver")]),
     ([('zero = "0 deg"', "range = [1, 0]")], [(16, "driver.range", "is [1, 0]; must rise")]),
     ([('zero = "0 deg"', "range = [10, 80]")], [(16, "driver.range", "a number without a unit is in radians")]),
     ([('zero = "0 deg"', 'range = ["0 deg", "400 deg"]')],
@@ -260,7 +260,7 @@ CHANGES = [
     ([(ROUGH, "points = { C = [0] }")], [(37, "start.points.C", "a list of two")]),
     ([(ROUGH, 'points = { A = ["q", 0], C = [0, "-356 mm"] }')], [(37, "start.points.A", "must be a number")]),
     ([(ROUGH, 'angles = { rode = "3 deg" }')], [(37, "start.angles.rode", 'was "rod" meant?')]),
-    ([(ROUGH, "poses = { rod = [0, 0] }")], [(37, "start.poses.rod", "a list of three")]),
+    ([(ROUGH, "poses = { rod = [0, 0] }")], [(37, "start.poses.rod", "is [0, 0]; must be a list of three")]),
     # springs
     (added(f'{SPRING}\nby = "rod.C"\nstiffness = 3\nlength = 0'),
      [(35, "loads.s", "give points that move apart")]),
