@@ -213,7 +213,7 @@ CHANGES = [
     ([('link = "crank"', 'link = "cronk"')], [(15, "driver.link", 'was "crank" meant?')]),
     ([('link = "crank"', 'link = "rod"')], [(15, "driver.link", "one revolute joint with the ground")]),
     ([('zero = "0 deg"', 'positive = "left"')], [(16, "driver.positive", '"counter-clockwise"')]),
-    ([('zero = "0 deg"', "range = 1")], [(16, "driver.range", "is 1; must be the least and the most angle of the driver")]),
+    ([('zero = "0 deg"', "range = 1")], [(16, "driver.range", "is 1; must be the least and the most angle of")]),
     ([('zero = "0 deg"', "range = [1, 0]")], [(16, "driver.range", "is [1, 0]; must rise")]),
     ([('zero = "0 deg"', "range = [10, 80]")], [(16, "driver.range", "a number without a unit is in radians")]),
     ([('zero = "0 deg"', 'range = ["0 deg", "400 deg"]')],

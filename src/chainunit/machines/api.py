@@ -358,9 +358,11 @@ class ChainedUnit(Machine):
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """See `Machine`; the angles in A2, B and A1 of each side come from the angles of the rods."""
         assert isinstance(self.model, ChainedModel)
-        angles, rods = super().pin_turns(run), self.model.organs.at_pins
+        angles, organs = super().pin_turns(run), self.model.organs
+        # the rods at A1, at B in wall and web, and at A2
+        at_pins = (1, organs.walls, organs.walls + 1, organs.number)
         for side in SIDES:
-            first, last, web, end = (run[f"{side}.theta_{k}"] for k in rods)
+            first, last, web, end = (run[f"{side}.theta_{k}"] for k in at_pins)
             angles[f"{side}.rocker_joint"] = end - run["rocker.psi"]
             angles[f"{side}.hinge"] = web - last
             angles[f"{side}.support"] = first

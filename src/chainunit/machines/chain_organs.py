@@ -193,11 +193,6 @@ class Organs:
         self.RodsStart = declared_class("RodsStart", (StartChoice,), both(rod_start, rod_start()))
         self._start_layout = Layout(rod_start)
 
-    @property
-    def at_pins(self) -> tuple[int, int, int, int]:
-        """Numbers of the rods at A1, at B in wall and web, and at A2."""
-        return 1, self.walls, self.walls + 1, self.number
-
     def split(self, x: Any) -> list[State]:
         """Angles and speeds of the rods, left and right."""
         N, sides = self.number, (self._layout.values(x.left), self._layout.values(x.right))

@@ -97,7 +97,10 @@ class FollowedLinkage:
                 for group, margin in zip(self.structure.groups, margins[-1], strict=True):
                     if not margin > LEAST_MARGIN:
                         raise dead_group(group, self.way.words(q), margin)
-                self._add_angles(angles, m)
+                for name, course in angles.items():
+                    # without a jump from the one before
+                    turn = math.remainder(self.linkage.angle(name, m) - course[-1], WHOLE)
+                    course.append(course[-1] + turn)
         except InputError:
             raise
         except (ArithmeticError, ValueError, IndexError):
@@ -113,11 +116,6 @@ class FollowedLinkage:
             rest = [angle - rate * (q - places[0]) for angle, q in zip(samples, places, strict=True)]
             turns[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * places[0]
         return turns
-
-    def _add_angles(self, angles: dict[str, list[float]], m: Mechanism) -> None:
-        """Add the angle of each link, without a jump from the one before."""
-        for name, course in angles.items():
-            course.append(course[-1] + math.remainder(self.linkage.angle(name, m) - course[-1], WHOLE))
 
     # where it does not close
 
@@ -157,27 +155,25 @@ class FollowedLinkage:
         there is none, or if the driver has to go all the way round."""
         if any(isinstance(group, Triad) for group in self.linkage.groups):
             return ""
-        start = self._start_in_range()
+        # the start of a slide may lie outside its range
+        low, high = self.way.limits or (-math.inf, math.inf)
+        start = min(max(self.way.start, low), high)
         ends = self.closing_range(start)
         if ends is None:
             return ""
         unit = "m" if self.way.linear else "deg"
-        low, high = (
+        least, most = (
             f"{self.way.inside(end.place, sense if end.links else 0.0)} {unit}"
             for end, sense in zip(ends, (1.0, -1.0), strict=True)
         )
         low_group, high_group = (f" (group of {', '.join(end.links)})" if end.links else "" for end in ends)
         around = "its start" if start == self.way.start else self.way.words(start)
         return (
-            f"; around {around} the linkage closes from {low}{low_group} to {high}{high_group}: "
+            f"; around {around} the linkage closes from {least}{low_group} to {most}{high_group}: "
             f"{'for a driver that swings, ' if self.way.turns else ''}write "
-            f'range = ["{low}", "{high}"] in [driver], or less, as the forces grow without limit towards such an end'
+            f'range = ["{least}", "{most}"] in [driver], or less, as the forces grow without limit towards such an '
+            "end"
         )
-
-    def _start_in_range(self) -> float:
-        """The start, or the end of the range that is nearest to it: that of a slide may lie outside."""
-        low, high = self.way.limits or (-math.inf, math.inf)
-        return min(max(self.way.start, low), high)
 
     def closing_range(self, start: float) -> tuple[RangeEnd, RangeEnd] | None:
         """The ends of the range around a place in which all groups close, clear of dead positions; None if they do
