@@ -3,22 +3,17 @@ its key, with all faults collected."""
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
-from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 from ...core import units
-from ...core.errors import InputError, near_name, printable, shown
-from ...core.model import About
-from ...core.quantities import USUAL, Layout, Quantity, Variable, base_units
-from ...mechanism.expressions import CONSTANTS, WORDS, Expression, as_float, expression
+from ...core.errors import InputError, near_name, shown
+from ...core.quantities import USUAL, Quantity, Variable, base_units
+from ...mechanism.expressions import Expression, as_float, expression
 from ...reading.lists import Entry
 from ...reading.tables import UnusualValue
-from .declarations import CommonParameters
 from .dimensions import Dimensions, checked_dimension, dimension_of_unit
 from .loads import MOTION, OF_POINT
 from .names import name_fault, words_in
@@ -146,18 +141,6 @@ class EntryReader(Entry):
             raise InputError(f"{is_given(entry)}; must be {must}")
         return tuple(self.number(key, x, unit) for x, unit in zip(entry, listed, strict=True))
 
-    def limit(self, end: str, whole: Mapping[str, Any], unit: str) -> float:
-        """The `end` (min or max) of a parameter, in its `unit`; if its own unit does not fit, either may be the wrong
-        one, so that both are named."""
-        bound = whole[end]
-        parts = units.split(bound) if isinstance(bound, str) else None
-        if "unit" not in whole and parts is not None and parts[1] and not units.converts(parts[1], unit):
-            raise InputError(
-                f"has value = {shown(whole['value'])} and {end} = {shown(bound)}, which are of different kinds; "
-                "correct the unit of one of them"
-            )
-        return self.number("", bound, unit)
-
     def entry(
         self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False
     ) -> Any:
@@ -218,25 +201,6 @@ class EntryReader(Entry):
                 self.derived_dimensions[name] = dimensions[name]
         return {**self.derived_dimensions, **of_units(units)}
 
-    def start_values(self, parameters: Iterable[Mapping[str, Any]]) -> dict[str, float]:
-        """The start values of parameters by name, also of those that are expressions of others. Entries that have no
-        finite value with them are faulted."""
-        values = {parameter["name"]: float(parameter["value"]) for parameter in parameters}
-
-        def number(key: str, text: str) -> float:
-            x = expression(text).number(values)
-            if not math.isfinite(x):
-                names = ", ".join(f"{name} = {values[name]:.6g}" for name in expression(text).names)
-                self.fault(key, f"is {shown(text)}, which has no value, or an infinite one, with {names}")
-            return x
-
-        for name, text in self.derived.items():
-            values[name] = number(f"parameters.{name}", text)
-        for key, text in self.expressed:
-            if all(math.isfinite(values.get(name, 0.0)) for name in expression(text).names):
-                number(key, text)
-        return values
-
     def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of extremes and tables of an expression, by name."""
         if parsed.extremes or parsed.tables:
@@ -264,99 +228,6 @@ class EntryReader(Entry):
         """Points by name."""
         self.fault_reserved_names(key, points)
         return {name: self.vector(f"{key}.{name}", place, "m") for name, place in points.items()}
-
-    def common(self) -> dict[str, float]:
-        """Start values of the parameters that every linkage has."""
-        common = {}
-        variables = Layout(CommonParameters).variables
-        for table in ("pins", "guides"):
-            names = [v.name.removeprefix(f"{table}.") for v in variables if v.name.startswith(f"{table}.")]
-            self.keys(table, self.table(table), names)
-        for variable in variables:
-            key, quantity = "gravity" if variable.name == "g" else variable.name, variable.quantity
-            table, _, name = key.rpartition(".")
-            value = (self.table(table) if table else self.data).get(name)
-            if value is not None:
-                with self.at(key):
-                    x = self.number("", value, quantity.unit)
-                    if not quantity.admits(x):
-                        raise InputError(f"is {shown(value)}; must be {quantity.allowed_range}")
-                    self.doubt(replace(variable, name=key), value, x)
-                    common[variable.name] = quantity.within_bounds(x)
-        return common
-
-    def about(self) -> dict[str, str]:
-        """Who made the machine, as its FMUs say it."""
-        table = self.table("about")
-        names = tuple(field.name for field in fields(About))
-        self.keys("about", table, names)
-        return {key: printable(self.text(f"about.{key}", "", table), 1000) for key in table if key in names}
-
-    def expressions(self, table: Mapping[str, Any]) -> None:
-        """Take up the parameters that are expressions of others, in any order, and check each."""
-        texts = {
-            name: str(entry["value"] if isinstance(entry, Mapping) else entry)
-            for name, entry in table.items()
-            if is_expression(entry)
-        }
-        order = TopologicalSorter({name: words_in(text) & {*texts} for name, text in texts.items()})
-        with contextlib.suppress(CycleError):
-            order.prepare()
-        while ready := order.get_ready():
-            for name in ready:
-                self.derived[name] = "0"
-                self.refused.add(name)
-                if not self.refused & words_in(texts[name]):
-                    with self.at(f"parameters.{name}"):
-                        self.check_parameter(name, table[name], texts[name])
-                        self.derived[name] = texts[name]
-                        self.refused.discard(name)
-            order.done(*ready)
-        waiting = [name for name in texts if name not in self.derived]
-        for name in waiting:
-            loop = ", ".join(waiting)
-            self.fault(f"parameters.{name}", f"refers to itself by way of {loop}; give one of them a number")
-            self.derived[name] = "0"
-        self.dimensions({})
-
-    def check_parameter(self, name: str, entry: Any, text: str) -> None:
-        """Refuse a parameter that is a wrong expression of other parameters."""
-        if isinstance(entry, Mapping):
-            self.keys(f"parameters.{name}", entry, ("value", "description"))
-        parsed = expression(text)
-        self.further_units(parsed, False)
-        for used in parsed.names:
-            if (used not in self.units and used not in self.derived) or used in self.inputs:
-                raise InputError(f"is {shown(text)}; {used} is no parameter{near_name(used, self.units)}")
-        self.used |= {*parsed.names}
-
-    def quantities(self, kind: str) -> list[dict[str, Any]]:
-        """Parameters or inputs; parameters that are expressions of others are taken up apart."""
-        entries = []
-        table = self.table(kind)
-        self.fault_reserved_names(kind, table)
-        for name, entry in table.items():
-            if kind == "parameters" and is_expression(entry):
-                continue
-            if name in (*WORDS, *CONSTANTS, *MOTION):
-                self.refused.add(name)
-            whole = entry if isinstance(entry, Mapping) else {"value": entry}
-            self.keys(f"{kind}.{name}", whole, ("value", "unit", "min", "max", "description", "tunable"))
-            with self.at(f"{kind}.{name}"):
-                value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
-                limits = {end: self.limit(end, whole, unit or "1") for end in ("min", "max") if end in whole}
-                if not limits.get("min", -math.inf) <= value <= limits.get("max", math.inf):
-                    ends = [f"{end} = {shown(whole[end])}" for end in limits]
-                    raise InputError(f"is {shown(whole['value'])}; must be within {' and '.join(ends)}")
-                self.units[name] = unit
-                described = {"name": name, "value": value, "unit": unit}
-                described["description"] = str(whole.get("description", ""))
-                described["tunable"] = bool(whole.get("tunable", False))
-                entries.append(described | limits)
-            self.units.setdefault(name, None)
-        if kind == "parameters":
-            self.expressions(table)
-        return entries
 
     def with_unit(self, entry: Any, unit: Any) -> tuple[float, str | None]:
         """A value in SI units, and its unit; None if its first use tells it."""
@@ -386,18 +257,6 @@ def sized(key: str, unit: str, usual: tuple[float, float] | None, description: s
     """The value of a key as a variable of these `usual` sizes, with this `description`."""
     description = description or units.kind_of(unit)
     return Variable(key, description, Quantity(unit, description, usual=usual))
-
-
-def is_expression(entry: Any) -> bool:
-    """Whether the entry of a parameter is an expression of others, and no number with a unit."""
-    value = entry.get("value") if isinstance(entry, Mapping) else entry
-    parts = units.split(value) if isinstance(value, str) else (0.0, "")
-    if not isinstance(value, str) or (parts is not None and parts[1][:1] not in ("+", "-", "*", "/")):
-        return False
-    try:
-        return bool(expression(value).names)
-    except InputError:
-        return False
 
 
 def _is_quantity(text: str) -> bool:

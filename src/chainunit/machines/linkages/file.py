@@ -36,7 +36,7 @@ from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
-from .names import alike_points, model_name, name_fault, words_in
+from .names import alike_points, model_name, name_fault
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
@@ -212,35 +212,6 @@ class _LinkageReader(LoadReader):
                 self.fault(f"{key}.links", f"{link} is no link{near_name(link, self.points)}")
             groups.append([kind, links])
         return groups
-
-    def fault_unused(
-        self, parameters: list[dict[str, Any]], inputs: list[dict[str, Any]], tables: Mapping[str, Any]
-    ) -> None:
-        """Fault parameters, inputs and tables that nothing uses, and complete the units of the others. A name in a
-        faulty entry may be meant to be used."""
-        entries = {f"parameters.{entry['name']}": entry for entry in parameters}
-        entries |= {f"inputs.{entry['name']}": entry for entry in inputs}
-        texts = words_in([self.data[key] for key in self.data if key not in ("parameters", "inputs")])
-        keys = [
-            *entries,
-            *(f"parameters.{name}" for name in self.derived),
-            *(f"tables.{name}" for name in tables),
-        ]
-        is_faulty = bool(self.errors)
-        for key in keys:
-            table, _, name = key.partition(".")
-            is_meant = is_faulty and (name in texts or near_name(name, texts))
-            if name not in self.used | self.refused and not is_meant:
-                user = "no load" if table == "tables" else "nothing"
-                self.fault(key, f"{user} uses it; use it, or take it out")
-        for key, entry in entries.items():
-            table, _, name = key.partition(".")
-            entry["unit"] = entry["unit"] or self.units[name] or "1"
-            written = self.data[table][name]
-            whole = written if isinstance(written, Mapping) else {"value": written}
-            value = f"{whole['value']} {whole['unit']}" if "unit" in whole else whole["value"]
-            with self.at(key):  # its size is judged here, as its first use may tell its unit
-                self.number(key, value, entry["unit"], entry["description"])
 
     def link_names(self) -> Iterable[str]:
         """The names of the links."""

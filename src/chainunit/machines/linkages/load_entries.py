@@ -14,9 +14,10 @@ from ...core.errors import InputError, meant, near_name, shown
 from ...core.inputs import cells_of, file_text, lines_of_table
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import Expression, expression
-from .entries import EntryReader, NameUnits, is_among, is_given, within
+from .entries import NameUnits, is_among, is_given, within
 from .loads import parts_of_extreme
 from .names import name_fault
+from .parameters import ParameterReader
 
 MOST_POINTS = 200
 """Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
@@ -40,7 +41,7 @@ Column = tuple[list[float], str | None]
 _HEADING = re.compile(r"\s*([^\[(]*?)\s*(?:[\[(]\s*(.*?)\s*[\])])?\s*")
 
 
-class LoadReader(EntryReader):
+class LoadReader(ParameterReader):
     """The reader of loads and tables."""
 
     def __init__(self, data: Mapping[str, Any], name: str, folder: Path) -> None:
