@@ -1,5 +1,5 @@
-"""The entries of a linkage file: names, numbers with units, expressions, points, parameters and inputs, each read by
-its key, with all faults collected."""
+"""The entries of a linkage file: numbers with units, expressions and points, each read by its key, with all faults
+collected."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core import units
-from ...core.errors import InputError, near_name, shown
+from ...core.errors import InputError, meant, near_name, shown
 from ...core.quantities import USUAL, Quantity, Variable, base_units
+from ...mechanism.assur import GROUND
 from ...mechanism.expressions import Expression, as_float, expression
 from ...reading.lists import Entry
 from ...reading.tables import UnusualValue
 from .dimensions import Dimensions, checked_dimension, dimension_of_unit
-from .loads import MOTION, OF_POINT
+from .loads import MOTION, OF_POINT, parts_of_extreme
 from .names import name_fault, words_in
 from .way import WHOLE
 
@@ -28,6 +29,12 @@ UNITS = (
 
 _USUAL = USUAL | {"m": (0.0, USUAL["m"][1]), "m2": (1e-8, 10.0), "kg/m3": (10.0, 3e4)}
 """Usual sizes by unit; a length may be a coordinate, of any small size."""
+
+MOST_POINTS = 200
+"""Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
+point costs an export about 10 ms, and each step of an FMU about 6 ns."""
+FEWER = f"must have at most {MOST_POINTS}: keep those between which the curve is nearly straight"
+_AXES = {"x": "m", "y": "m", "angle": "rad"}
 
 LARGEST = 1e30
 """Largest size of a value in SI units."""
@@ -53,6 +60,14 @@ class EntryReader(Entry):
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
         self.unusual: list[UnusualValue] = []
+        self.table_units: dict[str, str | None] = {}
+        """units of the values of the tables over phi"""
+        self.curve_units: dict[str, tuple[str | None, str | None]] = {}
+        """units of the places and of the values of all tables"""
+        self.sizes: dict[str, int] = {}
+        """numbers of points of the tables"""
+        self.looked_up = 0
+        """points of the tables that loads and parameters look up"""
 
     def table(self, key: str, parent: Mapping[str, Any] | None = None) -> Mapping[str, Any]:
         """A table of the file, or of a `parent` table by the last name of its `key`; empty, with a fault, if it is
@@ -201,19 +216,87 @@ class EntryReader(Entry):
                 self.derived_dimensions[name] = dimensions[name]
         return {**self.derived_dimensions, **of_units(units)}
 
+    # extremes of the motion and tables in expressions
+
     def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
-        """The units of extremes and tables of an expression, by name."""
-        if parsed.extremes or parsed.tables:
+        """The units of the extremes and tables of an expression, by name; a load may have them."""
+        if not in_load:
+            self.count(parsed)
+            if parsed.extremes or parsed.tables:
+                raise InputError(
+                    f"is {shown(parsed.text)}; extremes and tables over x belong into the force or torque of a load"
+                )
+            return {}
+        units_by_name: dict[str, str | None] = {
+            extreme: self.extreme(extreme, parsed.text) for extreme in parsed.extremes
+        }
+        for name in parsed.tables:
+            if name not in self.curve_units:
+                if name in self.refused:
+                    continue
+                hint = near_name(name, self.curve_units)
+                raise InputError(f"is {shown(parsed.text)}; {name} is no table{hint}")
+            units_by_name[f"x of {name}"], units_by_name[f"table {name}"] = self.curve_units[name]
+            self.used.add(name)
+        return units_by_name
+
+    def count(self, *expressions: Expression) -> None:
+        """Add the points of the tables in the expressions of a load or of a parameter to those of the file: a table
+        over phi counts once in all of them, a table over x as often as it is looked up.
+
+        Raises
+        ------
+        InputError
+            in one line, for the expressions with which the file first has more than `MOST_POINTS`.
+        """
+        before = self.looked_up
+        over_phi = {name for parsed in expressions for name in parsed.names} & {*self.table_units}
+        for parsed in expressions:
+            self.looked_up += sum(parsed.points) + sum(self.sizes.get(name, 0) for name in parsed.lookups)
+        self.looked_up += sum(self.sizes[name] for name in over_phi)
+        if before <= MOST_POINTS < self.looked_up:
             raise InputError(
-                f"is {shown(parsed.text)}; extremes and tables over x belong into the force or torque of a load"
+                f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
+                f"{FEWER}"
             )
-        return {}
 
     def note(self, name: str, names: Iterable[str]) -> str:
         """A hint on a name that is not known in an expression."""
+        if name in self.curve_units:
+            return f"; it is a table over x: write table(x, {name})"
         if name in MOTION:
             return f"; {name} is known in a {'force' if name in OF_POINT else 'load'} alone"
         return near_name(name, names)
+
+    def extreme(self, name: str, text: str) -> str:
+        """The unit of an extreme.
+
+        Raises
+        ------
+        InputError
+            in one line, if the linkage has no such place.
+        """
+        begin = f"is {shown(text)}; in {name} "
+        if "." not in name:
+            argument = name.partition("(")[2].removesuffix(")")
+            raise InputError(
+                f"{begin}{argument} is no place of the motion; write a point of a link and its axis, such as "
+                "min(ram.C.y); of two numbers the lesser is min(a, b)"
+            )
+        _, link, point, axis = parts_of_extreme(name)
+        if link not in self.points or link == GROUND:
+            links = [candidate for candidate in self.points if candidate != GROUND]
+            raise InputError(f"{begin}{link} is no link{meant(link, links)} links: {', '.join(links)}")
+        if point and point not in self.points[link]:
+            raise InputError(
+                f"{begin}{point} is no point of {link}{meant(point, self.points[link])} its points: "
+                f"{', '.join(self.points[link])}"
+            )
+        if axis not in _AXES or (point and axis == "angle"):
+            raise InputError(f"{begin}{axis} must be x or y of a point, or x, y or angle of a link")
+        return _AXES[axis]
+
+    # points
 
     def vector(
         self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False

@@ -1,4 +1,4 @@
-"""The loads of a linkage file, the tables that they know, and the extremes of the motion that they name."""
+"""The loads of a linkage file, and the tables that they know."""
 
 from __future__ import annotations
 
@@ -13,16 +13,11 @@ from ...core import units
 from ...core.errors import InputError, meant, near_name, shown
 from ...core.inputs import cells_of, file_text, lines_of_table
 from ...mechanism.assur import GROUND
-from ...mechanism.expressions import Expression, expression
-from .entries import NameUnits, is_among, is_given, within
-from .loads import parts_of_extreme
+from ...mechanism.expressions import expression
+from .entries import FEWER, MOST_POINTS, NameUnits, is_among, is_given, within
 from .names import name_fault
 from .parameters import ParameterReader
 
-MOST_POINTS = 200
-"""Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
-point costs an export about 10 ms, and each step of an FMU about 6 ns."""
-_FEWER = f"must have at most {MOST_POINTS}: keep those between which the curve is nearly straight"
 LOADS = {
     "force": ("type", "on", "force"),
     "follower": ("type", "on", "force"),
@@ -32,7 +27,6 @@ LOADS = {
 """Keys of each type of load."""
 _OF_LINK: NameUnits = {"phi": "rad", "w": "rad/s", "angle": "rad", "angle_rate": "rad/s"}
 _OF_FORCE: NameUnits = {**_OF_LINK, "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
-_AXES = {"x": "m", "y": "m", "angle": "rad"}
 _OWN = re.compile(r"\b(min|max|stroke)\(\s*(x|y|angle)\s*\)")
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
 """A number whose comma may stand between thousands."""
@@ -47,11 +41,6 @@ class LoadReader(ParameterReader):
     def __init__(self, data: Mapping[str, Any], name: str, folder: Path) -> None:
         super().__init__(data, name)
         self.folder = folder
-        self.table_units: dict[str, str | None] = {}
-        self.curve_units: dict[str, tuple[str | None, str | None]] = {}
-        self.sizes: dict[str, int] = {}
-        """numbers of points of the tables"""
-        self.looked_up = 0
 
     # tables
 
@@ -94,7 +83,7 @@ class LoadReader(ParameterReader):
                 f"must have {over} and value, two lists of one length, of {least} or more, or file, a CSV file"
             )
         if len(places) > MOST_POINTS:
-            raise InputError(f"has {len(places)} points; {_FEWER}")
+            raise InputError(f"has {len(places)} points; {FEWER}")
         if over == "x":
             return self.like(places), self.like(values)
         unit = "m" if "joint" in self.table("driver") else "rad"
@@ -115,7 +104,7 @@ class LoadReader(ParameterReader):
         text = lines_of_table(file, file_text(file))
         lines = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
         if len(lines) > MOST_POINTS + 1:
-            raise InputError(f"{name}: has {len(lines)} rows; {_FEWER}")
+            raise InputError(f"{name}: has {len(lines)} rows; {FEWER}")
         mark = next((mark for mark in ";\t" if any(mark in line for line in lines)), ",")
         rows = cells_of(name, lines, mark)
         if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != 2), None):
@@ -149,80 +138,6 @@ class LoadReader(ParameterReader):
                     raise InputError(f"{name}: row {place} of numbers, column {k + 1}:{cited} is no number")
                 columns[k].append(within(value * scales[k], cell))
         return (columns[0], column_units[0]), (columns[1], column_units[1])
-
-    # extremes of the motion
-
-    def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
-        """The units of the extremes and tables of an expression, by name; a load may have them."""
-        if not in_load:
-            self.count(parsed)
-            return super().further_units(parsed, in_load)
-        units_by_name: dict[str, str | None] = {
-            extreme: self.extreme(extreme, parsed.text) for extreme in parsed.extremes
-        }
-        for name in parsed.tables:
-            if name not in self.curve_units:
-                if name in self.refused:
-                    continue
-                hint = near_name(name, self.curve_units)
-                raise InputError(f"is {shown(parsed.text)}; {name} is no table{hint}")
-            units_by_name[f"x of {name}"], units_by_name[f"table {name}"] = self.curve_units[name]
-            self.used.add(name)
-        return units_by_name
-
-    def count(self, *expressions: Expression) -> None:
-        """Add the points of the tables in the expressions of a load or of a parameter to those of the file: a table
-        over phi counts once in all of them, a table over x as often as it is looked up.
-
-        Raises
-        ------
-        InputError
-            in one line, for the expressions with which the file first has more than `MOST_POINTS`.
-        """
-        before = self.looked_up
-        over_phi = {name for parsed in expressions for name in parsed.names} & {*self.table_units}
-        for parsed in expressions:
-            self.looked_up += sum(parsed.points) + sum(self.sizes.get(name, 0) for name in parsed.lookups)
-        self.looked_up += sum(self.sizes[name] for name in over_phi)
-        if before <= MOST_POINTS < self.looked_up:
-            raise InputError(
-                f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
-                f"{_FEWER}"
-            )
-
-    def note(self, name: str, names: Any) -> str:
-        """A hint on a name that an expression does not know, such as a table over x."""
-        if name in self.curve_units:
-            return f"; it is a table over x: write table(x, {name})"
-        return super().note(name, names)
-
-    def extreme(self, name: str, text: str) -> str:
-        """The unit of an extreme.
-
-        Raises
-        ------
-        InputError
-            in one line, if the linkage has no such place.
-        """
-        begin = f"is {shown(text)}; in {name} "
-        if "." not in name:
-            argument = name.partition("(")[2].removesuffix(")")
-            raise InputError(
-                f"{begin}{argument} is no place of the motion; write a point of a link and its axis, such as "
-                "min(ram.C.y); of two numbers the lesser is min(a, b)"
-            )
-        _, link, point, axis = parts_of_extreme(name)
-        if link not in self.points or link == GROUND:
-            links = [candidate for candidate in self.points if candidate != GROUND]
-            raise InputError(f"{begin}{link} is no link{meant(link, links)} links: {', '.join(links)}")
-        if point and point not in self.points[link]:
-            raise InputError(
-                f"{begin}{point} is no point of {link}{meant(point, self.points[link])} its points: "
-                f"{', '.join(self.points[link])}"
-            )
-        if axis not in _AXES or (point and axis == "angle"):
-            raise InputError(f"{begin}{axis} must be x or y of a point, or x, y or angle of a link")
-        return _AXES[axis]
 
     # loads
 
