@@ -13,6 +13,7 @@ from .declarations import RESERVED
 from .joint_kind import JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
+from .names import alike_points
 from .structure import DriverEntry, groups_of
 
 Fault = tuple[str, str]
@@ -74,16 +75,23 @@ def spring_faults(loads: Entries, joints: Entries) -> Iterator[Fault]:
 
 
 def freedom_faults(
-    links: Entries, joints: Entries, driver: Mapping[str, Any], hint: str = ""
+    points: Mapping[str, Iterable[str]],
+    links: Entries,
+    joints: Entries,
+    loads: Entries,
+    driver: Mapping[str, Any],
 ) -> Iterator[Fault]:
-    """Too many or too few degrees of freedom, and groups of a class that is not covered; the `hint` follows a refusal
-    of too many."""
-    entries = [JointEntry.from_table(j) for j in joints]
+    """Too many or too few degrees of freedom, and groups of a class that is not covered. Too many may come from a
+    name of a point that is not spelled as that of the pin that it was meant to be."""
+    names = [link["name"] for link in links]
     try:
-        groups_of([link["name"] for link in links], entries, DriverEntry(**driver))
+        groups_of(names, [JointEntry.from_table(j) for j in joints], DriverEntry(**driver))
     except InputError as error:
-        text = f"{error}{hint if isinstance(error, FreeLinksError) else ''}"
-        yield f"links.{error.key}" if error.key in {link["name"] for link in links} else "joints", text
+        used = {tuple(entry[end]) for entry in (*joints, *loads) for end in ("on", "by") if end in entry}
+        used |= {(joint["by"][0], joint["toward"]) for joint in joints if "toward" in joint}
+        used |= {(link["name"], point) for link in links for point in link["masses"]}
+        hint = alike_points(points, used) if isinstance(error, FreeLinksError) else ""
+        yield f"links.{error.key}" if error.key in names else "joints", f"{error}{hint}"
 
 
 Places = Mapping[str, Mapping[str, tuple[float, float]]]

@@ -36,7 +36,7 @@ from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
-from .names import alike_points, model_name, name_fault
+from .names import model_name, name_fault
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
@@ -142,8 +142,7 @@ class _LinkageReader(LoadReader):
         self.all(quantity_names(names, links))
         self.all([*spring_faults(loads, joints), *guide_faults(data, joints)])
         self.refuse()
-        alike = alike_points(self.points, self.named_points(links, loads))
-        self.all(freedom_faults(links, joints, driver, alike))
+        self.all(freedom_faults(self.points, links, joints, loads, driver))
         owned = [
             {"name": f"{quantity}_of_{link['name']}", "value": x}
             for link in links
@@ -182,16 +181,6 @@ class _LinkageReader(LoadReader):
             several = f"stands there {len(drivers)} times: {ONE_DRIVER}; take all but one out, and"
             self.fault("driver", f"{several if len(drivers) > 1 else 'is a list;'} write [driver]")
             self.data = {**self.data, "driver": drivers[0]}
-
-    def named_points(self, links: list[dict[str, Any]], loads: list[dict[str, Any]]) -> set[tuple[str, ...]]:
-        """The points that joints of the file, loads and masses name, by link."""
-        joints = [joint for joint in self.table("joints").values() if isinstance(joint, Mapping)]
-        ends = [joint.get(key) for joint in joints for key in ("on", "by")]
-        named = {tuple(end.split(".")) for end in ends if isinstance(end, str)}
-        named |= {tuple(load[key]) for load in loads for key in ("on", "by") if key in load}
-        named |= {(link["name"], point) for link in links for point in link["masses"]}
-        lines = [str(joint["toward"]).rpartition(".")[2] for joint in joints if "toward" in joint]
-        return named | {(link, line) for link in self.points for line in lines}
 
     def groups(self) -> list[Any]:
         """The groups that the file lists, each with its kind, if it is given, and its links."""
