@@ -213,7 +213,7 @@ CHANGES = [
     ([('link = "crank"', 'link = "cronk"')], [(15, "driver.link", 'was "crank" meant?')]),
     ([('link = "crank"', 'link = "rod"')], [(15, "driver.link", "one revolute joint with the ground")]),
     ([('zero = "0 deg"', 'positive = "left"')], [(16, "driver.positive", '"counter-clockwise"')]),
-    ([('zero = "0 deg"', "range = 1")], [(16, "driver.range", "the least and the most angle of the driver")]),
+    ([('zero = "0 deg"', "range = 1")], [(16, "driver.range", "is 1; must be the least and the most angle of")]),
     ([('zero = "0 deg"', "range = [1, 0]")], [(16, "driver.range", "is [1, 0]; must rise")]),
     ([('zero = "0 deg"', "range = [10, 80]")], [(16, "driver.range", "a number without a unit is in radians")]),
     ([('zero = "0 deg"', 'range = ["0 deg", "400 deg"]')],
@@ -221,7 +221,7 @@ CHANGES = [
     ([('zero = "0 deg"', 'range = ["30 deg", "90 deg"]')],
      [(36, "start.phi", 'is "20 deg"; must be an angle in driver.range, from 30 deg to 90 deg')]),
     ([('zero = "0 deg"', 'range = ["30 deg", "90 deg"]'), ('phi = "20 deg"\n', "")],
-     [(35, "start.phi", "is 0 where it is not given; must be an angle in driver.range")]),
+     [(35, "start.phi", "is 0 if it is not given; must be an angle in driver.range")]),
     # drivers of other programs
     ([("[driver]", "[[driver]]"), ("[links.crank]", '[[driver]]\nlink = "rod"\n[links.crank]')],
      [(14, "driver", "stands there 2 times: a linkage has one driver, and a second one is not possible yet")]),
@@ -260,7 +260,7 @@ CHANGES = [
     ([(ROUGH, "points = { C = [0] }")], [(37, "start.points.C", "a list of two")]),
     ([(ROUGH, 'points = { A = ["q", 0], C = [0, "-356 mm"] }')], [(37, "start.points.A", "must be a number")]),
     ([(ROUGH, 'angles = { rode = "3 deg" }')], [(37, "start.angles.rode", 'was "rod" meant?')]),
-    ([(ROUGH, "poses = { rod = [0, 0] }")], [(37, "start.poses.rod", "a list of three")]),
+    ([(ROUGH, "poses = { rod = [0, 0] }")], [(37, "start.poses.rod", "is [0, 0]; must be a list of three")]),
     # springs
     (added(f'{SPRING}\nby = "rod.C"\nstiffness = 3\nlength = 0'),
      [(35, "loads.s", "give points that move apart")]),

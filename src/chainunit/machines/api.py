@@ -191,7 +191,7 @@ class ChainUnitMachine(Machine):
         """Loads of the organs at a rocker angle `psi` [rad], with speed `w` and acceleration `a` of the rocker,
         independent of the drive: for the papers' statics at +-12 degrees, beyond this drive's swing.
 
-        For an array of angles, the loads of a side and of the rocker are NaN where that side cannot be assembled: the
+        For an array of angles, the loads of a side and of the rocker are NaN if that side cannot be assembled: the
         array may pass the limit.
 
         Raises
@@ -229,13 +229,11 @@ class ChainUnitMachine(Machine):
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
         check_choice("side", side, SIDES)
-        p, organ = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
-        on_web = p.web_share * loads.material_mass
-        masses = organ.wall_mass + loads.material_mass - on_web, organ.web_mass + on_web
-        counts = split((p.l1, p.l2), number)
-        lengths, shares = ([x / n for x, n in zip(xs, counts, strict=True)] for xs in ((p.l1, p.l2), masses))
-        return np.repeat(lengths, counts), np.repeat(shares, counts)
+        lengths, masses = (self.p.l1, self.p.l2), chain_unit.organ_masses(self.p, side, loads)
+        counts = split(lengths, number)
+        length, mass = (np.repeat(np.divide(parts, counts), counts) for parts in (lengths, masses))
+        return length, mass
 
     def hanging(self, side: str, psi: float, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> Hanging:
         """An organ at rest as a chain of `number` rods, at the rocker angle `psi` [rad]. The right organ is returned
@@ -244,7 +242,7 @@ class ChainUnitMachine(Machine):
         Raises
         ------
         GeometryError
-            where the organ does not hang.
+            if the organ does not hang.
         """
         lengths, masses = self.organ_rods(side, loads, number)
         return rods(lengths, masses * self.p.g, self._reach(side, one_number(_ROCKER["psi"], psi)))
@@ -305,7 +303,7 @@ class ChainUnitMachine(Machine):
         self, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
     ) -> Any:
         """The least pull at an end of the webs [N] over `points` angles of a crank turn at constant motor speed `w`,
-        for each speed in `w`; infinite where no side is loaded."""
+        for each speed in `w`; infinite if no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
         w = np.asarray(in_declared_unit(_SPEED, w))
         out = self.forces(phi, w[..., None], 0.0, left, right)
@@ -375,9 +373,11 @@ class ChainedUnit(Machine):
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """See `Machine`; the angles in A2, B and A1 of each side come from the angles of the rods."""
         assert isinstance(self.model, ChainedModel)
-        angles, rods = super().pin_turns(run), self.model.organs.at_pins
+        angles, organs = super().pin_turns(run), self.model.organs
+        # the rods at A1, at B in wall and web, and at A2
+        at_pins = (1, organs.walls, organs.walls + 1, organs.number)
         for side in SIDES:
-            first, last, web, end = (run[f"{side}.theta_{k}"] for k in rods)
+            first, last, web, end = (run[f"{side}.theta_{k}"] for k in at_pins)
             angles[f"{side}.rocker_joint"] = end - run["rocker.psi"]
             angles[f"{side}.hinge"] = web - last
             angles[f"{side}.support"] = first

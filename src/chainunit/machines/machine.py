@@ -54,7 +54,7 @@ class Machine:
     """
 
     in_place: ClassVar[str] = ""
-    """Words on what the results without a run are of, where the runs have another model; else empty."""
+    """Words on what the results without a run are of, if the runs have another model; else empty."""
 
     def __init__(self, model: InverseMachine, parameters: Any = None, /, **values: Any) -> None:
         check_kind("model", model, InverseMachine, "a machine, such as KnifeDrive")

@@ -144,21 +144,15 @@ def field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
 
 def with_starts(declared: type, starts: Mapping[str, float]) -> type:
     """A declaration with other start values, by name."""
-    flat = Layout(declared).from_names(dict(starts))
-    fields = [
-        (f.name, f.type, group(f.metadata["of"], f.metadata["group"], default=getattr(flat, f.name)))
-        if "of" in f.metadata
-        else (
-            f.name,
-            f.type,
-            dataclasses.field(
-                default=getattr(flat, f.name),
-                metadata=f.metadata
-                | {"quantity": dataclasses.replace(f.metadata["quantity"], start=getattr(flat, f.name))},
-            ),
-        )
-        for f in dataclasses.fields(declared)
-    ]
+    flat, fields = Layout(declared).from_names(dict(starts)), []
+    for name, kind, slot in fields_of(declared):
+        start, data = getattr(flat, name), slot.metadata
+        if "of" in data:
+            started: Any = group(data["of"], data["group"], default=start)
+        else:
+            described = dataclasses.replace(data["quantity"], start=start)
+            started = dataclasses.field(default=start, metadata=data | {"quantity": described})
+        fields.append((name, kind, started))
     return declared_class(declared.__name__, (), fields)
 
 
