@@ -106,9 +106,7 @@ def linkage_from(
     try:
         description = reader.description()
         # what is wrong of a group is told at its first link
-        with each_refusal(
-            lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")
-        ):
+        with each_refusal(lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")):
             machine = machine_of(description)
             check_start(machine.described_by)  # type: ignore[attr-defined]
         return machine, tuple(reader.unusual)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -14,17 +14,15 @@ from ....mechanism.assur import GROUND
 from ..checks import POINT_NAMES
 
 Place = tuple[float, float]
-MOST_LINKS, MOST_PINS = 60, 300
-"""Most links and pins of a linkage that is imported."""
+_MOST = 300
+"""Most pins, and most links, of a linkage that is imported."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 
 
 @dataclass
 class ForeignLink:
-    """A link: its `title` in the source, its pins, its mass [kg], its inertia about the centroid [kg m2], and the
-    place of the centroid."""
+    """A link: its pins, its mass [kg], its inertia about the centroid [kg m2], and the place of the centroid."""
 
-    title: str
     pins: list[str] = field(default_factory=list)
     mass: float = 0.0
     inertia: float = 0.0
@@ -54,46 +52,44 @@ class ForeignDriver(NamedTuple):
 
 class ForeignLinkage(Faults):
     """A linkage of the program `program`, in which lengths have the unit `unit`. A reader fills it, and collects the
-    faults of the source, each with its place; `remarks` are sentences for the result."""
+    faults of the source, each with its place; `remarks` are sentences for the result. A load has its link and its
+    entries by its name, which is that of its point, too."""
 
     def __init__(self, program: str, unit: str) -> None:
         super().__init__()
         self.program, self.unit, self.weightless = program, unit, False
         self.places: dict[str, Place] = {}
-        self.links = {GROUND: ForeignLink("the ground")}
+        self.links = {GROUND: ForeignLink()}
         self.fastened: list[tuple[str, str]] = []
         self.slots: list[ForeignSlot] = []
         self.drivers: list[ForeignDriver] = []
         self.loads: dict[str, tuple[str, dict[str, Any]]] = {}
-        """by name, which is that of its point, too: the link, and the entries of the load"""
         self.remarks: list[str] = []
 
     def fault(self, title: str, message: str) -> None:
         """Collect the fault of a place in the source."""
         self.add([InputError(f"{title}: {message}")])
 
-    def number(self, title: str, name: str, text: str, most: float = 1e9) -> float:
-        """The number in a text; one that is wrong is a fault, and counts as 0."""
-        value = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
-        if not abs(value) <= most:
-            self.fault(title, f"{name} is {shown(text)}; must be a number, <= {most:g} in size")
-            return 0.0
-        return value
+    def numbers(self, title: str, texts: Iterable[str]) -> list[float]:
+        """The numbers in texts; one that is wrong is a fault, and counts as 0."""
+        values = [float(text) if _NUMBER.fullmatch(text) else math.inf for text in texts]
+        for text in (text for text, value in zip(texts, values, strict=True) if abs(value) > 1e12):
+            self.fault(title, f"has {shown(text)} in place of a number, <= 1e12 in size")
+        return [value if abs(value) <= 1e12 else 0.0 for value in values]
 
-    def pin(self, text: str, place: Place) -> str:
-        """Add a pin; returns its name in the linkage file."""
+    def pin(self, text: str, place: Iterable[float], *links: str) -> str:
+        """Add a pin of some links; returns its name in the linkage file."""
         name = free_name(text, self.places)
-        self.places[name] = place
-        if len(self.places) == MOST_PINS + 1:
-            self.fault(self.program, f"has more than {MOST_PINS} pins, the most that are read")
+        x, y = place
+        self.places[name] = x, y
+        for link in links:
+            self.links[link].pins.append(name)
         return name
 
-    def link(self, text: str, title: str) -> str:
+    def link(self, text: str) -> str:
         """Add a link; returns its name in the linkage file."""
         name = free_name(text, self.links)
-        self.links[name] = ForeignLink(title)
-        if len(self.links) == MOST_LINKS + 2:
-            self.fault(self.program, f"has more than {MOST_LINKS} links, the most that are read")
+        self.links[name] = ForeignLink()
         return name
 
     def slot(self, title: str, pin: str, track: str, angle: float, stiff: bool) -> None:
@@ -101,16 +97,21 @@ class ForeignLinkage(Faults):
         x, y = self.places[pin]
         reach = 0.25 * max(math.dist(place, (x, y)) for place in self.places.values()) or 1.0
         end = x + reach * math.cos(angle), y + reach * math.sin(angle)
-        line = self.pin(f"{pin}_slot", (x, y)), self.pin(f"{pin}_end", end)
-        self.links[track].pins += line
+        line = self.pin(f"{pin}_slot", (x, y), track), self.pin(f"{pin}_end", end, track)
         self.slots.append(ForeignSlot(title, pin, track, line, stiff))
 
 
 def free_name(text: str, taken: Collection[str]) -> str:
-    """A name for a linkage file that is like the text, and that is not `taken`."""
+    """A name for a linkage file that is like the text, and that is not `taken`.
+
+    Raises
+    ------
+    InputError
+        if too many are taken.
+    """
+    if len(taken) > _MOST:
+        raise InputError(f"the drawing has more than {_MOST} pins or links, the most that are read")
     first = re.sub(r"[^A-Za-z0-9_]", "_", text)[:40]
     first = first if first[:1].isalpha() else f"N{first}"
     names = (f"{first}_{k}" if k else first for k in range(len(taken) + 2))
-    return next(
-        name for name in names if not (name in taken or keyword.iskeyword(name) or name in POINT_NAMES)
-    )
+    return next(x for x in names if x not in taken and not keyword.iskeyword(x) and x not in POINT_NAMES)
