@@ -39,9 +39,10 @@ class _Reader:
 
     def __init__(self, sections: dict[str, list[list[str]]]) -> None:
         _, clockwise, gravity, unit = ([*sections.get("s", []), []][0] + [""] * 4)[:4]
-        self.linkage, self.clockwise = ForeignLinkage("PMKS+", unit or "cm"), clockwise in _TRUE
-        if self.linkage.unit not in _MASSES:
+        self.linkage = ForeignLinkage("PMKS+", unit if unit in _MASSES else "cm")
+        if unit not in ("", *_MASSES):
             self.linkage.fault("settings", f"the unit of length is {shown(unit)}; set it to cm or m")
+        self.clockwise = clockwise in _TRUE
         self.linkage.weightless = gravity in _FALSE
         self.linkage.remarks += ["gravity is off in the drawing, and so it is here"] * self.linkage.weightless
         self.joints: dict[str, str] = {}
@@ -83,7 +84,7 @@ class _Reader:
     def link(self, title: str, row: list[str]) -> None:
         """A link: its mass and its joints."""
         link, (mass, inertia, x, y) = self.named(row[0]), self.linkage.numbers(title, row[1:5])
-        units = _MASSES.get(self.linkage.unit, (1.0, 1.0))
+        units = _MASSES[self.linkage.unit]
         link.mass, link.inertia, link.centroid = mass * units[0], inertia * units[1], (x, y)
         joints = [joint for joint in row[5].split("|") if joint]
         if mass < 0.0 or inertia < 0.0 or not {*joints} <= {*self.joints}:
