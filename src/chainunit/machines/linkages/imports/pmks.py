@@ -98,7 +98,7 @@ class _Reader:
         angle = next((x for x in row[6:] if x not in (*_TRUE, *_FALSE, "", "Null")), "0")
         riders = [link for link in self.linkage.links.values() if pin in link.pins]
         places = {self.linkage.places[other] for link in riders for other in link.pins}
-        self.linkage.slot(title, pin, GROUND, *self.linkage.numbers(title, [angle]), stiff=len(places) == 1)
+        self.linkage.slot(title, pin, GROUND, self.linkage.numbers(title, [angle])[0], len(places) == 1)
 
     def force(self, title: str, row: list[str]) -> None:
         """A constant force from its start towards its end, or against that, in the frame or along its link."""
