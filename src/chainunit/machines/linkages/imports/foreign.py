@@ -14,7 +14,7 @@ from ....mechanism.assur import GROUND
 from ..checks import POINT_NAMES
 
 Place = tuple[float, float]
-_MOST = 300
+_MOST = 100
 """Most pins, and most links, of a linkage that is imported."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 

@@ -11,8 +11,6 @@ from .foreign import ForeignDriver, ForeignLinkage, ForeignSlot
 
 _MECHANISM = 16
 """Bit of the layer of a mechanism; what has no layer is on it."""
-_SPEED = "15"
-"""[rev/min], without a speed in the file"""
 
 
 def read(data: bytes, name: str) -> ForeignLinkage:
@@ -26,19 +24,19 @@ def read(data: bytes, name: str) -> ForeignLinkage:
     root = xml_of(data, name)
     if root.tag != "linkage2":
         raise InputError(f"{name}: begins with {shown(root.tag)}; a file of Linkage begins with <linkage2>")
-    return _Reader([node for node in root if _is_mechanism(node)]).linkage
+    return LinkageDrawing([node for node in root if _is_mechanism(node)])
 
 
-class _Reader:
-    """The reader of one file; connectors and links have names by their ids in it."""
+class LinkageDrawing(ForeignLinkage):
+    """The linkage of one file; connectors and links have `names` by their ids in it."""
 
     def __init__(self, nodes: list[Element]) -> None:
-        self.linkage = ForeignLinkage("Linkage", "mm")
+        super().__init__("Linkage", "mm")
         self.names: dict[str, dict[str, str]] = {"connector": {}, "Link": {}}
         connectors = [node for node in nodes if node.tag == "connector"]
         links = [node for node in nodes if node.tag in ("Link", "element")]
         for read, chosen in (
-            (self.connector, connectors), (self.link, links), (self.fasten, (*connectors, *links)),
+            (self.connector, connectors), (self.body, links), (self.fasten, (*connectors, *links)),
             (self.slide, connectors), (self.gears, [ratio for node in nodes for ratio in node.iterfind("ratio")]),
         ):  # fmt: skip
             for node in chosen:
@@ -47,35 +45,35 @@ class _Reader:
     def connector(self, title: str, node: Element) -> None:
         """A connector: a pin, which may be fixed, and may be the input."""
         if _id(node) in self.names["connector"]:
-            self.linkage.fault(title, "stands there twice; give each connector an id of its own")
+            self.fault(title, "stands there twice; give each connector an id of its own")
             return
-        place = self.linkage.numbers(title, [node.get("x", ""), node.get("y", "")])
-        pin = self.linkage.pin(f"C{_id(node)}", place, *[GROUND] * (node.get("anchor") == "true"))
+        place = self.numbers(title, [node.get("x", ""), node.get("y", "")])
+        pin = self.pin(f"C{_id(node)}", place, *[GROUND] * (node.get("anchor") == "true"))
         self.names["connector"][_id(node)] = pin
         if node.get("input") == "true":
-            self.linkage.drivers.append(ForeignDriver(title, (pin,)))
-            speed = abs(self.linkage.numbers(title, [node.get("rpm", _SPEED)])[0])
-            self.linkage.remarks.append(f"the drawing turns {pin} at {speed:g} rev/min; give --speed for it")
+            self.drivers.append(ForeignDriver(title, (pin,)))
+            speed = abs(self.numbers(title, [node.get("rpm", "15")])[0])
+            self.remarks.append(f"the drawing turns {pin} at {speed:g} rev/min; give --speed for it")
 
-    def link(self, title: str, node: Element) -> None:
+    def body(self, title: str, node: Element) -> None:
         """A link, or an actuator."""
         pins = self.pins(title, [end for end in node if end.tag in ("connector", "fastenconnector")])
         if node.get("actuator") != "true":
-            name = self.linkage.link(f"L{_id(node)}")
+            name = self.link(f"L{_id(node)}")
             self.names["Link"].setdefault(_id(node), name)
-            self.linkage.links[name].pins += pins
+            self.links[name].pins += pins
             return
-        (throw,) = self.linkage.numbers(title, [node.get("throw", "")])
+        (throw,) = self.numbers(title, [node.get("throw", "")])
         if len(pins) != 2 or throw <= 0.0:
-            self.linkage.fault(title, "is an actuator; it must have two connectors and a throw > 0")
+            self.fault(title, "is an actuator; it must have two connectors and a throw > 0")
         way = -throw if node.get("cpm", "").startswith("-") else throw
-        self.linkage.drivers.append(ForeignDriver(title, tuple(pins), throw=way))
+        self.drivers.append(ForeignDriver(title, tuple(pins), throw=way))
 
     def pins(self, title: str, ends: list[Element]) -> list[str]:
         """The pins of connectors; those that are missing are faults."""
         names = {_id(end): self.names["connector"].get(_id(end), "") for end in ends}
         for missing in (end for end, name in names.items() if not name):
-            self.linkage.fault(title, f"names connector {missing}, which is not in the file")
+            self.fault(title, f"names connector {missing}, which is not in the file")
         return [name for name in names.values() if name]
 
     def fasten(self, title: str, node: Element) -> None:
@@ -83,30 +81,30 @@ class _Reader:
         link = self.names["Link"].get(node.get("fastenlink") or node.get("fasten") or "")
         name = self.names[node.tag if node.tag == "connector" else "Link"].get(_id(node))
         if link and name and node.tag == "connector":
-            self.linkage.links[link].pins.append(name)
+            self.links[link].pins.append(name)
         elif link and name:
-            self.linkage.fastened.append((name, link))
+            self.fastened.append((name, link))
         elif node.get("fastenlink") or node.get("fasten") or node.get("fastenconnector"):
-            self.linkage.fault(title, "is fastened, but not to a link of the file; fasten it to one")
+            self.fault(title, "is fastened, but not to a link of the file; fasten it to one")
 
     def slide(self, title: str, node: Element) -> None:
         """A connector that slides between two others of one link."""
         line = self.pins(title, node.findall("slidelimit")[:2])
         if len(line) < 2 or node.get("slider") != "true":
             return
-        tracks = [name for name, link in self.linkage.links.items() if {*line} <= {*link.pins}]
-        if not tracks or self.linkage.numbers(title, [node.get("slideradius", "0")])[0] > 0.0:
+        tracks = [name for name, link in self.links.items() if {*line} <= {*link.pins}]
+        if not tracks or self.numbers(title, [node.get("slideradius", "0")])[0] > 0.0:
             wrong = "along an arc" if tracks else "between two connectors that share no link"
-            self.linkage.fault(title, f"slides {wrong}; only a straight slot of one link is carried over")
+            self.fault(title, f"slides {wrong}; only a straight slot of one link is carried over")
             return
         pin = self.names["connector"][_id(node)]
-        self.linkage.slots.append(ForeignSlot(title, pin, tracks[-1], (line[0], line[1])))
+        self.slots.append(ForeignSlot(title, pin, tracks[-1], (line[0], line[1])))
 
     def gears(self, _: str, node: Element) -> None:
         """Gears or a chain."""
         ends = " and ".join(f"Link {_id(end)}" for end in node)
         wheels = "gears" if node.get("type") == "gears" else "a chain"
-        self.linkage.fault(ends, f"are joined by {wheels}; only pins, slots and cylinders are carried over")
+        self.fault(ends, f"are joined by {wheels}; only pins, slots and cylinders are carried over")
 
 
 def _is_mechanism(node: Element) -> bool:

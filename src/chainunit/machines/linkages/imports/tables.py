@@ -51,11 +51,13 @@ class _Tables:
         self.poses: dict[str, list[float]] = {}
         self.body = {name: name for name in linkage.links}
         stiff = {slot.pin for slot in linkage.slots if slot.stiff}
-        pairs = [*linkage.fastened, *self.pairs(1, stiff)]
-        while pairs := [*pairs, *self.pairs(2, {*self.places})]:
-            first, second = sorted((self.body[name] for name in pairs.pop()), key=[*self.body].index)
-            self.body = {name: first if body == second else body for name, body in self.body.items()}
-            pairs = [(a, b) for a, b in pairs if self.body[a] != self.body[b]]
+        pairs = [*linkage.fastened, *self.pairs(1, stiff), *self.pairs(2, {*self.places})]
+        while pairs:
+            for pair in pairs:
+                ends = {self.body[name] for name in pair}
+                first = next(name for name in self.body if name in ends)
+                self.body = {name: first if body in ends else body for name, body in self.body.items()}
+            pairs = [*self.pairs(2, {*self.places})]
         # a link with one pin alone moves nothing
         self.pins = {
             body: pins
