@@ -283,7 +283,9 @@ def xml_of(data: bytes, name: str) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(data, ElementTree.XMLParser(target=_TreeWithoutType()))
     except _HasTypeError:
-        raise InputError(f"{name}: has a document type, which no file of an FMU has; take it out") from None
+        raise InputError(
+            f"{name}: has a document type, by which a text may grow without end; take it out"
+        ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{name}: is no XML that can be read ({printable(str(error))})") from error
 

@@ -41,15 +41,22 @@ class LinkageQuestion(NamedTuple):
     file: str
     unusual: tuple[UnusualValue, ...] = ()
     """values of the file that are of an unusual size"""
+    remarks: tuple[str, ...] = ()
+    """sentences on a linkage from a drawing of another program"""
 
 
 def linkage_report(
-    findings: LinkageFindings, source: str, unusual: tuple[UnusualValue, ...] = ()
+    findings: LinkageFindings,
+    source: str,
+    unusual: tuple[UnusualValue, ...] = (),
+    remarks: tuple[str, ...] = (),
 ) -> b.Report:
-    """The report on a linkage from the file `source`, which has these values of an unusual size."""
+    """The report on a linkage from the file `source`, which has these values of an unusual size, and on which there
+    are `remarks`."""
     slips = [str(value) for value in slips_of(unusual)]
     notes = [value.sentence for value in unusual if value.with_unit]
-    result = _result(findings, source) | {"slips": slips, "notes": notes}
+    drawn = [f"{capital(remark)}." for remark in remarks]
+    result = _result(findings, source) | {"slips": slips, "notes": notes, "drawn": drawn}
     s = b.Source(result)
     return b.Report(
         result["title"],
@@ -145,6 +152,7 @@ def _over_the_way(f: LinkageFindings) -> dict[str, Any]:
 
 def _opening(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     yield b.Text(s.line("The driver gives one degree of freedom: {groups_in_words}."), central=True)
+    yield from (b.Text(s.words(f"drawn.{i}"), central=True) for i in range(len(s.result["drawn"])))
     if slips := s.result["slips"]:
         items = tuple(s.words(f"slips.{i}") for i in range(len(slips)))
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
@@ -395,12 +403,14 @@ def _variables(f: LinkageFindings) -> Iterator[b.Block]:
             yield b.Given(((title, sections),))
 
 
-TASK: Task[LinkageQuestion, tuple[LinkageFindings, str, tuple[UnusualValue, ...]]] = Task(
+LinkageOutcome = tuple[LinkageFindings, str, tuple[UnusualValue, ...], tuple[str, ...]]
+TASK: Task[LinkageQuestion, LinkageOutcome] = Task(
     "linkage",
     lambda question, folder, progress: (
         linkage_findings(question.machine, question.speed),
         question.file,
         question.unusual,
+        question.remarks,
     ),
     lambda outcome: linkage_report(*outcome),
     files=PICTURES,

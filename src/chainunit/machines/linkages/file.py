@@ -84,20 +84,32 @@ def linkage_in(file: Path) -> tuple[InverseMachine, tuple[UnusualValue, ...]]:
     """
     text = file_text(file, TOML)
     with in_file(str(file), lambda: toml_lines.lines_of(text)):
-        reader = _LinkageReader(toml(text), file.stem, file.parent)
-        try:
-            description = reader.description()
-            # the fault of a group belongs to its first link
-            with each_refusal(
-                lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")
-            ):
-                machine = machine_of(description)
-                check_start(machine.described_by)  # type: ignore[attr-defined]
-            return machine, tuple(reader.unusual)
-        except InputError as error:
-            # if lengths do not fit together, one may be a slip of the unit
-            slips = [InputError(str(value), value.name) for value in reader.unusual if value.meant]
-            raise InputError.joined([*error.faults, *slips]) from error
+        return linkage_from(toml(text), file.stem, file.parent)
+
+
+def linkage_from(
+    data: Mapping[str, Any], name: str, folder: Path = Path()
+) -> tuple[InverseMachine, tuple[UnusualValue, ...]]:
+    """The model of the machine in the tables of a file in a `folder`, and the values that are of an unusual size;
+    `name` is the name of a machine to which the file gives none.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault, which names the key.
+    """
+    reader = _LinkageReader(data, name, folder)
+    try:
+        description = reader.description()
+        # the fault of a group belongs to its first link
+        with each_refusal(lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")):
+            machine = machine_of(description)
+            check_start(machine.described_by)  # type: ignore[attr-defined]
+        return machine, tuple(reader.unusual)
+    except InputError as error:
+        # if lengths do not fit together, one may be a slip of the unit
+        slips = [InputError(str(value), value.name) for value in reader.unusual if value.meant]
+        raise InputError.joined([*error.faults, *slips]) from error
 
 
 def description_of(data: Mapping[str, Any], name: str, folder: Path = Path()) -> dict[str, Any]:
