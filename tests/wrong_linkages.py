@@ -234,10 +234,10 @@ CHANGES = [
     (added('[joints.mesh]\ntype = "belt"\non = "ram.C"\nby = "crank.A"'),
      [(36, "joints.mesh.type", "a belt or a cam between links is not possible yet")]),
     (added('[joints.A]\non = "rod.A"\nby = "crank.A"\nfriction = 0.2\ndiameter = "30 mm"'),
-     [(38, "joints.A.friction", "is not possible for one joint yet; give it in [pins]"),
-      (39, "joints.A.diameter", "is not possible for one joint yet; give it in [pins]")]),
+     [(38, "joints.A.friction", "stands in [pins.A], or for all in [pins]"),
+      (39, "joints.A.diameter", "stands in [pins.A], or for all in [pins]")]),
     ([('toward = "G2"', 'toward = "G2"\nfriction = 0.2')],
-     [(32, "joints.guide.friction", "is not possible for one joint yet; give it in [guides]")]),
+     [(32, "joints.guide.friction", "stands in [guides.guide], or for all in [guides]")]),
     # degrees of freedom and assembly
     ([("A = [0, 0], C", "Q = [0, 0], C")], [(21, "links.rod", "rod has one joint; add a joint")]),
     ([(GUIDE, "")], [(24, "links.ram", "too many degrees of freedom: 3")]),

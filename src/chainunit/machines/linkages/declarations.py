@@ -8,6 +8,7 @@ from typing import Any
 
 from ...core.ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
 from ...core.quantities import Layout, Value, declaration, declared_class, fields_of, group, quantity
+from ...mechanism.assur import PRISMATIC, REVOLUTE
 from ...mechanism.driver_ports import AddedInertia
 from ...mechanism.models import names_of
 from ..parts import Force, GuideLaw, Pin
@@ -118,6 +119,21 @@ class WayRunning(Energies):
     """Outputs of every machine whose driver slides."""
 
     tau: Value = quantity("N", "force needed at the driver, J a + tau_bias", nominal=1000.0)
+
+
+LOSSES: Mapping[str, tuple[str, type]] = {"pins": (REVOLUTE, PinLaw), "guides": (PRISMATIC, GuideLaw)}
+"""By table, the kind of the joints and the declaration of their losses."""
+
+
+def with_differing(common: type, table: str, laws: Mapping[str, Mapping[str, float]]) -> tuple[str, Any, Any]:
+    """The field of the losses in a `table` of the common parameters, with the `laws` of joints that differ."""
+    declared, shared = LOSSES[table][1], getattr(common(), table)
+    fields = [
+        (name, declared, group(declared, f"{table.removesuffix('s')} {name}", default=declared(**values)))
+        for name, values in laws.items()
+    ]
+    differing: Any = declared_class(f"{declared.__name__}s", (declared,), fields)
+    return table, differing, group(differing, table, default=differing(**Layout(declared).by_name(shared)))
 
 
 def common_parameters(linear: bool, guides: bool, starts: Mapping[str, float]) -> type:

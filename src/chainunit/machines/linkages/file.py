@@ -145,6 +145,7 @@ class _LinkageReader(LoadReader):
         driver, span = self.driver(joints)
         loads = [self.load(name) for name in self.table("loads")]
         common, groups, about = self.common(), self.groups(), self.about()
+        losses = self.differing(joints, common)
         self.fault_unused(parameters, inputs, tables)
         names = {
             "parameters": [*(entry["name"] for entry in parameters), *self.derived],
@@ -184,7 +185,8 @@ class _LinkageReader(LoadReader):
             "groups": groups,
             "start": start,
         }
-        return described | ({"derived": [*self.derived.items()]} if self.derived else {})
+        more = {"derived": [*self.derived.items()], "losses": losses}
+        return described | {key: entries for key, entries in more.items() if entries}
 
     def fault_drivers(self) -> None:
         """Fault a list of drivers; the reader goes on with the first one."""
@@ -313,7 +315,7 @@ class _LinkageReader(LoadReader):
         for loss in {*loss_keys} & {*table}:
             self.fault(
                 f"{key}.{loss}",
-                f"is not possible for one joint yet; give it in [{loss_table}], for all of them",
+                f"stands in [{loss_table}.{name}], or for all in [{loss_table}]",
             )
         self.keys(key, {entry_key: x for entry_key, x in table.items() if entry_key not in loss_keys}, KEYS)
         ends = []

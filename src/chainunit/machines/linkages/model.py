@@ -34,7 +34,7 @@ from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, words_on_motion
 from .closing import LEAST_MARGIN
-from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
+from .declarations import LinkageMotion, LinkBody, common_parameters, field_of, with_differing
 from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
 from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
@@ -151,6 +151,7 @@ class LinkageDescription(LinkageOutputs):
                 fields.append((name, LinkBody, group(LinkBody, title, default=LinkBody(**quantities))))
         guides = any(j.kind == PRISMATIC for j in self.structure.joints.values())
         common = common_parameters(self.way.linear, guides, self.data["common"])
+        fields += [with_differing(common, table, laws) for table, laws in self.data.get("losses", {}).items()]
         if self.way.swings:
             ratio = self._ratio
             fields.append(("ratio", Value, quantity("1", _FIXED_RATIO, default=ratio, min=ratio, max=ratio)))
@@ -198,14 +199,18 @@ class LinkageDescription(LinkageOutputs):
         loads: dict[str, Any] = {"weight": Weight(p.g)}
         for load in self.data["loads"]:
             loads[name_of_load(load)] = self._load(load, parts)
-        loads["pins"] = PinLosses(p.pins, p.pins.damping)
+        laws = {
+            table: {parts.receivers[name][0]: getattr(getattr(p, table), name) for name in named}
+            for table, named in self.data.get("losses", {}).items()
+        }
+        loads["pins"] = PinLosses(p.pins, p.pins.damping, laws.get("pins", {}))
         if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
                 parts.receivers[joint["name"]][0]: parts.geometry.number(joint["length"])
                 for joint in self.data["joints"]
                 if "length" in joint
             }
-            loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths)
+            loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths, laws.get("guides", {}))
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)
         return DescribedLinkage(
             parts.ground, parts.driver, tuple(parts.groups), loads, parts, extremes=extremes

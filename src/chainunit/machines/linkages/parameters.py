@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -13,12 +13,18 @@ from typing import Any
 from ...core import units
 from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
-from ...core.quantities import Layout
+from ...core.quantities import Layout, Variable
 from ...mechanism.expressions import CONSTANTS, WORDS, expression
-from .declarations import CommonParameters
+from .declarations import LOSSES, CommonParameters
 from .entries import EntryReader
 from .loads import MOTION
 from .names import words_in
+
+PLAIN, ROLLING = "plain", "rolling"
+"""Kinds of bearings in a pin."""
+ROLLING_FRICTION = 0.0015
+"""Usual coefficient of friction of a rolling bearing, on half of its mean diameter (makers' catalogues: 0.0010 to
+0.0024)."""
 
 
 class ParameterReader(EntryReader):
@@ -30,19 +36,69 @@ class ParameterReader(EntryReader):
         variables = Layout(CommonParameters).variables
         for table in ("pins", "guides"):
             names = [v.name.removeprefix(f"{table}.") for v in variables if v.name.startswith(f"{table}.")]
-            self.keys(table, self.table(table), names)
+            shared = {key: x for key, x in self.table(table).items() if not isinstance(x, Mapping)}
+            self.keys(table, shared, names)
         for variable in variables:
-            key, quantity = "gravity" if variable.name == "g" else variable.name, variable.quantity
+            key = "gravity" if variable.name == "g" else variable.name
             table, _, name = key.rpartition(".")
             value = (self.table(table) if table else self.data).get(name)
-            if value is not None:
+            if value is not None and not isinstance(value, Mapping):
                 with self.at(key):
-                    x = self.number("", value, quantity.unit)
-                    if not quantity.admits(x):
-                        raise InputError(f"is {shown(value)}; must be {quantity.allowed_range}")
-                    self.doubt(replace(variable, name=key), value, x)
-                    common[variable.name] = quantity.within_bounds(x)
+                    common[variable.name] = self.admitted(replace(variable, name=key), value)
         return common
+
+    def admitted(self, variable: Variable, value: Any) -> float:
+        """The number of a value of the file for a declared quantity, within its bounds.
+
+        Raises
+        ------
+        InputError
+            for a value that is no number of its unit, or out of its bounds.
+        """
+        quantity = variable.quantity
+        x = self.number("", value, quantity.unit)
+        if not quantity.admits(x):
+            raise InputError(f"is {shown(value)}; must be {quantity.allowed_range}")
+        self.doubt(variable, value, x)
+        return float(quantity.within_bounds(x))
+
+    def differing(
+        self, joints: Sequence[Mapping[str, Any]], common: Mapping[str, float]
+    ) -> dict[str, dict[str, dict[str, float]]]:
+        """By table ("pins", "guides") and joint, the start values of the losses of joints that differ from the
+        others, which have the `common` ones."""
+        laws: dict[str, dict[str, dict[str, float]]] = {}
+        for table, (kind, declared) in LOSSES.items():
+            usual = Layout(declared).by_name(getattr(CommonParameters(), table))
+            shared = {name: common.get(f"{table}.{name}", value) for name, value in usual.items()}
+            named = [joint["name"] for joint in joints if joint["type"] == kind]
+            for name, entry in self.table(table).items():
+                if not isinstance(entry, Mapping):
+                    continue
+                key = f"{table}.{name}"
+                if name not in named:
+                    possible = f"its {table} are {', '.join(named)}" if named else f"it has no {table}"
+                    self.fault(key, f"is no {table.removesuffix('s')} of this linkage; {possible}")
+                    continue
+                if name in shared:
+                    self.fault(key, f"has the name of a key of [{table}]; give the joint another name")
+                    continue
+                self.keys(key, entry, (*shared, "kind") if table == "pins" else (*shared,))
+                values = shared | self.bearing(key, entry)
+                for variable in Layout(declared).variables:
+                    if (value := entry.get(variable.name)) is not None:
+                        with self.at(f"{key}.{variable.name}"):
+                            full = replace(variable, name=f"{key}.{variable.name}")
+                            values[variable.name] = self.admitted(full, value)
+                laws.setdefault(table, {})[name] = values
+        return laws
+
+    def bearing(self, key: str, entry: Mapping[str, Any]) -> dict[str, float]:
+        """The usual friction of the `kind` of bearing that an entry names."""
+        kind = entry.get("kind", PLAIN)
+        if kind not in (PLAIN, ROLLING):
+            self.fault(f"{key}.kind", f"is {shown(kind)}; must be {PLAIN} or {ROLLING}")
+        return {"friction": ROLLING_FRICTION} if kind == ROLLING else {}
 
     def about(self) -> dict[str, str]:
         """Who made the machine, as its FMUs say it."""
