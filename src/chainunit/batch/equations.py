@@ -12,7 +12,7 @@ from ..core.errors import InputError, near_name
 from ..core.model import Model
 from ..core.printing.operations import Operations
 from ..core.quantities import Variable, quotient
-from ..core.symbolic_trace import trace
+from ..core.symbolic_trace import chosen_columns, trace
 
 
 @dataclass(frozen=True)
@@ -97,35 +97,27 @@ def equations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> Eq
     """
     import casadi
 
-    t, arguments, declared = trace(model), arguments_of(model), columns_of(model)
-    places = find(outputs, names_of(declared), "output")
+    t, arguments = trace(model), arguments_of(model)
+    variables = chosen_columns(t, outputs)
     columns = find(by, names_of(arguments), "parameter, input or state")
     p, u, x, _ = t.symbols
-    traced = [value for _, value in t.columns.values()]
-    rows = casadi.vertcat(*(casadi.SX(traced[place]) for place in places), casadi.SX(0, 1))
+    rows = casadi.vertcat(*(casadi.SX(t.columns[name][1]) for name in outputs), casadi.SX(0, 1))
     rows, codes = t.explicit([rows, _first_unmet(list(model.requirements(casadi_(), t.p)))])
     point = casadi.vertcat(p, u, x)
-    slopes = [casadi.jtimes(rows, point, _unit_vector(point.numel(), column)) for column in columns]
-    results = [Result(v.name, v.unit, v.description) for v in (declared[place] for place in places)]
+    unit_vectors = casadi.SX(casadi.DM.eye(point.numel()))
+    slopes = [casadi.jtimes(rows, point, unit_vectors[:, column]) for column in columns]
+    results = [Result(v.name, v.unit, v.description) for v in variables]
     results += [
         Result(
-            f"d({declared[place].name})/d({arguments[column].name})",
-            quotient(declared[place].unit, arguments[column].unit),
-            f"derivative of {declared[place].description} by {arguments[column].description}",
+            f"d({v.name})/d({argument.name})",
+            quotient(v.unit, argument.unit),
+            f"derivative of {v.description} by {argument.description}",
         )
-        for column in columns
-        for place in places
+        for argument in (arguments[column] for column in columns)
+        for v in variables
     ]
     operations = Operations([p, u, x], [casadi.vertcat(rows, *slopes), codes])
     return Equations(model, arguments, tuple(results), operations)
-
-
-def _unit_vector(size: int, place: int) -> Any:
-    import casadi
-
-    vector = casadi.DM.zeros(size, 1)
-    vector[place] = 1.0
-    return casadi.SX(vector)
 
 
 def _first_unmet(limits: Sequence[tuple[Any, Any, Any]]) -> Any:

@@ -29,6 +29,7 @@ from ..core.errors import InputError, RunError
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS, Compiler, compiler
 from ..core.printing.c_forms import STEP, c_file, constant
+from ..core.printing.kernels import STEP_NUMBERS
 from ..core.printing.operations import Operations
 from ..core.printing.vector_code import VectorCode, header
 from ..core.symbolic_trace import outputs_of, trace
@@ -36,11 +37,6 @@ from .equations import arguments_of, find, names_of
 from .native import load, threads
 from .python_loop import PythonLoop
 
-_NUMBERS = (
-    "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR "
-    "DENSE"
-).split()
-"""The numbers of `chainunit.core.integrators` that the loops need."""
 _LANES = 8
 """The number of runs is filled up to a multiple of it, a multiple of the lanes of every vector."""
 
@@ -327,8 +323,7 @@ def _compiled(
         "PUT": " ".join(put),
         "GUARDED": " ".join(guards),
     }
-    constants = {name: value for name, value in vars(integrators).items() if name in _NUMBERS}
-    constants["NOMINAL"] = tuple(v.quantity.nominal or 1.0 for v in states)
+    constants = STEP_NUMBERS | {"NOMINAL": tuple(v.quantity.nominal or 1.0 for v in states)}
     source = "\n".join(
         [
             header(),

@@ -33,14 +33,13 @@ from importlib.resources import files
 from itertools import chain, count
 from typing import Any
 
-from .. import integrators
 from ..engines import casadi_
 from ..errors import InputError
 from ..model import Model
 from ..symbolic_trace import chosen_columns, outputs_of, trace
 from .division import Division
-from .elementary import OWN, recording
-from .kernels import ModelFunction, kernels
+from .elementary import OWN, is_pair, recording
+from .kernels import STEP_NUMBERS, ModelFunction, kernels
 from .operations import ARGUMENT, NUMBER, Operation, Operations
 from .recorder import CHOOSE, EXPONENT, MANTISSA, POWER2
 
@@ -63,11 +62,6 @@ _FORMS |= _CONDITIONS | {
 """Each operation in JavaScript: ``{0}`` is its first operand, and ``{c[0]}`` that as a condition."""
 _RESULTS = {"values": "y", "derivatives": "rates", "derive": "k", "guess": "z", "initial": "x"}
 """The arrays of the results of functions, by name; those of all others have the name of the function and ``_``."""
-_NUMBERS = (
-    "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR "
-    "DENSE"
-).split()
-"""The numbers of `chainunit.core.integrators` that the steps need."""
 _HEAD = """\
 const f8 = new Float64Array(1), i4 = new Int32Array(f8.buffer), u4 = new Uint32Array(f8.buffer);
 const second = new Float64Array(1); // the second result of a function
@@ -86,8 +80,7 @@ const copysign = (a, b) => ((f8[0] = b), i4[1] < 0 ? -Math.abs(a) : Math.abs(a))
 def program(models: Mapping[str, str]) -> str:
     """The expression whose value has these models, each printed by `model_text`, by name."""
     rows = ",\n".join(f"{json.dumps(name)}: stepped({text})" for name, text in models.items())
-    constants = {name: value for name, value in vars(integrators).items() if name in _NUMBERS}
-    numbers = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in constants.items())
+    numbers = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in STEP_NUMBERS.items())
     steps = (files(__package__) / "steps.js").read_text("utf-8")
     return f'(() => {{\n"use strict";\n{_HEAD}{_elementary()}{numbers}{steps}return {{\n{rows}\n}};\n}})()'
 
@@ -228,7 +221,7 @@ def _statements(
             *values, c=[truths.get(k, f"({x}!==0)") for k, x in zip(operands, values, strict=True)]
         )
         stored = f"{kept[place]}=" if place in kept else ""
-        if _is_pair(kind):
+        if is_pair(kind):
             first = pairs.setdefault((text, operands), place)
             if first == place:
                 lines += [f"$s{place}={text}", f"$c{place}=second[0]"]
@@ -303,11 +296,6 @@ def _form(kind: str) -> str:
             "exp(y*log(x)), the others follow from sin, cos, asin, acos, atan2, exp and log"
         )
     return _FORMS[kind]
-
-
-def _is_pair(kind: str) -> bool:
-    """Whether the function that computes operations of this kind has two results, as sine and cosine."""
-    return kind in OWN and len(recording(kind).results) > 1
 
 
 def _elementary() -> str:

@@ -9,9 +9,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from .. import integrators
 from ..engines import casadi_
 from ..model import Model
 from ..symbolic_trace import Trace
+
+STEP_NUMBERS = {
+    name: getattr(integrators, name)
+    for name in (
+        "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH "
+        "NO_ERROR DENSE"
+    ).split()
+}
+"""The numbers of `chainunit.core.integrators` that a printed loop of steps needs, by name."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,15 +31,11 @@ def kernels(interface: Interface) -> tuple[str, int]:
 
 @lru_cache(maxsize=16)
 def _kernels(model: Model) -> tuple[str, int]:
-    programs = list(_programs(shared_interface(model)))
+    shared = shared_interface(model)
+    programs = [Program(function) for function in kernels_of(shared.trace, shared.derived)]
     table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
     text = "\n".join([_BEFORE_KERNELS, *(program.text for program in programs), _TABLE, *table, "};", ""])
     return text, max(program.room for program in programs)
-
-
-def _programs(interface: Interface) -> Iterator[Program]:
-    for kernel in kernels_of(interface.trace, interface.derived):
-        yield Program(kernel.name, kernel.arguments, kernel.groups, kernel.offsets, kernel.frequency)
 
 
 _BEFORE_KERNELS = """\
