@@ -21,7 +21,7 @@ def may_be_share(variable: Variable) -> bool:
 
 
 def kind_words(variable: Variable) -> str:
-    """Words on what a value of a file has to be: ``a number in m, or a text such as "2 mm" (crank O1-A)``."""
+    """The allowed form of a value of a file: ``a number in m, or a text such as "2 mm" (crank O1-A)``."""
     fitting = units.fitting(variable.unit, variable.kind)
     if variable.type != "Real":
         return f"{variable.quantity.allowed_range} ({variable.description})"
@@ -51,9 +51,9 @@ def number_of_text(variable: Variable, text: str) -> float:
         pass
     is_pure = variable.type != "Real" or (variable.unit == "1" and not may_be_share(variable))
     hint = "" if is_pure else units.spelling(text, variable.unit, variable.kind)
-    other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
-    other = f"; {printable(other)}" if other else ""
-    raise ValueError(f"{variable.name} = {shown(text)}: must be {kind_words(variable)}{other}{hint}")
+    kind = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
+    kind = f"; {printable(kind)}" if kind else ""
+    raise ValueError(f"{variable.name} = {shown(text)}: must be {kind_words(variable)}{kind}{hint}")
 
 
 def magnitude_and_unit(value: Any) -> tuple[Any, str] | None:
@@ -68,17 +68,9 @@ def magnitude_and_unit(value: Any) -> tuple[Any, str] | None:
         return None
     for quantity in (value, value.to_base_units()):
         unit = f"{quantity.units:~C}" or "1"
-        if _is_unit(unit):
+        if units.is_unit(unit):
             return quantity.magnitude, unit
     return value.magnitude, f"{value.units:~C}"
-
-
-def _is_unit(unit: str) -> bool:
-    try:
-        units.dimension(unit)
-    except ValueError:
-        return False
-    return True
 
 
 def has_own_unit(value: Any) -> bool:
@@ -138,7 +130,7 @@ def in_declared_unit(variable: Variable, value: Any) -> Any:
 
 
 def _read(variable: Variable, text: str) -> float:
-    """The number of a text; see `number_of_text`, whose error it raises as an InputError."""
+    """See `number_of_text`; its error is an InputError."""
     try:
         return number_of_text(variable, text)
     except ValueError as error:
@@ -160,5 +152,5 @@ def one_number(variable: Variable, value: Any) -> float:
 
 
 def number_in(unit: str, name: str, value: Any, description: str) -> float:
-    """One number in the `unit`, of an argument that no model declares; errors are those of `one_number`."""
+    """One number in the `unit`, of an argument that no model declares; see `one_number` for its errors."""
     return one_number(Variable(name, description, Quantity(unit, description)), value)

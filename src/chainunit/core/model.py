@@ -238,7 +238,7 @@ class Model:
                 _let_pickle(self, name)
 
     def follow(self, **values: Any) -> None:
-        """Set those of these attributes that are not stated."""
+        """Set the attributes that are not stated."""
         followed = vars(self).setdefault("_followed", set())
         for name, value in values.items():
             if getattr(self, name) is UNSTATED:
@@ -375,7 +375,7 @@ def _model_in(module: str, name: str) -> Any:
 
 
 def _let_pickle(model: Model, name: str) -> None:
-    """Let pickle take the instances of a declaration of a model that is `made`, if no module has its class by name."""
+    """Let pickle take the instances of a declaration of a `made` model whose class no module has by its name."""
     declared = getattr(model, name, None)
     if declared is None or _has_name(declared):
         return

@@ -5,7 +5,7 @@ scalar) or `group` (a nested dataclass, whose fields have a prefix: ``crank.m``)
 Everything else - modelDescription.xml, config validation, tables, netCDF attributes - is
 generated from these declarations.
 
-Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer behind a name is its power:
+Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer after a name is its power:
 ``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number. Several factors in the denominator stand in brackets:
 ``Hz/(N.m)``.
 """
@@ -117,7 +117,7 @@ def base_units(unit: str) -> dict[str, int]:
 
 
 def quotient(unit: str, by: str) -> str:
-    """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``; that of an energy by the time is ``W``."""
+    """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``, an energy by the time -> ``W``."""
     if (unit, by) == ("J", "s"):
         return "W"
     powers: dict[str, int] = {}
@@ -241,7 +241,7 @@ class Quantity(Described):
         return bounds.admits(x, self.low, self.high, self.slack, self.open_low, self.type != "Real")
 
     def within_bounds(self, x: float) -> float:
-        """The admitted number `x`, set to the bound where it is beyond it by rounding."""
+        """The admitted number `x`; the bound in place of a number that is beyond it by rounding."""
         return bounds.within(x, self.low, self.high)
 
 
@@ -315,40 +315,37 @@ Fields = Sequence[tuple[str, Any, Any]]
 
 
 def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
-    """A declaration with these fields and those of `bases`."""
+    """A declaration with these fields and the fields of `bases`."""
     return briefly_shown(dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True))
 
 
 def fields_of(declared: type, *, without: Sequence[str] = ()) -> Fields:
     """The fields of a declaration except those in `without`, to build another one from."""
-    return [
-        (f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata))
-        for f in dataclasses.fields(declared)
-        if f.name not in without
-    ]
+    return [_copied(f) for f in dataclasses.fields(declared) if f.name not in without]
+
+
+def _copied(f: dataclasses.Field[Any]) -> tuple[str, Any, Any]:
+    """A field for another declaration: a dataclass changes the fields that it is made of."""
+    return f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata)
 
 
 def pruned(declared: type, leave_out: Container[str], prefix: str = "") -> type | None:
     """The declaration without the quantities whose full names, after `prefix`, are in `leave_out`: `declared` itself
-    where nothing is left out, None where nothing is left."""
+    if it has none of them, None if it has no others."""
+    left = [prefix + v.name not in leave_out for v in variables(declared)]
+    if all(left) or not any(left):
+        return declared if any(left) else None
     fields = []
     for f in dataclasses.fields(declared):
         name = prefix + f.name
         if "quantity" in f.metadata:
             if name not in leave_out:
-                fields.append((f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata)))
-            continue
-        inner = pruned(f.metadata["of"], leave_out, f"{name}.")
-        if inner is not None:
+                fields.append(_copied(f))
+        elif (inner := pruned(f.metadata["of"], leave_out, f"{name}.")) is not None:
             default = f.metadata["default"]
-            if default is not None and inner is not f.metadata["of"]:
-                default = narrowed(default, inner)
+            default = None if default is None else narrowed(default, inner)
             fields.append((f.name, inner, group(inner, f.metadata["group"], default=default)))
-    if not fields:
-        return None
-    layout = {v.name for v in variables(declared)}
-    there = any(prefix + name in leave_out for name in layout)
-    return declared_class(declared.__name__, (), fields) if there else declared
+    return declared_class(declared.__name__, (), fields)
 
 
 def narrowed(instance: Any, to: type) -> Any:
@@ -448,8 +445,7 @@ class Layout:
         return _build(self._plan, values)
 
     def from_names(self, values: dict[str, Any], default: Any = None) -> Any:
-        """The instance with these `values` by name; the other values are those of `default`, or else the
-        start values.
+        """The instance with these `values` by name; the other values come from `default`, or are the start values.
 
         Raises
         ------
