@@ -29,7 +29,7 @@ class Equations:
     """What a batch computes.
 
     `arguments` are the parameters, inputs and states of the model in declared order. `operations` has two groups of
-    results: the `results`, and one number, which is 0 where all requirements of the model are met, and else the
+    results: the `results`, and one number, which is 0 if all requirements of the model are met, and else the
     place of the first that is not, from 1.
     """
 

@@ -40,7 +40,7 @@ _LEAST_INNER = 64
 
 
 class ReasonKind(Enum):
-    """Why a state has no result, with its text; the first is that of a state with a result."""
+    """Why a state has no result, with its text; ``NONE`` is for a state with a result."""
 
     NONE = "valid"
     REQUIREMENT = "{subject}: {words}"
@@ -61,7 +61,7 @@ class StateReason:
 
 
 def reasons_of(model: Model) -> list[StateReason]:
-    """The reasons of a model by their codes; those of values outside their bounds follow them."""
+    """The reasons of a model by their codes. The reasons for values outside their bounds follow them."""
     return [
         StateReason(ReasonKind.NONE),
         *(
@@ -105,7 +105,7 @@ def evaluate(
     parameters : an instance of `model.Parameters` with the values of all other parameters
     engine : "native" (compiled C, SIMD, threads), "numpy", or "cuda" (a GPU of NVIDIA, by CuPy); without a C compiler
         "native" is numpy, with a warning
-    workers : number of threads of the native engine; by default that of the processors
+    workers : number of threads of the native engine; by default one for each processor
     out : the result of an earlier call with the same outputs and dimensions. Its memory takes the new results, and
         its own values are gone; new memory takes as long as the computation.
     on_host : whether results of "cuda" are copied to the host, as arrays of numpy. Without it they stay on the
@@ -209,7 +209,7 @@ class ResultRows:
 
     @property
     def dims(self) -> list[str]:
-        """Its dimensions before those of the states."""
+        """Its dimensions before the dimensions of the states."""
         return [] if self.bins is None else [self.result.name.replace("histogram(", "bin(", 1)]
 
 
@@ -312,7 +312,7 @@ class Grid:
         return self._shaped(x.copy(data=inside))
 
     def _shaped(self, x: xr.DataArray) -> Any:
-        """The values over the outer and the inner dimensions, each flat, or of length 1 where they do not vary."""
+        """The values, shape (1 or outer, 1 or inner): 1 for dimensions along which they do not vary."""
         dims = set(map(str, x.dims))
         sides = [side if dims & set(side) else [] for side in (self._outer, self._inner)]
         order = [d for side in sides for d in side]
@@ -321,12 +321,12 @@ class Grid:
         return namespace(full.data).ascontiguousarray(full.data, float).reshape(shape)
 
     def memory(self, earlier: xr.Dataset | None) -> Memory:
-        """New memory for the results, or that of an `earlier` result.
+        """New memory for the results, or the memory of an `earlier` result.
 
         Raises
         ------
         InputError
-            where the earlier result has no memory for these results.
+            if the earlier result has no memory for these results.
         """
         shape = self.size[:1] if self._reduced else self.size
         columns = self._columns
@@ -408,7 +408,7 @@ class Grid:
         return dict(zip(entries, self._arguments, strict=True))
 
     def _kernel(self, entries: Mapping[tuple[int, int], Any]) -> Any:
-        """The compiled loop of the engine; None where numpy computes."""
+        """The compiled loop of the engine; None if numpy computes."""
         if self._engine == "numpy":
             return None
         varying = tuple(entry for entry, x in entries.items() if x.shape[1] > 1)
@@ -466,7 +466,7 @@ class Grid:
         return [reduced_column(results[column.place], request) for column, request in self._reduced]
 
     def dataset(self, memory: Memory, on_host: bool) -> xr.Dataset:
-        """The results with names, units and coordinates; those of a GPU as arrays of the device, or `on_host`."""
+        """The results with names, units and coordinates; of a GPU as arrays of the device, unless `on_host`."""
         import xarray as xr
 
         dims, take = self._dims, host if on_host else (lambda x: x)

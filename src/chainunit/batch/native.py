@@ -94,7 +94,7 @@ class NativeKernel:
             the parts
         reason : array to be filled, of the same shape
         size : (outer, inner)
-        numbers : those of the reductions, see `flat_numbers`
+        numbers : see `chainunit.batch.reductions.flat_numbers`
         workers : number of threads
         """
         outer, inner = size
@@ -150,7 +150,7 @@ def _pointers(arrays: Any) -> Any:
 
 
 def _pieces(outer: int, inner: int, workers: int, divide: bool) -> list[tuple[int, int, int, int]]:
-    """Ranges of both dimensions; the inner one is divided only where there are too few outer ones."""
+    """Ranges of both dimensions; the inner one is divided only if there are too few outer ones."""
     count = 1 if workers == 1 else _PIECES * workers
     if outer >= count or not divide:
         cuts = [outer * k // count for k in range(count + 1)]
@@ -165,7 +165,7 @@ def load(source: str, compiler: Compiler, files: Mapping[str, str] | None = None
     Raises
     ------
     RunError
-        where the compiler fails.
+        if the compiler fails.
     """
     native = flags_for_this_processor(compiler)
     arguments = (*native.flags, "batch.c", "-o", "batch.so", *native.libraries)
@@ -186,7 +186,7 @@ def native_kernel(
     Raises
     ------
     RunError
-        where the compiler fails.
+        if the compiler fails.
     """
     local_compiler = compiler()
     return None if local_compiler is None else NativeKernel(equations, varying, reductions, local_compiler)

@@ -22,7 +22,7 @@ class PythonLoop:
     ----------
     model, outputs, varying, driven, guarded : see `chainunit.batch.transients.Transients`
     symbols, groups : the vectors of parameters, inputs and states; the derivatives of the states, the kept rows, and
-        the states that meet the constraints, none where the integrator has equal steps
+        the states that meet the constraints, none if the integrator has equal steps
 
     Raises
     ------
@@ -77,7 +77,7 @@ class PythonLoop:
             `chainunit.batch.transients.Transients.run`, the runs last
         x : states at the begin, shape (states, runs); those at the end replace them
         out : rows to be filled, shape (outputs, runs, rows)
-        count : numbers of rows to be filled, shape (runs,); negative where the last one is not finite
+        count : numbers of rows to be filled, shape (runs,); negative if the last one is not finite
         """
         uniform, varying, signals, begin, stop, limits = arrays
         for r in range(*runs):
@@ -98,7 +98,7 @@ class PythonLoop:
         out: Any,
     ) -> int:
         """Fill the rows of a run, shape (outputs, rows), and replace its states; gives the number of rows, negative
-        where the last one is not finite."""
+        if the last one is not finite."""
         step, longest, tolerance, most = numbers
         time, stop = ends
         signals = signals[: len(self._driven)]

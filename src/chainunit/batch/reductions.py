@@ -142,7 +142,7 @@ class ReducedColumn:
 
 
 Reductions = tuple[ReducedColumn, ...]
-"""Empty where the results themselves are stored."""
+"""Empty if the results themselves are stored."""
 
 
 def column_of(place: int, request: str | Beyond | Histogram, output: str) -> ReducedColumn:
@@ -187,8 +187,8 @@ def row_count(reductions: Reductions) -> int:
 
 
 def loop_text(reductions: Reductions) -> Mapping[str, str]:
-    """The statements of a loop, by name: BEGIN before it, TAKE for each vector, PARTS after it, where it is a part of
-    a loop whose parts are put together later, and END at last.
+    """The statements of a loop, by name: BEGIN before it, TAKE for each vector, PARTS after it if it is a part of a
+    loop whose parts are put together later, and END at last.
 
     The loop has the vectors ``y`` of results, the vector ``one``, the numbers ``L``, two for each reduction, and the
     number of all states ``n``. It defines BINS (memory for the counts of a histogram), COUNT (of a vector, into

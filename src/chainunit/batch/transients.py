@@ -52,7 +52,7 @@ def profile_rows(signal: Any, changes: int) -> list[float]:
     """
     changes_of_signal = getattr(signal, "changes", ())
     if len(changes_of_signal) > changes:
-        raise ValueError(f"a profile with {len(changes_of_signal)} changes, where {changes} are the most")
+        raise ValueError(f"a profile with {len(changes_of_signal)} changes: at most {changes} are allowed")
     rows = [
         float(getattr(signal, "start", signal)),
         *(float(x) for change in changes_of_signal for x in change),
@@ -78,8 +78,8 @@ def signal_table(
 class Runs:
     """The results of a block of runs.
 
-    `rows` has the shape (outputs, runs, rows); a run has `count` rows, shape (runs,), behind which the values have no
-    meaning. Where `failed`, shape (runs,), the last of them is not finite. `states` are those at the end, shape
+    `rows` has the shape (outputs, runs, rows); a run has `count` rows, shape (runs,), after which the values have no
+    meaning. If `failed`, shape (runs,), the last of them is not finite. `states` are those at the end, shape
     (states, runs), and `times` the times of the rows [s], shape (runs, rows). With directions, `slopes` are the
     derivatives of the rows, of the same shape, and the derivatives of the states follow the states.
     """
@@ -208,7 +208,7 @@ class Transients:
         limits : of the guarded outputs, shape (guarded, runs): a run ends with the row beyond its limit
         directions : of each run, the change of each quantity in `by`, shape (by, runs). The error of the derivative
             is held to the tolerance of the states themselves: a change of the size that matters is a good one.
-        longest : longest step of the integrator [s]; by default that of the model
+        longest : longest step of the integrator [s]; by default the one of the model
         workers : number of threads
         """
         stop = np.atleast_1d(np.asarray(stop, float))
@@ -360,7 +360,8 @@ def _operations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> 
 def _equations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> tuple[list[Any], list[Any]]:
     """The arguments, and three groups: the derivatives of the states, these outputs and states, and the states that
     meet the constraints of a model with error control. The derivatives of each group in a direction follow it; the
-    direction consists of derivatives of the states, behind the states, and of those `by` names, a fourth argument."""
+    direction consists of derivatives of the states, which follow the states, and of the changes of the quantities in
+    `by`, a fourth argument."""
     import casadi
 
     t = trace(model)

@@ -4,8 +4,8 @@ A kernel uses operators and exactly the names of `NAMES`; each engine here offer
 name that one engine lacks cannot slip into a kernel.
 
 ========  ==============================================================================
-`MATH`    floats at one point, five times as fast as numpy there; where numpy returns NaN it raises an
-          error, and `minimum` and `maximum` may ignore a NaN
+`MATH`    floats at one point, five times as fast as numpy; raises an error in place of a NaN, and
+          `minimum` and `maximum` may ignore a NaN
 `numpy_`  arrays of any broadcastable shape
 `casadi_` symbols, from which C code, exact derivatives and sparsity come
 `dual`    first-order dual numbers on top of any of the others: exact slopes
@@ -122,8 +122,7 @@ class _DualEngine(SimpleNamespace):
 def dual(xp: Any) -> SimpleNamespace:
     """The engine on dual numbers over `xp`; plain numbers pass through it unchanged.
 
-    At a kink (`abs`, `minimum`, `maximum`) the derivative is that of either side, as
-    in every automatic differentiation.
+    At a kink (`abs`, `minimum`, `maximum`) the derivative is the one of either side.
 
     Raises
     ------

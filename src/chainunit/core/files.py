@@ -47,9 +47,9 @@ def atomic_file(file: Path, *, is_result: bool = True) -> Iterator[Path]:
     Raises
     ------
     InputError
-        where `file` is no regular file.
+        if `file` is no regular file.
     WriteError
-        where it cannot be written, such as on a full disk; an earlier `file` stays as it was.
+        if it cannot be written, such as on a full disk; an earlier `file` stays as it was.
     """
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: is not a regular file; name another")
@@ -84,8 +84,8 @@ def named_file(file: str | Path, *endings: str) -> Path:
 
 
 def write_file(file: Path, content: str | bytes) -> list[Path]:
-    """Write a text, in UTF-8, or bytes into a file, whole or not at all; returns the file. Errors are those of
-    `atomic_file`."""
+    """Write a text, in UTF-8, or bytes into a file, whole or not at all; returns the file. See `atomic_file` for
+    errors."""
     with atomic_file(file) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
     return [file]
@@ -132,7 +132,7 @@ def folder(path: Path) -> Path:
     Raises
     ------
     InputError
-        where it cannot be made or written to.
+        if it cannot be made or written to.
     """
     if path.is_file():
         raise InputError(f"{path}: is a file; must be a folder")
@@ -154,7 +154,7 @@ class FileList:
     Raises
     ------
     InputError
-        where the file of the list has other content.
+        if the file of the list has other content.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -221,7 +221,7 @@ def claim(path: Path, *names: str) -> Iterator[Path]:
     Raises
     ------
     InputError
-        where another process writes there, and with a line for each file that no earlier run wrote and that would be
+        if another process writes there, and with a line for each file that no earlier run wrote and that would be
         lost; see also `folder`.
     """
     from filelock import FileLock, Timeout

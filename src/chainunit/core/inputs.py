@@ -110,10 +110,10 @@ def _too_large(place: str, most: int, subject: str = "") -> InputError:
     )
 
 
-def regular_bytes(file: Path, most: int = TEXT) -> bytes | None:
+def regular_bytes(file: Path) -> bytes | None:
     """The content of a file; None if `file_bytes` refuses it."""
     try:
-        return file_bytes(file, most)
+        return file_bytes(file)
     except InputError:
         return None
 
@@ -300,7 +300,7 @@ def check_archive(source: Path | bytes, name: str, most: int = UNPACKED, kind: s
     Raises
     ------
     InputError
-        in one line that begins with the `name` of the archive; also where it is none of its `kind`.
+        in one line that begins with the `name` of the archive; also if it is none of its `kind`.
     """
     try:
         with source.open("rb") if isinstance(source, Path) else io.BytesIO(source) as stream:

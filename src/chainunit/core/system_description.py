@@ -27,7 +27,7 @@ Steps = Sequence[tuple[str, Sequence[str]]]
 
 @declaration
 class SystemSolver(Solver):
-    """Limits of the internal integrator of a system, in place of those of its components."""
+    """Limits of the internal integrator of a system, in place of the limits of its components."""
 
     tolerance: Value = quantity(
         "1",

@@ -1,4 +1,4 @@
-"""The choice of the backend for an FMU: native code where there is a C compiler, otherwise Python by pythonfmu."""
+"""The choice of the backend for an FMU: native code if there is a C compiler, otherwise Python by pythonfmu."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def export(
     Parameters
     ----------
     model, file, start, names : see `chainunit.fmu.export.export`
-    backend : "native" or "python"; by default native where a C compiler is found and works
+    backend : "native" or "python"; by default native if a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
     platforms, progress : see `chainunit.fmu.native.export.export`; platforms only by the native backend
 

@@ -59,7 +59,7 @@ def export(
     KeyError
         for a name in `start` that the model does not have.
     InputError
-        where the start values are out of bounds or make no machine, or two flat names are the same.
+        if the start values are out of bounds or make no machine, or two flat names are the same.
     """
     interface = interface_of(model, start, script_with_names(names))
     file = Path(file)

@@ -2,7 +2,7 @@
 this file, and the model as the module that `chainunit.fmu.printed_model` prints.
 
 It never raises: a reason is logged, outputs become NaN, and a step is refused. Outputs are evaluated when they are
-read, once per state: those that were read at this state or an earlier one, and no others.
+read, once per state, together with the outputs that were read at an earlier state.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Settable(NamedTuple):
         return bool(bounds.admits(x, self.low, self.high, self.slack, self.open_low, whole))
 
     def within_bounds(self, x: float) -> float:
-        """The allowed value, set to the bound where it is beyond it by rounding."""
+        """The allowed value; the bound in place of a value that is beyond it by rounding."""
         return bounds.within(x, self.low, self.high)
 
     def complaint(self, x: float) -> str:
@@ -126,7 +126,7 @@ class ModelInstance:
         self._initialized = True
 
     def step(self, time: float, size: float) -> bool:
-        """One communication step; False where the model, its inputs or the step are not usable."""
+        """One communication step; False if the model, its inputs or the step are not usable."""
         try:
             bad = self.prepare() or self._bad_step(time, size) or self._bad_input()
             if bad:
@@ -156,7 +156,7 @@ class ModelInstance:
         return ""
 
     def _advance(self, time: float, step: float) -> bool:
-        """Take states and inputs to the end of a step; False where a state runs away."""
+        """Take states and inputs to the end of a step; False if a state runs away."""
         run = self._running()
         if self.model.NOMINAL:
             x = self._integrate(run, step)
@@ -398,7 +398,7 @@ class ModelInstance:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Take a saved state; where it is none of this model, nothing works until another one is restored."""
+        """Take a saved state; if it is none of this model, nothing works until another one is restored."""
         try:
             why = self._bad_state(state)
         except (KeyError, TypeError, ValueError, AttributeError):
@@ -412,13 +412,13 @@ class ModelInstance:
         self._time, self._stop, self._pace = state["time"], state["stop"], state["pace"]
         self._initialized = state["initialized"]
         self._doubtful = set(range(self.first_input, self.first_state))
-        # the state may be that of another geometry
+        # the state may belong to another geometry
         self._p = self._derived = None
         self._unstarted = ""
         self._closed = state["closed"]
 
     def _bad_state(self, state: dict[str, Any]) -> str:
-        """Why the state cannot be restored, or an empty text; an error where it is no state of this model."""
+        """Why the state cannot be restored, or an empty text; raises an error if it is no state of this model."""
         if "damaged" in state:
             return str(state["damaged"])
         if state["of"] != _IDENTITY:

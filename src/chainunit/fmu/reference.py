@@ -72,12 +72,12 @@ def experiments_file(name: str, description: str, experiments: Iterable[Referenc
 
 
 def reference_results(interface: Interface) -> dict[str, bytes]:
-    """The files of reference results. Where, with the start values, the states run away or are too fast for the
+    """The files of reference results. If, with the start values, the states run away or are too fast for the
     integrator, there are no files, and a warning is logged."""
     name = interface.model.name
     try:
         tables = reference_tables(interface)
-    except (ArithmeticError, ValueError) as reason:  # ValueError: of `math`, where a linkage does not close
+    except (ArithmeticError, ValueError) as reason:  # ValueError: of `math`, if a linkage does not close
         log.warning(
             "The FMU %s: no reference results inside: %s; no run of this package needs them, an importer is checked "
             "by them",
@@ -253,14 +253,14 @@ def _march(interface: Interface, p: Any) -> Any:
             ) from error
         states = [float(v) for v in later.full().ravel()]
         if not np.isfinite(states).all():
-            raise ArithmeticError(f"the states run away behind t = {t:g} s")
+            raise ArithmeticError(f"the states run away after t = {t:g} s")
         return states
 
     return march
 
 
 def csv_bytes(head: Sequence[str], rows: Iterable[Sequence[float]], types: Mapping[str, Type]) -> bytes:
-    """A table in CSV with the exact numbers; a column without a type, as that of the time, has real ones."""
+    """A table in CSV with the exact numbers; a column without a type, such as the time, has real ones."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
@@ -281,10 +281,10 @@ _RUN = 4.0
 
 def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
     """The inputs by name as functions of time [s], for the reference results: all change smoothly, within their
-    bounds. The names are those of the FMU.
+    bounds. The names are the names in the FMU.
 
     A shaft runs from rest, unevenly, or swings within its bounds. A load or a torque has a size that suits the
-    inertia of its shaft. Every other input swings about its start value, or about its usual size where the start
+    inertia of its shaft. Every other input swings about its start value, or about its usual size if the start
     value is 0.
     """
     model = interface.model
@@ -324,7 +324,7 @@ _SHAFT: dict[str, Callable[[float], float]] = {
 
 
 def _shaft(interface: Interface, phi: str) -> dict[str, Callable[[float], float]]:
-    """The motion of a shaft: it runs from rest, or swings where the input `phi` has bounds."""
+    """The motion of a shaft: it runs from rest, or swings if the input `phi` has bounds."""
     bounds = [v.quantity for v in interface.inputs if v.name == phi]
     if not bounds or not math.isfinite(bounds[0].high - bounds[0].low):
         return _SHAFT
@@ -338,7 +338,7 @@ def _shaft(interface: Interface, phi: str) -> dict[str, Callable[[float], float]
 
 def _load(tau: float, inertia: float) -> dict[str, Callable[[float], float]]:
     """A load of about this torque [N m] and inertia [kg m2]. The slopes are so small that, for a shaft up to 150 rad
-    before or behind the point of the load, the inertia stays positive and the torque within twice its size."""
+    from the point of the load, the inertia stays positive and the torque within twice its size."""
     return {
         "tau_bias": lambda t: tau * (1.0 + 0.4 * math.sin(10.0 * t)),
         "tau_bias_dphi": lambda t: 0.01 * tau * math.cos(4.0 * t),

@@ -195,7 +195,7 @@ def unusual_values(
 
 
 def _meant(variable: Variable, entry: Any) -> str | None:
-    """The given number with the unit in which it is allowed and usual; None where there is no such unit."""
+    """The number of an entry with the unit in which it is allowed and usual; None if there is no such unit."""
     parts = units.split(str(entry))
     if parts is None or not math.isfinite(parts[0]):
         return None
@@ -280,22 +280,22 @@ def _path(error: ErrorDetails) -> list[str]:
 
 def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
     path = error["loc"]
-    where = prefix + printable(".".join(_path(error)), 80)
+    full_name = prefix + printable(".".join(_path(error)), 80)
     if error["type"] == "extra_forbidden":
         table: Any = file
         for part in path[:-1]:
             table = table.model_fields[part].annotation
         keys = f"known here: {', '.join(table.model_fields)}"
         hint = near_name(str(path[-1]), table.model_fields) or _elsewhere(str(path[-1]), file)
-        return f"{where}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{keys}"
+        return f"{full_name}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{keys}"
     if error["type"] == "model_type":
-        array = f", below [{where}]" if isinstance(error["input"], list) else ""
-        named = _holders(where, file) if isinstance(error["input"], str) else []
+        array = f", below [{full_name}]" if isinstance(error["input"], list) else ""
+        named = _holders(full_name, file) if isinstance(error["input"], str) else []
         hint = f"; its name stands in {' or '.join(named)}" if named else ""
-        return f"{where} = {shown(error['input'])}: must be a table{array}{hint}"
+        return f"{full_name} = {shown(error['input'])}: must be a table{array}{hint}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
-    return f"{where} = {shown(error['input'])}: {_allowed(error, where.removeprefix(prefix))}"
+    return f"{full_name} = {shown(error['input'])}: {_allowed(error, full_name.removeprefix(prefix))}"
 
 
 def _elsewhere(key: str, file: type[BaseModel]) -> str:
@@ -340,7 +340,7 @@ def _allowed(error: ErrorDetails, key: str) -> str:
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """The table `over`, completed by `base`: a value that `over` does not have is that of `base`."""
+    """The table `over`, completed by the values of `base` that it does not have."""
     result = dict(base)
     for name, value in over.items():
         below = result.get(name)
@@ -364,7 +364,7 @@ def packaged(name: str) -> str:
 
 
 MOST_KEYS = 5000
-"""Most keys of a file, those of its tables among them."""
+"""Most keys of a file, with the keys of its tables."""
 
 
 def toml(text: str, most: int = MOST_KEYS) -> dict[str, Any]:
@@ -373,7 +373,7 @@ def toml(text: str, most: int = MOST_KEYS) -> dict[str, Any]:
     Raises
     ------
     InputError
-        where the text is no TOML, each fault with its line, has more than so many keys, and for `text_faults`.
+        if the text is no TOML, each fault with its line, has more than so many keys, and for `text_faults`.
     """
     try:
         data = tomllib.loads(text)
@@ -400,12 +400,12 @@ Unicode assigns to nothing. XML, and with it an FMU, an SVG and a page, has no p
 
 
 def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """The table of that name in a file, empty where there is none.
+    """The table of that name in a file, empty if there is none.
 
     Raises
     ------
     InputError
-        where it is no table.
+        if it is no table.
     """
     table = data.get(name, {})
     if not isinstance(table, Mapping):
@@ -499,7 +499,7 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
 
 
 def _line_of(key: str, lines: Mapping[str, int]) -> int:
-    """The line of a key, or else of the innermost table that contains it; 0 where the file has neither."""
+    """The line of a key, or else of the innermost table that contains it; 0 if the file has neither."""
     while key and key not in lines:
         key = key.rpartition(".")[0]
     return lines.get(key, 0)

@@ -37,7 +37,7 @@ def received() -> int | None:
 
 
 def status() -> int:
-    """The exit status after the signal that was received; that of Ctrl-C without one."""
+    """The exit status after the signal that was received; without one, the status of Ctrl-C."""
     return 128 + (received() or signal.SIGINT)
 
 

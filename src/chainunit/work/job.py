@@ -108,15 +108,15 @@ class Job:
 
 
 class BatchStore:
-    """The store of a `job` in a folder, which is made where it is missing or has another declaration. One with fewer
+    """The store of a `job` in a folder, which is made if it is missing or has another declaration. One with fewer
     points grows; one with more points keeps them.
 
     Raises
     ------
     InputError
-        where its file is no regular one.
+        if its file is no regular one.
     WriteError
-        where it cannot be written.
+        if it cannot be written.
     """
 
     earlier_points = 0
@@ -217,7 +217,7 @@ class BatchStore:
         Raises
         ------
         WriteError
-            where the file cannot be written.
+            if the file cannot be written.
         """
         begin, end = self.extent(batch)
         with self._opened("r+") as file:

@@ -55,13 +55,13 @@ def run(
     Raises
     ------
     InputError
-        where the scheduler or its workers do not answer.
+        if the scheduler or its workers do not answer.
     RunError
-        where `work` fails, or a worker ends; the message names the batch. Earlier batches are in the store.
+        if `work` fails, or a worker ends; the message names the batch. Earlier batches are in the store.
     InterruptedRunError
         after Ctrl-C; likewise.
     WriteError
-        where the store cannot be written; likewise.
+        if the store cannot be written; likewise.
     """
     store = BatchStore(job, make_folder(folder))
     progress(job.title, 0, job.points)
@@ -227,7 +227,7 @@ def check_scheduler(scheduler: str) -> None:
     Raises
     ------
     InputError
-        where they do not answer within a few seconds.
+        if they do not answer within a few seconds.
     """
 
     async def ask() -> Any:

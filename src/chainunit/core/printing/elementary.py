@@ -8,11 +8,11 @@ printed.
 An engine has ``sqrt abs copysign`` and
 
 ``choose(condition, a, b)``
-    `a` where the condition, a comparison, holds, else `b`; both are computed
+    `a` if the condition, a comparison, holds, else `b`; both are computed
 ``exponent(x)``
     the nearest exponent of 2 of a positive normal number, as a whole number
 ``mantissa(x)``
-    what that power is multiplied by, from the root of 1/2 to that of 2
+    what that power is multiplied by, from the root of 1/2 to the root of 2
 ``power2(k)``
     2 to the power of a whole number from -1022 to 1023
 
@@ -167,10 +167,10 @@ def arccosine(xp: Any, x: Any) -> Any:
     high, low = _HALF_PI
     near = xp.copysign(1.0, x)
     middle, tail = _short_sum(high, -near * s)
-    behind, rest = _short_sum(2.0 * high, -2.0 * s)
+    beyond, rest = _short_sum(2.0 * high, -2.0 * s)
     inside = middle + (tail + (low - near * lost))
     return xp.choose(
-        far, xp.choose(x < 0.0, behind + (rest + (2.0 * low - 2.0 * lost)), 2.0 * (s + lost)), inside
+        far, xp.choose(x < 0.0, beyond + (rest + (2.0 * low - 2.0 * lost)), 2.0 * (s + lost)), inside
     )
 
 
@@ -245,7 +245,7 @@ def _sum(a: Any, b: Any) -> tuple[Any, Any]:
 
 
 def _short_sum(a: Any, b: Any) -> tuple[Any, Any]:
-    """The same where `a` is not smaller than `b` in size, or 0."""
+    """The same if `a` is not smaller than `b` in size, or 0."""
     s = a + b
     return s, b - (s - a)
 

@@ -14,8 +14,8 @@ Nothing is evaluated from texts, so that it runs under a content policy that adm
 ``derivatives()``
     to ``rates``, the derivatives of the states
 ``requirements()``, ``start_limits()``
-    to arrays of these names with a ``_`` behind: value, lower and upper limit of each requirement on the parameters,
-    and on the states at the start
+    to ``requirements_`` and ``start_limits_``: value, lower and upper limit of each requirement on the parameters, and
+    on the states at the start
 ``start()``, ``run(...)``
     the states at the start, and a run in the time, see ``steps.js``
 ``about``
@@ -61,7 +61,7 @@ _FORMS |= _CONDITIONS | {
 }  # fmt: skip
 """Each operation in JavaScript: ``{0}`` is its first operand, and ``{c[0]}`` that as a condition."""
 _RESULTS = {"values": "y", "derivatives": "rates", "derive": "k", "guess": "z", "initial": "x"}
-"""The arrays of the results of functions, by name; those of all others have the name of the function and ``_``."""
+"""By function, the array of its results; the arrays of all others have the name of the function and ``_``."""
 _HEAD = """\
 const f8 = new Float64Array(1), i4 = new Int32Array(f8.buffer), u4 = new Uint32Array(f8.buffer);
 const second = new Float64Array(1); // the second result of a function
@@ -189,8 +189,8 @@ def _statements(
     Parameters
     ----------
     outside : the text of a value that is computed elsewhere
-    kept : by place where values are stored
-    results : places of values that are needed behind the statements
+    kept : by place, the array entry in which a value is stored
+    results : places of values that are needed after the statements
     usual : see `_renamed`
     """
     inside = [place for place in places if items[place].operands]
@@ -243,7 +243,7 @@ def _statements(
 
 _NAME = re.compile(r"\$\w+")
 _LETTERS = "abcdefghijlmnoqrstvABCDEFGHIJKLMNOPQRSTUVWXYZ"
-"""First letters of names of values: those of arrays are others."""
+"""First letters of names of values; arrays have others."""
 
 
 def _renamed(

@@ -77,7 +77,7 @@ def kernels(
     t: Trace, derived: Sequence[Any], slopes: bool = True, columns: Sequence[str] | None = None
 ) -> Iterator[ModelFunction]:
     """The functions of a traced model: its outputs and their derivatives in a direction (``values``, ``forward``),
-    and where it has such, the ``derivatives`` of its states and all for their start, the requirements on its
+    and, if it has such, the ``derivatives`` of its states and all for their start, the requirements on its
     parameters, and the values `derived` from them. With `columns`, by name, ``values`` gives these alone, in one
     group."""
     import casadi

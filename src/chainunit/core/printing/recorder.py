@@ -14,7 +14,7 @@ from typing import Any
 from .operations import ARGUMENT, NUMBER, Operation
 
 CHOOSE, EXPONENT, MANTISSA, POWER2 = "CHOOSE", "EXPONENT", "MANTISSA", "POWER2"
-"""Kinds of operations beside those of CasADi: the second operand where the first one is not 0, else the third; the
+"""Kinds of operations beside those of CasADi: the second operand if the first one is not 0, else the third; the
 nearest exponent of 2 of a number, and what that power is multiplied by; and 2 to the power of a whole number."""
 
 
@@ -61,7 +61,7 @@ class Recorder:
         return self.operation("COPYSIGN", a, b)
 
     def choose(self, condition: Any, a: Any, b: Any) -> Noted:
-        """`a` where the condition holds, else `b`."""
+        """`a` if the condition holds, else `b`."""
         return self.operation(CHOOSE, condition, a, b)
 
     def exponent(self, x: Any) -> Noted:
@@ -69,7 +69,7 @@ class Recorder:
         return self.operation(EXPONENT, x)
 
     def mantissa(self, x: Any) -> Noted:
-        """A positive normal number over 2 to the power of that, from the root of 1/2 to that of 2."""
+        """A positive normal number over that power of 2, from the root of 1/2 to the root of 2."""
         return self.operation(MANTISSA, x)
 
     def power2(self, k: Any) -> Noted:

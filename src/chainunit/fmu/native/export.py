@@ -86,9 +86,9 @@ def export(
     Raises
     ------
     KeyError, InputError
-        see `chainunit.fmu.export.export`; also where there is no compiler for a platform.
+        see `chainunit.fmu.export.export`; also if there is no compiler for a platform.
     RunError
-        where the compiler fails, with its messages.
+        if the compiler fails, with its messages.
     """
     targets, compiler = choose(platforms, fmi)
     interface = interface_of(model, start, script_with_names(names))

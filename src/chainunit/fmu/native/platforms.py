@@ -111,7 +111,7 @@ def build(
     Raises
     ------
     RunError
-        where the compiler fails, with its messages.
+        if the compiler fails, with its messages.
     """
     target_platform = PLATFORMS[name]
     libraries = {}
@@ -131,10 +131,10 @@ def build_here(compiler: Compiler, fmi: int, identifier: str, sources: Mapping[s
     Raises
     ------
     RunError
-        where the compiler fails, with its messages.
+        if the compiler fails, with its messages.
     """
     here = host() or "linux64"
-    # a library is the same in each folder; of macOS that of FMI 2.0 has all processors
+    # a library is the same in each folder; of macOS the one of FMI 2.0 has all processors
     version = 2 if 2 in PLATFORMS[here].folders else 3
     (library,) = build(compiler, here, version, identifier, sources, units_of(fmi)).values()
     return library
@@ -169,7 +169,7 @@ def compile_with_kernels(
     Raises
     ------
     RunError
-        where the compiler fails, with its messages.
+        if the compiler fails, with its messages.
     """
     kernels = {name: sources[name] for name in (KERNELS, *HEADERS)}
     object_code = compile_code(
