@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 from ..core.model import Model
 
 Names = Literal["structured", "flat"]
-"""The names of an FMU's variables: the model's names, as ``left.material_mass``, or with underscores in place of dots,
-as ``left_material_mass``."""
+"""The names of an FMU's variables: the model's names, ``left.material_mass``, or with underscores in place of dots,
+``left_material_mass``."""
 
 
 def name_in_fmu(name: str, names: Names) -> str:

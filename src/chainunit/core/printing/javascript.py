@@ -14,8 +14,8 @@ Nothing is evaluated from texts, so that it runs under a content policy that adm
 ``derivatives()``
     to ``rates``, the derivatives of the states
 ``requirements()``, ``start_limits()``
-    to ``requirements_`` and ``start_limits_``: value, lower and upper limit of each requirement on the parameters, and
-    on the states at the start
+    to ``requirements_`` and ``start_limits_``: value, lower and upper limit of each requirement on the parameters,
+    and on the states at the start
 ``start()``, ``run(...)``
     the states at the start, and a run in the time, see ``steps.js``
 ``about``
