@@ -26,15 +26,12 @@ from . import arrays
 from .cuda import cuda_kernel, cupy_, host, namespace, on_device
 from .equations import Equations, Result, equations, find, names_of
 from .native import aligned, native_kernel
-from .reductions import REDUCTIONS, Beyond, Histogram, ReducedColumn, by_array, column_of, flat_numbers
+from .reductions import REDUCTIONS, Beyond, Histogram, ReducedColumn, Reductions, Request, flat_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
 
 ENGINES = ("native", "numpy", "cuda")
-Request = str | Beyond | Histogram
-Reduced = tuple[tuple[ReducedColumn, Request], ...]
-"""Reductions with their requests."""
 _LEAST_INNER = 64
 """A last dimension that is shorter is no loop of its own: all dimensions are one loop then."""
 
@@ -138,8 +135,7 @@ def evaluate(
         outputs = list(reduce)
     names = texts_in("outputs", outputs) if outputs is not None else tuple(v.name for v in outputs_of(model))
     traced = equations(model, names, texts_in("by", by))
-    reduced = _reduced(reduce or {}, traced.results)
-    grid = Grid(traced, values, parameters, over, engine, reduced)
+    grid = Grid(traced, values, parameters, over, engine, _reductions(reduce or {}, traced.results))
     try:
         memory = grid.memory(out)
         grid.compute(memory, workers or os.cpu_count() or 1)
@@ -166,19 +162,19 @@ def check_engine(engine: str) -> None:
         cupy_()
 
 
-def _reduced(reduce: Mapping[str, Request | Sequence[Request]], results: Sequence[Result]) -> Reduced:
-    """The requests with the places of their outputs, whose `results` have units, checked; one request is a list of
-    one."""
-    requests = [
-        (place, output, _in_unit(request, results[place].unit))
-        for place, (output, listed) in enumerate(reduce.items())
-        for request in (listed if isinstance(listed, list | tuple) else [listed])
-    ]
-    histograms = [output for _, output, request in requests if isinstance(request, Histogram)]
-    for output in histograms:
-        if histograms.count(output) > 1:
-            raise InputError(f"{output}: has {histograms.count(output)} histograms; give one, with more bins")
-    return tuple((column_of(place, request, output), request) for place, output, request in requests)
+def _reductions(reduce: Mapping[str, Request | Sequence[Request]], results: Sequence[Result]) -> Reductions:
+    """The checked requests; one request is a list of one. The output at each place has the unit of its result."""
+    columns: list[ReducedColumn] = []
+    for place, (output, listed) in enumerate(reduce.items()):
+        requests = listed if isinstance(listed, list | tuple) else [listed]
+        count = sum(isinstance(request, Histogram) for request in requests)
+        if count > 1:
+            raise InputError(f"{output}: has {count} histograms; give one, with more bins")
+        columns += [
+            ReducedColumn.checked(place, _in_unit(request, results[place].unit), output)
+            for request in requests
+        ]
+    return tuple(columns)
 
 
 def _in_unit(request: Any, unit: str) -> Any:
@@ -233,10 +229,10 @@ class Grid:
         parameters: Any,
         over: str | None,
         engine: str,
-        reduced: Reduced,
+        reductions: Reductions,
     ) -> None:
         model = equations.model
-        self._equations, self._engine, self._reduced = equations, engine, reduced
+        self._equations, self._engine, self._reductions = equations, engine, reductions
         places = find(texts_in("values", values), names_of(equations.arguments), "parameter, input or state")
         variations = {
             name: _array(equations.arguments[k], x)
@@ -328,7 +324,7 @@ class Grid:
         InputError
             if the earlier result has no memory for these results.
         """
-        shape = self.size[:1] if self._reduced else self.size
+        shape = self.size[:1] if self._reductions else self.size
         columns = self._columns
         if earlier is None:
             ends = np.cumsum([0, *(column.rows for column in columns)])
@@ -367,7 +363,7 @@ class Grid:
 
     def compute(self, memory: Memory, workers: int) -> None:
         """Fill the memory with results and reasons."""
-        traced, reduced = self._equations, self._reduced
+        traced = self._equations
         if not self.size[0]:
             return
         entries = self._entries()
@@ -378,15 +374,15 @@ class Grid:
                 memory.results,
                 memory.reason,
                 self.size,
-                flat_numbers([request for _, request in reduced]),
+                flat_numbers(self._reductions),
                 workers,
             )
         else:
             states = memory
-            if reduced:
+            if self._reductions:
                 states = Memory(np.empty((len(traced.results), *self.size)), np.zeros(self.size, np.int16))
             arrays.by_numpy(traced.operations, entries, states.results, states.reason, traced.not_finite)
-            if reduced:
+            if self._reductions:
                 self._reduce(states, memory)
         self._refuse(memory)
 
@@ -395,10 +391,9 @@ class Grid:
         largest reason of its states, and no results."""
         memory.reason[...] = np.max(states.reason, axis=1)
         rows = iter(memory.results)
-        for column, request in self._reduced:
+        for column in self._reductions:
             with np.errstate(invalid="ignore"):
-                reduced = by_array(request, states.results[column.place])
-            # several for a histogram, one for each bin
+                reduced = column.of_array(states.results[column.place])
             for result in reduced:
                 next(rows)[...] = np.where(memory.reason == 0, result, np.nan)
 
@@ -412,11 +407,10 @@ class Grid:
         if self._engine == "numpy":
             return None
         varying = tuple(entry for entry, x in entries.items() if x.shape[1] > 1)
-        reductions = tuple(column for column, _ in self._reduced)
         if self._engine == "cuda":
-            return cuda_kernel(self._equations, varying, reductions)
+            return cuda_kernel(self._equations, varying, self._reductions)
         try:
-            kernel = native_kernel(self._equations, varying, reductions)
+            kernel = native_kernel(self._equations, varying, self._reductions)
         except RunError as error:
             warnings.warn(
                 f"the native engine is not available, numpy computes: {error}", RemarkWarning, stacklevel=4
@@ -455,15 +449,15 @@ class Grid:
     @property
     def _dims(self) -> list[str]:
         """The dimensions of the states that the results have."""
-        return self.dims[:-1] if self._reduced else self.dims
+        return self.dims[:-1] if self._reductions else self.dims
 
     @property
     def _columns(self) -> list[ResultRows]:
         """The variables of the results."""
         results = self._equations.results
-        if not self._reduced:
+        if not self._reductions:
             return [ResultRows(result) for result in results]
-        return [reduced_column(results[column.place], request) for column, request in self._reduced]
+        return [_reduced_rows(results[column.place], column.request) for column in self._reductions]
 
     def dataset(self, memory: Memory, on_host: bool) -> xr.Dataset:
         """The results with names, units and coordinates; of a GPU as arrays of the device, unless `on_host`."""
@@ -496,7 +490,7 @@ class Grid:
         return xr.Dataset(variables, coords)
 
 
-def reduced_column(result: Result, request: Request) -> ResultRows:
+def _reduced_rows(result: Result, request: Request) -> ResultRows:
     """The variable of a reduced result."""
     if isinstance(request, Histogram):
         counts = Result(f"histogram({result.name})", "1", f"number of states by value, {result.description}")
