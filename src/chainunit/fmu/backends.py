@@ -20,13 +20,13 @@ Backend = Literal["native", "python"]
 
 @dataclass(frozen=True)
 class Origin:
-    """The backend that made an FMU, and a text on how and why: `words`."""
+    """The backend that made an FMU, and a `text` on how and why."""
 
     backend: Backend
-    words: str
+    text: str
 
     def __str__(self) -> str:
-        return self.words
+        return self.text
 
 
 def export(

@@ -65,6 +65,7 @@ _TABLE = "const Kernels kernels = {"
 
 
 def _text(s: str) -> str:
+    """A text in C."""
     return json.dumps(s)
 
 
@@ -73,7 +74,7 @@ def _unit(unit: str) -> str:
 
 
 def _array(kind: str, name: str, items: list[str]) -> str:
-    # C has no empty arrays
+    """The definition of an array; C has no empty ones."""
     body = ",\n    ".join(items or ["0"])
     return f"static const {kind} {name}[] = {{\n    {body},\n}};\n"
 
@@ -95,6 +96,7 @@ def _capitals(module: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _printf(text: str) -> str:
+    """A text with fields in braces as a format of printf."""
     kinds = {"": "%s", "g": "%g", "d": "%u"}
     pieces = Formatter().parse(text)
     return "".join(x.replace("%", "%%") + (kinds[kind or ""] if name else "") for x, name, kind, _ in pieces)
@@ -112,22 +114,15 @@ def _quantity(v: Variable) -> str:
 def tables(interface: Interface, guid: str, room: int) -> str:
     """``model.c``: the tables that model.h declares, with the GUID (in FMI 3.0 the instantiation token) and the
     memory `room` of the kernels."""
-    model = interface.model
-
-    def rate_of(name: str) -> int:
-        return model.input_layout.names.index(model.input_rates[name]) if name in model.input_rates else -1
-
-    place, group_of = {}, {}
-    first = 0
-    group_rows = []
-    for g, group in enumerate(output_groups(interface.model)):
-        group_rows.append(f"{{{first}, {len(group)}}}")
-        for k, output in enumerate(group):
-            place[output], group_of[output] = first + k, g
-        first += len(group)
+    model, groups = interface.model, output_groups(interface.model)
+    inputs, parameters = model.input_layout.names, model.parameter_layout.names
     n_y = len(interface.others)
+    group_of = {output: g for g, group in enumerate(groups) for output in group}
+    place = {output: k for k, output in enumerate(output for group in groups for output in group)}
+    group_rows = [f"{{{place[group[0]]}, {len(group)}}}" for group in groups]
     starts = [s.start for s in (*interface.signals_of("parameter"), *interface.signals_of("input"))]
-    parameter_names = model.parameter_layout.names
+    rates = [inputs.index(model.input_rates[name]) if name in model.input_rates else -1 for name in inputs]
+    requirements = (*model.required, *model.start_problem.required)
     lines = [
         f"/* {model.name}: tables for model.h, generated from the model's declarations. */",
         "#include <math.h>",
@@ -138,15 +133,14 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         _array("double", "starts", [number(x or 0.0) for x in starts]),
         _array("Quantity", "declared", [_quantity(v) for v in (*interface.parameters, *interface.inputs)]),
         _array("double", "nominal", [number(v.quantity.nominal or 1.0) for v in interface.states]),
-        _array("int", "rate_of", [str(rate_of(v.name)) for v in interface.inputs]),
+        _array("int", "rate_of", list(map(str, rates))),
         _array("int", "place", [str(place[i]) for i in range(n_y)]),
         _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
         _array("Group", "group", group_rows),
         _array("Type", "discrete_type", [interface.others[i].type.upper() for i in interface.discrete]),
     ]
-    requirements = (*model.required, *model.start_problem.required)
     for i, r in enumerate(requirements):
-        lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.context]))
+        lines.append(_array("int", f"given_{i}", [str(parameters.index(name)) for name in r.context]))
     rows = [
         f"{{{_text(r.subject)}, {_unit(r.unit)}, {_text(r.why)}, {_text(r.remedy)}, {len(r.context)}, given_{i}}}"
         for i, r in enumerate(requirements)
@@ -164,7 +158,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "n_z": model.start_problem.unknowns,
         "n_w": room,
         "n_groups": len(group_rows),
-        "differenced": f"{sum(1 << g for g in difference_groups(interface.model))}u",
+        "differenced": f"{sum(1 << g for g in difference_groups(model))}u",
         "n_required": len(model.required),
         "n_start_required": len(model.start_problem.required),
         "start": "starts",
@@ -178,7 +172,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "discrete_type": "discrete_type",
         "required": "required" if rows else "NULL",
         "start_rounds": model.start_problem.rounds,
-        "max_steps": parameter_names.index(MAX_STEPS) if interface.states else -1,
+        "max_steps": parameters.index(MAX_STEPS) if interface.states else -1,
     }
     lines.append("const Model model = {")
     lines += [f"    .{name} = {value}," for name, value in fields.items()]
