@@ -40,21 +40,22 @@ class ReasonKind(Enum):
     """Why a state has no result, with its text; ``NONE`` is for a state with a result."""
 
     NONE = "valid"
-    REQUIREMENT = "{subject}: {words}"
+    REQUIREMENT = "{subject}: {detail}"
     POSITION = "the machine cannot be assembled in this position, or stands in a dead position"
-    BOUNDS = "{subject}: must be {words}"
+    BOUNDS = "{subject}: must be {detail}"
 
 
 @dataclass(frozen=True)
 class StateReason:
-    """A reason for which there is no result: its kind, whose value is its text, and what the text is about."""
+    """A reason for which there is no result: its kind, whose value is a text with slots for the `subject`, such as
+    the name of a parameter, and a `detail`."""
 
     kind: Enum
     subject: str = ""
-    words: str = ""
+    detail: str = ""
 
     def __str__(self) -> str:
-        return str(self.kind.value).format(subject=self.subject, words=self.words)
+        return str(self.kind.value).format(subject=self.subject, detail=self.detail)
 
 
 def reasons_of(model: Model) -> list[StateReason]:
@@ -500,7 +501,7 @@ def _reduced_rows(result: Result, request: Request) -> ResultRows:
         text = f"number of states with a size beyond {size} {result.unit}, {result.description}"
         return ResultRows(Result(f"beyond({result.name}, {size})", "1", text))
     return ResultRows(
-        Result(f"{request}({result.name})", result.unit, f"{REDUCTIONS[request].words}, {result.description}")
+        Result(f"{request}({result.name})", result.unit, f"{REDUCTIONS[request].title}, {result.description}")
     )
 
 

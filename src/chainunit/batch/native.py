@@ -33,8 +33,11 @@ _BLOCK = 64
 """Number of states that are kept in the first cache before they are stored."""
 
 
-def defines(equations: Equations, code: VectorCode, reductions: Reductions, more: Mapping[str, int]) -> str:
-    """The sizes and statements that the generated code defines for its loop, see states.h, and `more` sizes."""
+def defines(
+    equations: Equations, code: VectorCode, reductions: Reductions, own_sizes: Mapping[str, int]
+) -> str:
+    """The sizes and statements that the generated code defines for its loop, see states.h, with the `own_sizes` of a
+    language."""
     sizes = {
         "INPUTS": len(code.inputs),
         "COLUMNS": len(code.columns),
@@ -43,7 +46,7 @@ def defines(equations: Equations, code: VectorCode, reductions: Reductions, more
         "REDUCED": int(bool(reductions)),
         "NOT_FINITE": equations.not_finite,
     }
-    values = {**sizes, **more, **loop_text(reductions)}
+    values = {**sizes, **own_sizes, **loop_text(reductions)}
     return "\n".join(f"#define {name} {value}" for name, value in values.items())
 
 

@@ -19,7 +19,7 @@ MOST_BINS = 1024
 
 @dataclass(frozen=True)
 class Reduction:
-    """A reduction of a column over the last dimension: in words, as a function of an array, and in C.
+    """A reduction of a column over the last dimension: its title, as a function of an array, and in C.
 
     In C each lane starts with `begin` and takes up each value by `take`, where ``{a}`` is the lane, ``{y}`` the
     value, ``{one}`` 1 for a lane that counts and 0 for one that does not, and ``{limit}`` the limit of a count. The
@@ -27,7 +27,7 @@ class Reduction:
     ``{a}``, and of the number of values, ``{n}``.
     """
 
-    words: str
+    title: str
     of_array: Callable[..., Any]
     begin: str
     take: str

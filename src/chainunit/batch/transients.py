@@ -220,7 +220,7 @@ class Transients:
         room = x.shape[-1]
         arrays = [
             self._uniform(parameters, inputs),
-            self._given(varying, directions, runs),
+            self._run_values(varying, directions, runs),
             self._filled(signals if self._driven else 0.0, runs, len(self._driven), 1 + 3 * self._changes),
             self._filled(begin, runs),
             self._filled(stop, runs),
@@ -254,11 +254,11 @@ class Transients:
         """The values of all runs, filled up to whole vectors by the values of the last run; a new array of the shape
         (*shape, lanes)."""
         full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
-        more = np.repeat(full[..., -1:], -runs % self._loop.lanes, -1)
-        return np.ascontiguousarray(np.concatenate([full, more], -1))
+        padding = np.repeat(full[..., -1:], -runs % self._loop.lanes, -1)
+        return np.ascontiguousarray(np.concatenate([full, padding], -1))
 
-    def _given(self, varying: Any, directions: Any, runs: int) -> Any:
-        """The values that runs have for themselves: varying parameters, and directions."""
+    def _run_values(self, varying: Any, directions: Any, runs: int) -> Any:
+        """The constant values that differ between runs: varying parameters, then directions."""
         parts = [(varying, len(self._varying)), (directions, len(self._by))]
         return np.concatenate([self._filled(x if n else 0.0, runs, n) for x, n in parts])
 

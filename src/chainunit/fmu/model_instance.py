@@ -88,8 +88,8 @@ class ModelInstance:
         self._p: list[float] | None = None
         self._derived: Sequence[float] | None = None
         """from the fixed parameters, which do not change after the initialization"""
-        self._more: tuple[Sequence[float], ...] = ()
-        """the last argument of the model's functions, if they take it"""
+        self._derived_argument: tuple[Sequence[float], ...] = ()
+        """the derived values as the last argument of the model's functions; empty if the model has none"""
         self._x: Sequence[float] = ()  # empty before the start of the states
         self._pace = 0.0  # next substep of an integrator that controls its error
         self._closed = False
@@ -175,7 +175,7 @@ class ModelInstance:
         return True
 
     def _integrate(self, run: list[tuple[int, float, float]], step: float) -> list[float]:
-        p, more, model = self._p, self._more, self.model
+        p, derived, model = self._p, self._derived_argument, self.model
         still = self._inputs()
 
         def inputs(since: float) -> list[float]:
@@ -188,11 +188,11 @@ class ModelInstance:
             return values
 
         def rates(since: float, x: Sequence[float]) -> Sequence[float]:
-            derivatives: Sequence[float] = model.derivatives(p, inputs(since), x, *more)
+            derivatives: Sequence[float] = model.derivatives(p, inputs(since), x, *derived)
             return derivatives
 
         def close(since: float, x: Sequence[float]) -> Sequence[float]:
-            states: Sequence[float] = model.closed(p, inputs(since), x, *more)
+            states: Sequence[float] = model.closed(p, inputs(since), x, *derived)
             return states
 
         (longest,), most = model.internal_step(p), self._now[model.MAX_STEPS]
@@ -272,7 +272,7 @@ class ModelInstance:
         """Evaluate the outputs among these variables; why they have no values, or an empty text."""
         try:
             self._known, outputs, function = _evaluation(self.model, references)
-            values = function(self._p, self._inputs(), self._x, *self._more)
+            values = function(self._p, self._inputs(), self._x, *self._derived_argument)
             # the sum of finite numbers is finite, except of the largest, and takes a third of the time
             if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
                 raise ArithmeticError
@@ -316,9 +316,9 @@ class ModelInstance:
             p[:] = [v.within_bounds(x) for v, x in zip(self.settable, p, strict=False)]
             if model.DERIVED:
                 derived = model.derive(p) if derived is None else derived
-                self._more = (derived,)
+                self._derived_argument = (derived,)
             if model.REQUIRED:
-                self._check(model.REQUIRED, model.requirements(p, *self._more))
+                self._check(model.REQUIRED, model.requirements(p, *self._derived_argument))
             self._derived = derived
         except BaseException as reason:
             return str(reason) or repr(reason)
@@ -345,7 +345,7 @@ class ModelInstance:
                     z = model.improved(p, u, z)
             x = model.initial(p, u, z)
             if model.START_REQUIRED:
-                self._check(model.START_REQUIRED, model.start_limits(p, u, x, *self._more))
+                self._check(model.START_REQUIRED, model.start_limits(p, u, x, *self._derived_argument))
             if not all(map(math.isfinite, x)):
                 raise _RefusedError(messages.NO_OUTPUT.format(model=model.NAME, time=self._time))
             self._x, self._pace = x, 0.0

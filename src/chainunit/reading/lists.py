@@ -177,24 +177,24 @@ class TableList:
         tables: Iterable[Any],
         faults: Faults,
         read: Callable[[Entry, str], T],
-        known: Collection[str] | None = None,
+        names: Collection[str] | None = None,
         fixed: Mapping[str, str] | None = None,
         usual: str = "",
     ) -> dict[str, T]:
         """The results of `read` by the names of the entries, for those without a fault; the faults of the others go
-        to `faults`. The names are `known` ones, or any; `fixed` has the reasons against further names. An entry
-        without a name has the name `usual`, which its number follows."""
-        names: set[str] = set()
+        to `faults`. The allowed `names` are these, or any; `fixed` has the reasons against further names. An entry
+        without a name has the name `usual` with its number."""
+        present: set[str] = set()
 
         def named_result(entry: Entry, number: int) -> tuple[str, T]:
             prefix = f"{entry.place}."
             entry.raw = given_values(read_table(self.form(prefix), entry.given, prefix))
             name = entry.given.get(self.named_by, usual and f"{usual}{number}")
-            self._check(entry, name, known, fixed or {})
+            self._check(entry, name, names, fixed or {})
             entry.refuse()
-            if name in names:
+            if name in present:
                 entry.wrong(self.named_by, name, self.is_twice)
-            names.add(name)
+            present.add(name)
             return name, read(entry, name)
 
         return dict(read_entries(enumerate(tables, 1), self.name, faults, named_result))

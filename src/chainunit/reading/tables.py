@@ -116,7 +116,7 @@ class UnusualValue:
     meant: str | None = part("the probable value, in the form of a study file")
 
     @classmethod
-    def of(cls, variable: Variable, entry: Any, value: float) -> UnusualValue | None:
+    def of_entry(cls, variable: Variable, entry: Any, value: float) -> UnusualValue | None:
         """The unusual `value` of a variable, which a file has as `entry`; None for a usual one."""
         if variable.quantity.is_usual(value):
             return None
@@ -190,7 +190,9 @@ def unusual_values(
                 if entry is None and not quantity.is_usual(start):
                     template = f"{variable.template}; not in the file"
                     yield UnusualValue(dataclasses.replace(variable, template=template), start, "", None)
-            if entry is not None and (value := UnusualValue.of(variable, entry, to_number(variable, entry))):
+            if entry is not None and (
+                value := UnusualValue.of_entry(variable, entry, to_number(variable, entry))
+            ):
                 yield value
 
 
