@@ -281,12 +281,12 @@ def _compiled(
     changes: int,
     compiler: Compiler,
 ) -> _NativeLoop:
-    """The compiled loop."""
+    """The compiled loop of a model, see `Transients`."""
     operations = _operations(model, outputs, by)
     assert model.state_layout is not None
     sides = 2 if by else 1
     states = model.state_layout.variables * sides
-    count = len(varying) + len(by)
+    constants = len(varying) + len(by)
     entries = [
         *((0, k) for k in find(varying, model.parameter_layout.names, "parameter")),
         *((3, k) for k in range(len(by))),
@@ -295,18 +295,17 @@ def _compiled(
     ]
     find(guarded, outputs, "output that is kept")
     code = VectorCode(operations, entries)
-    sizes = len(model.parameter_layout.names), len(model.input_layout.names)
     places = {entry: k for k, entry in enumerate(entries)}
-    put = []
-    for column, entry in enumerate(code.columns):
+
+    def argument(entry: tuple[int, int]) -> str:
+        """The vector of an argument that differs between runs: a constant of each run, a signal, or a state."""
         k = places[entry]
-        if k < count:
-            put.append(f"a[{column}] = b->given[{k}];")
-        elif k < count + len(driven):
-            offset = (k - count) * (1 + 3 * changes)
-            put.append(f"a[{column}] = signal_at(b->signal + {offset} * b->runs, b->runs, t);")
-        else:
-            put.append(f"a[{column}] = x[{entry[1]}];")
+        if k < constants:
+            return f"b->given[{k}]"
+        if k < constants + len(driven):
+            return f"signal_at(b->signal + {(k - constants) * (1 + 3 * changes)} * b->runs, b->runs, t)"
+        return f"x[{entry[1]}]"
+
     guards = [
         f"if (fabs(y[{outputs.index(name)}][l]) > limit[{k} * runs + r + l]) ends = 1;"
         for k, name in enumerate(guarded)
@@ -314,21 +313,21 @@ def _compiled(
     defines = {
         "STATES": len(states),
         "ROWS": len(outputs) * sides,
-        "PARAMS": count,
+        "PARAMS": constants,
         "COLUMNS": len(code.columns),
         "ROOM": code.room,
         "CHANGES": changes,
         "SIGNALS": len(driven),
         "METHOD": _method(model),
-        "PUT": " ".join(put),
+        "PUT": " ".join(f"a[{k}] = {argument(entry)};" for k, entry in enumerate(code.columns)),
         "GUARDED": " ".join(guards),
     }
-    constants = STEP_NUMBERS | {"NOMINAL": tuple(v.quantity.nominal or 1.0 for v in states)}
+    numbers = STEP_NUMBERS | {"NOMINAL": tuple(v.quantity.nominal or 1.0 for v in states)}
     source = "\n".join(
         [
             header(),
             *(f"#define {name} {value}" for name, value in defines.items()),
-            *(constant(name, value) for name, value in constants.items()),
+            *(constant(name, value) for name, value in numbers.items()),
             code.uniform(),
             code.body("rates", (0,)),
             code.body("results", (1,)),
@@ -336,11 +335,10 @@ def _compiled(
             c_file("transients.h", __package__),
         ]
     )
-    names = [v.name for v in arguments_of(model)]
-    starts = (0, sizes[0], sum(sizes))
+    layouts = model.parameter_layout, model.input_layout
+    uniform = [layouts[kind].names[k] for kind, k in code.inputs]
     files = {STEP: c_file(STEP)}
     digest = hashlib.sha256((source + files[STEP]).encode()).hexdigest()
-    uniform = [names[starts[kind] + k] for kind, k in code.inputs]
     return _NativeLoop(digest, load(source, compiler, files), uniform)
 
 

@@ -249,34 +249,37 @@ _LETTERS = "abcdefghijlmnoqrstvABCDEFGHIJKLMNOPQRSTUVWXYZ"
 def _renamed(
     lines: Sequence[str], results: Sequence[str], usual: dict[Any, list[int]]
 ) -> tuple[str, list[str]]:
-    """The statements and texts with few names, each used again when nothing needs its value. A value has a name that
-    one of a statement like this had, its `usual` ones, if one is free: operations that stand again and again have
-    texts that a packer finds again."""
-    whole = [*lines, *results]
-    last = {name: n for n, line in enumerate(whole) for name in _NAME.findall(line)}
+    """The statements and texts with few short names, each used again as soon as nothing needs its value.
+
+    `usual` has the numbers of the names that statements of the same form had, by the form and the one before it. A
+    value takes one of them if it is free: statements that stand again and again then have equal texts, which a packer
+    finds.
+    """
+    texts = [*lines, *results]
+    last_use = {name: n for n, text in enumerate(texts) for name in _NAME.findall(text)}
     forms = ["", *(_NAME.sub("", line) for line in lines)]
-    names: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     busy: set[int] = set()
-    for n, line in enumerate(whole):
-        used = _NAME.findall(line)
-        new = used.pop(0) if line.startswith("$") and n < len(lines) else ""
-        busy.difference_update(names[name] for name in used if last[name] == n)
+    for n, text in enumerate(texts):
+        used = _NAME.findall(text)
+        new = used.pop(0) if text.startswith("$") and n < len(lines) else ""
+        busy.difference_update(numbers[name] for name in used if last_use[name] == n)
         if new:
             candidates = usual.setdefault((forms[n], forms[n + 1]), [])
-            names[new] = next(k for k in chain(candidates, count(min(len(usual), _NAMES))) if k not in busy)
-            if names[new] not in candidates:
-                candidates.append(names[new])
-            if last[new] > n:
-                busy.add(names[new])
-        whole[n] = _NAME.sub(lambda match: _short(names[match[0]]), line)
-    head = f"let {','.join(map(_short, sorted(set(names.values()))))};" if names else ""
-    return head + "".join(f"{line};" for line in whole[: len(lines)]), whole[len(lines) :]
+            numbers[new] = next(k for k in chain(candidates, count(min(len(usual), _NAMES))) if k not in busy)
+            if numbers[new] not in candidates:
+                candidates.append(numbers[new])
+            if last_use[new] > n:
+                busy.add(numbers[new])
+        texts[n] = _NAME.sub(lambda match: _short(numbers[match[0]]), text)
+    head = f"let {','.join(map(_short, sorted(set(numbers.values()))))};" if numbers else ""
+    return head + "".join(f"{text};" for text in texts[: len(lines)]), texts[len(lines) :]
 
 
 def _short(n: int) -> str:
     """The name of a value by its number."""
-    more, first = divmod(n, len(_LETTERS))
-    return _LETTERS[first] + (str(more) if more else "")
+    digits, letter = divmod(n, len(_LETTERS))
+    return _LETTERS[letter] + (str(digits) if digits else "")
 
 
 def _form(kind: str) -> str:
@@ -309,10 +312,12 @@ def _elementary() -> str:
             return _number(operation.value) if operation.kind == NUMBER else f"x{operation.entry[1]}"
 
         lines, values = _statements(traced.items, range(len(traced.items)), outside, {}, traced.results, {})
-        first, *other = values
-        also = "".join(f"second[0]={value};" for value in other)
+        first, *rest = values
+        second = "".join(f"second[0]={value};" for value in rest)
         names = ",".join(f"x{n}" for n in range(arguments))
-        texts[function.__name__] = f"function {function.__name__}({names}){{{lines}{also}return {first};}}\n"
+        texts[function.__name__] = (
+            f"function {function.__name__}({names}){{{lines}{second}return {first};}}\n"
+        )
     return "".join(texts.values())
 
 

@@ -15,12 +15,12 @@ from ...core.printing.c_elementary import HEADER
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
-_KERNELS, _KERNELS_OBJECT, _HEADERS = "kernels.c", "kernels.o", ("model.h", HEADER)
+KERNELS, _KERNELS_OBJECT, HEADERS = "kernels.c", "kernels.o", ("model.h", HEADER)
 
 
 def units_of(fmi: int) -> tuple[str, ...]:
     """The names of the sources that are compiled, for that version of FMI; they include the others."""
-    return _KERNELS, "model.c", f"fmi{fmi}.c"
+    return KERNELS, "model.c", f"fmi{fmi}.c"
 
 
 @dataclass(frozen=True)
@@ -154,13 +154,13 @@ def _compile(
     for any start values."""
     options = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
     flags = (*options, *_FLAGS)
-    kernels = {name: sources[name] for name in (_KERNELS, *_HEADERS)}
+    kernels = {name: sources[name] for name in (KERNELS, *HEADERS)}
     object_code = compile_code(
-        compiler, (*flags, "-c", _KERNELS, "-o", _KERNELS_OBJECT), kernels, _KERNELS_OBJECT
+        compiler, (*flags, "-c", KERNELS, "-o", _KERNELS_OBJECT), kernels, _KERNELS_OBJECT
     )
-    rest = {name: text for name, text in sources.items() if name != _KERNELS}
+    rest = {name: text for name, text in sources.items() if name != KERNELS}
     library = identifier + target_platform.suffix
-    arguments = (*flags, *(name for name in units if name != _KERNELS), _KERNELS_OBJECT, "-o", library)
+    arguments = (*flags, *(name for name in units if name != KERNELS), _KERNELS_OBJECT, "-o", library)
     link = (*_SHARED, *target_platform.link_options)
     return compile_code(compiler, (*arguments, *link), rest | {_KERNELS_OBJECT: object_code}, library)
 
