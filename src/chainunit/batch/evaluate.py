@@ -221,7 +221,11 @@ class Memory:
 
 
 class Grid:
-    """The states of a batch: arguments over named dimensions."""
+    """The states of a batch: arguments over named dimensions.
+
+    `sizes` are the lengths of the dimensions, `dims` their names, last the one that is reduced or the longest; `size`
+    is the number of states over the outer dimensions, and over the inner one.
+    """
 
     def __init__(
         self,
@@ -367,7 +371,8 @@ class Grid:
         traced = self._equations
         if not self.size[0]:
             return
-        entries = self._entries()
+        places = [(kind, k) for kind, size in enumerate(traced.sizes) for k in range(size)]
+        entries = dict(zip(places, self._arguments, strict=True))
         if (kernel := self._kernel(entries)) is not None:
             kernel(
                 [entries[e][:, 0].copy() for e in kernel.inputs],
@@ -397,11 +402,6 @@ class Grid:
                 reduced = column.of_array(states.results[column.place])
             for result in reduced:
                 next(rows)[...] = np.where(memory.reason == 0, result, np.nan)
-
-    def _entries(self) -> dict[tuple[int, int], Any]:
-        sizes = self._equations.sizes
-        entries = [(kind, k) for kind, size in enumerate(sizes) for k in range(size)]
-        return dict(zip(entries, self._arguments, strict=True))
 
     def _kernel(self, entries: Mapping[tuple[int, int], Any]) -> Any:
         """The compiled loop of the engine; None if numpy computes."""

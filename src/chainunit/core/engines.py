@@ -116,7 +116,7 @@ def slope(x: Any) -> Any:
 
 
 class _DualEngine(SimpleNamespace):
-    pass
+    """An engine on dual numbers."""
 
 
 def dual(xp: Any) -> SimpleNamespace:
@@ -135,6 +135,8 @@ def dual(xp: Any) -> SimpleNamespace:
         )
 
     def lift(f: Any, df: Any) -> Any:
+        """A function of one argument for dual numbers; `df` gives its slope from the argument and the value."""
+
         def g(x: Any) -> Any:
             if isinstance(x, Dual):
                 y = f(x.v)
@@ -148,9 +150,6 @@ def dual(xp: Any) -> SimpleNamespace:
             return xp.atan2(y, x)
         yv, xv = value(y), value(x)
         return Dual(xp.atan2(yv, xv), (xv * slope(y) - yv * slope(x)) / (xv * xv + yv * yv))
-
-    def absolute(x: Any) -> Any:
-        return maximum(x, -x)
 
     def minimum(a: Any, b: Any) -> Any:
         if not (isinstance(a, Dual) or isinstance(b, Dual)):
@@ -172,7 +171,7 @@ def dual(xp: Any) -> SimpleNamespace:
         exp=lift(xp.exp, lambda v, y: y),
         log=lift(xp.log, lambda v, y: 1.0 / v),
         atan2=atan2,
-        abs=absolute,
+        abs=lambda x: maximum(x, -x),
         minimum=minimum,
         maximum=maximum,
     )

@@ -201,14 +201,12 @@ def printable(text: str, most: int = 200) -> str:
     directions of writing), and invisible ones, are written as escapes. Beyond `most` characters the end is
     left out."""
     line = "".join(
-        x if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs" else _escape(x)
+        x
+        if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs"
+        else x.encode("unicode_escape").decode()
         for x in text[:most]
     )
     return line if len(text) <= most else f"{line}... ({len(text) - most} more characters)"
-
-
-def _escape(character: str) -> str:
-    return character.encode("unicode_escape").decode()
 
 
 _LETTERS, _ENTRIES, _DEPTH = 60, 4, 2

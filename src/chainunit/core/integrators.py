@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 
 MAX_STEPS = "solver.max_steps"
-"""Full name of the parameter `chainunit.core.solver.Solver.max_steps`."""
+"""Full name of the parameter `chainunit.core.ports.Solver.max_steps`."""
 
 
 SAME_TIME, ROUNDED, ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53

@@ -31,16 +31,11 @@ class Trace:
     derivatives: list[Any]
 
     @cached_property
-    def further_quantities(self) -> list[tuple[Variable, Any]]:
-        """The quantities beside the outputs, see `Model.further_quantities`."""
-        names = (v.name for v in outputs_of(self.model))
-        outputs = dict(zip(names, self.outputs, strict=True))
-        return self.model.further_quantities(casadi_(), self.p, self.u, self.x, outputs)
-
-    @cached_property
     def columns(self) -> dict[str, tuple[Variable, Any]]:
-        """By name, all outputs and further quantities, each with its declaration and its value."""
-        pairs = [*zip(outputs_of(self.model), self.outputs, strict=True), *self.further_quantities]
+        """By name, all outputs and `Model.further_quantities`, each with its declaration and its value."""
+        pairs = list(zip(outputs_of(self.model), self.outputs, strict=True))
+        outputs = {variable.name: value for variable, value in pairs}
+        pairs += self.model.further_quantities(casadi_(), self.p, self.u, self.x, outputs)
         return {variable.name: (variable, value) for variable, value in pairs}
 
     @cached_property

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 from .integrators import MAX_STEPS
 from .model import Model, Requirement, Terminal
+from .ports import Solver
 from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
-from .solver import Solver
 
 _SOLVER = MAX_STEPS.partition(".")[0]
 RESERVED = (_SOLVER, "derived", "of_components")

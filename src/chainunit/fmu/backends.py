@@ -60,42 +60,29 @@ def export(
         raise InputError(f"backend = {shown(backend)}: must be {one_of(backend, get_args(Backend))}")
     if names not in get_args(Names):
         raise InputError(f"names = {shown(names)}: must be {one_of(names, get_args(Names))}")
-    if backend == "python":
-        return _by_python(model, file, start, names, fmi, platforms, "")
+    reason = ""
     if backend is None and not platforms and not targets.compiles(fmi):
-        return _by_python(model, file, start, names, fmi, platforms, ", no C compiler for this machine found")
-    built, compiler = targets.choose(platforms, fmi)
-    try:
-        native.export(model, file, start, fmi=fmi, platforms=platforms, names=names, progress=progress)
-    except WriteError:
-        raise
-    except RunError:
-        if backend or fmi != 2 or platforms:
+        reason = ", no C compiler for this machine found"
+    elif backend != "python":
+        built, compiler = targets.choose(platforms, fmi)
+        text = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
+        if platforms:
+            text += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
+        elif backend is None:
+            text += ", the C compiler found here"
+        try:
+            native.export(model, file, start, fmi=fmi, platforms=platforms, names=names, progress=progress)
+            return Origin("native", text)
+        except WriteError:
             raise
-        return _by_python(
-            model, file, start, names, fmi, platforms, f", the C compiler {compiler.name} failed"
-        )
-    text = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
-    if platforms:
-        text += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
-    elif backend is None:
-        text += ", the C compiler found here"
-    return Origin("native", text)
-
-
-def _by_python(
-    model: Model,
-    file: Path,
-    start: dict[str, float] | None,
-    names: Names,
-    fmi: int,
-    platforms: Sequence[str],
-    why: str,
-) -> Origin:
+        except RunError:
+            if backend or fmi != 2 or platforms:
+                raise
+            reason = f", the C compiler {compiler.name} failed"
     if fmi != 2:
         raise InputError(f"fmi 3 needs the native backend, that is a C compiler ({COMPILERS})")
     if platforms:
         raise InputError("platforms: need the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start, names=names)
-    text = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
+    text = f"FMI 2.0 Co-Simulation, by pythonfmu{reason}; needs Python 3.11 in the importing process"
     return Origin("python", text)

@@ -152,8 +152,7 @@ class BatchStore:
 
     def _declare(self, file: Any) -> None:
         job = self.job
-        about = {"title": job.title, "source": f"chainunit {__version__}", "declaration": job.layout}
-        file.setncatts(about)
+        file.setncatts({"title": job.title, "source": f"chainunit {__version__}", "declaration": job.layout})
         file.createDimension(job.dimension, self._points)
         file.createDimension("batch", -(-self._points // job.batch))
         for v in job.variables:
@@ -161,8 +160,8 @@ class BatchStore:
             if v.letters:
                 file.createDimension(dims[1], v.letters)
             file.createVariable(v.name, "S1" if v.letters else v.dtype, dims).setncatts(v.attributes)
-        about = {"units": "1", "long_name": "CRC-32 of the values of a batch"}
-        file.createVariable(CHECKS, "u4", ("batch",)).setncatts(about)
+        attributes = {"units": "1", "long_name": "CRC-32 of the values of a batch"}
+        file.createVariable(CHECKS, "u4", ("batch",)).setncatts(attributes)
         # the values as they are
         file.set_auto_maskandscale(False)
         file.set_auto_chartostring(False)
