@@ -146,6 +146,7 @@ def aligned(shape: tuple[int, ...]) -> Any:
 
 
 def _pointers(arrays: Any) -> Any:
+    """The addresses of some arrays, and one more, as C has no empty arrays."""
     if isinstance(arrays, np.ndarray):
         first, step = arrays.ctypes.data, arrays.strides[0]
         return (ctypes.c_void_p * (len(arrays) + 1))(*range(first, first + step * len(arrays), step))

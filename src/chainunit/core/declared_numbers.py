@@ -3,6 +3,7 @@ library such as pint."""
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -40,18 +41,15 @@ def number_of_text(variable: Variable, text: str) -> float:
     ValueError
         in one line, for a text that is no number and a unit of another kind.
     """
-    parts = units.split(text)
-    try:
-        if parts is not None:
-            number, written = parts
-            if set(written) & set("%‰") and not may_be_share(variable):
-                raise ValueError(written)
-            return units.convert(number, written, variable.unit, variable.kind) if written else number
-    except ValueError:
-        pass
+    number, unit = units.split(text) or (None, "")
+    if number is not None and not unit:
+        return number
+    if number is not None and (may_be_share(variable) or not set(unit) & set("%‰")):
+        with contextlib.suppress(ValueError):
+            return units.convert(number, unit, variable.unit, variable.kind)
     is_pure = variable.type != "Real" or (variable.unit == "1" and not may_be_share(variable))
     hint = "" if is_pure else units.spelling(text, variable.unit, variable.kind)
-    kind = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
+    kind = units.of_other_kind(unit, variable.unit) if unit else ""
     kind = f"; {printable(kind)}" if kind else ""
     raise ValueError(f"{variable.name} = {shown(text)}: must be {kind_words(variable)}{kind}{hint}")
 
@@ -66,6 +64,7 @@ def magnitude_and_unit(value: Any) -> tuple[Any, str] | None:
         return value.values, str(attributes["units"])
     if not all(hasattr(value, name) for name in ("magnitude", "units", "to")):
         return None
+    # a unit that only the library knows is converted to its base units
     for quantity in (value, value.to_base_units()):
         unit = f"{quantity.units:~C}" or "1"
         if units.is_unit(unit):

@@ -323,6 +323,7 @@ class Model:
         return p
 
     def _meets(self, p: Any, requirements: tuple[Requirement, ...], limits: Limits) -> None:
+        """Refuse the first requirement whose value is not between its limits."""
         for requirement, (value, low, high) in zip(requirements, limits, strict=True):
             if not low < value < high:
                 complaint = requirement.refusal(value, low, high, self.parameter_layout.by_name(p))

@@ -465,6 +465,8 @@ class Layout:
 
 
 def _plan(cls: type, i: int) -> tuple[tuple[type, list[tuple[str, Any]]], int]:
+    """The class of a declaration, and for each field the place of its value, from `i` on, or the plan of its group;
+    and the place after the last one."""
     steps: list[tuple[str, Any]] = []
     for field in dataclasses.fields(cls):
         if "quantity" in field.metadata:
@@ -477,6 +479,7 @@ def _plan(cls: type, i: int) -> tuple[tuple[type, list[tuple[str, Any]]], int]:
 
 
 def _build(plan: tuple[type, list[tuple[str, Any]]], values: Any) -> Any:
+    """The instance of a `_plan` with these values."""
     cls, steps = plan
     return cls(
         **{name: values[step] if isinstance(step, int) else _build(step, values) for name, step in steps}

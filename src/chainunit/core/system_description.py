@@ -141,6 +141,7 @@ class SystemDescription:
         return declared_class("FurtherOutputs", (), fields) if fields else None
 
     def _member(self, name: str, model: Model, inputs: Iterable[str], common: Mapping[str, str]) -> Member:
+        """A component, from the inputs that are connected or left out and the parameters that are `common`."""
         parameters = [f"{name}.{parameter}" for parameter in model.parameter_layout.names]
         taken = [f"{name}.{variable}" for variable in model.input_layout.names]
         return Member(

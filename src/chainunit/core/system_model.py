@@ -240,6 +240,7 @@ def _sizes(description: SystemDescription) -> dict[str, float]:
 
 
 def _new_model(description: SystemDescription) -> SystemModel:
+    """The model of a description: all it has by the names of its components."""
     data, models = description.data, description.models.values()
     by_differences = description.by_differences()
     return SystemModel(

@@ -166,6 +166,7 @@ def dimension(unit_text: str) -> dict[str, int]:
 
 
 def _dimension(factors: Sequence[tuple[str, int]]) -> dict[str, int]:
+    """The exponents of the SI base units, without angles, of names of `UNITS` with their powers."""
     exponents = dict.fromkeys(SI, 0)
     for name, power in factors:
         for base, exponent in UNITS[name].base.items():

@@ -467,6 +467,7 @@ def _unit(unit: str) -> dict[str, str]:
 
 
 def _attributes(signal: Signal, description: str) -> dict[str, str]:
+    """The attributes of a variable that do not depend on its type."""
     q = signal.variable.quantity
     if signal.causality == "parameter":
         variability = "tunable" if q.tunable else "fixed"

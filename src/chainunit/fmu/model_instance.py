@@ -82,7 +82,8 @@ class ModelInstance:
         self._now = [v.start for v in self.settable] + [NAN] * (count - self.first_state)
         ends = self.first_state, self.first_output, count
         self._settable, self._states, self._all = (frozenset(range(end)) for end in ends)
-        self._known = self._settable
+        self._current = self._settable
+        """the variables whose values in `_now` are up to date"""
         self._read, self._growths = self._states, 0
         """the outputs that were read, with all other variables, and how often outputs were added"""
         self._p: list[float] | None = None
@@ -147,6 +148,7 @@ class ModelInstance:
         return False
 
     def _bad_step(self, time: float, size: float) -> str:
+        """Why a step cannot be taken from the present time; else an empty text."""
         if not (math.isfinite(time) and 0.0 <= size < math.inf and time + size < math.inf):
             return messages.STEP_SIZE.format(size=size, time=time)
         if abs(time - self._time) > SAME_TIME * size + ROUNDED * abs(self._time):
@@ -175,6 +177,7 @@ class ModelInstance:
         return True
 
     def _integrate(self, run: list[tuple[int, float, float]], step: float) -> list[float]:
+        """The states after a step [s]; `run` are the inputs that move in it, see `_running`."""
         p, derived, model = self._p, self._derived_argument, self.model
         still = self._inputs()
 
@@ -231,6 +234,7 @@ class ModelInstance:
             self._take(reference, value)
 
     def _take(self, reference: int, value: float) -> None:
+        """Set a parameter: all that follows from it is computed anew."""
         self._now[reference] = value
         self._p = None
         self._start_anew()
@@ -243,16 +247,17 @@ class ModelInstance:
 
     def values(self, references: Sequence[int]) -> list[float]:
         """The values of these variables; outputs are evaluated at most once per state."""
-        if not self._known.issuperset(references):
+        if not self._current.issuperset(references):
             self._evaluate(references)
         now = self._now
         return [now[i] for i in references]
 
     def _evaluate(self, references: Sequence[int]) -> None:
+        """Evaluate these variables and the outputs that were read before; all are NaN if the model has a fault."""
         bad = self.prepare()
         count = self.first_output - self.first_state
         self._now[self.first_state : self.first_output] = [NAN] * count if bad else self._x
-        self._known = self._states
+        self._current = self._states
         if self._states.issuperset(references):
             return
         bad = bad or self._bad_input()
@@ -266,12 +271,12 @@ class ModelInstance:
         if bad:
             self.tell(bad)
             self._now[self.first_output :] = [NAN] * len(self.model.OUTPUTS)
-            self._known = self._all
+            self._current = self._all
 
     def _fault(self, references: frozenset[int]) -> str:
         """Evaluate the outputs among these variables; why they have no values, or an empty text."""
         try:
-            self._known, outputs, function = _evaluation(self.model, references)
+            self._current, outputs, function = _evaluation(self.model, references)
             values = function(self._p, self._inputs(), self._x, *self._derived_argument)
             # the sum of finite numbers is finite, except of the largest, and takes a third of the time
             if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
@@ -287,7 +292,7 @@ class ModelInstance:
     def _touch(self) -> None:
         """Mark all outputs for a new evaluation."""
         self._closed = False
-        self._known = self._settable
+        self._current = self._settable
 
     def prepare(self) -> str:
         """Check the parameters and start the states, after a change of either. Returns why they make no model, or an
@@ -354,6 +359,7 @@ class ModelInstance:
             self.tell(self._unstarted)
 
     def _bad_experiment(self) -> str:
+        """Why the start and the stop time are not allowed; else an empty text."""
         if not math.isfinite(self._time):
             return messages.TIME.format(which="start time", time=self._time)
         if not self._time <= self._stop:
@@ -373,6 +379,7 @@ class ModelInstance:
         return [row for row in rows if row[1] or row[2]]
 
     def _bad_input(self) -> str:
+        """The refusal of the first input that is not allowed; else an empty text."""
         for reference in sorted(self._doubtful):
             if not self.settable[reference].admits(self._now[reference]):
                 return f"input {self.settable[reference].complaint(self._now[reference])}"

@@ -42,6 +42,7 @@ def interface_of(
 
 
 def _refuse_same_names(interface: Interface) -> None:
+    """Refuse variables with one name in the FMU."""
     by_name: dict[str, list[str]] = {}
     for signal in interface.signals:
         by_name.setdefault(signal.name, []).append(signal.variable.name)

@@ -166,6 +166,7 @@ def as_data(x: Any, *, titled: bool = False, driver: str = USUAL_DRIVER) -> Any:
 
 
 def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
+    """The data of a value, a number in this unit or, without a unit, a result."""
     if isinstance(x, InUnit):
         return _number(x.value, x.unit, x.kind) | ({"title": x.title} if x.title else {})
     if isinstance(x, Estimate):
@@ -192,6 +193,7 @@ def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
 
 
 def _table(x: Any, titled: bool, driver: str) -> dict[str, Any]:
+    """The data of a result: its parts by name."""
     data: dict[str, Any] = {}
     result_type: Any = type(x)
     for member in parts(result_type):
@@ -212,6 +214,7 @@ def _table(x: Any, titled: bool, driver: str) -> dict[str, Any]:
 
 
 def _number(x: Any, unit: str, kind: str) -> dict[str, Any]:
+    """The entry of a number or an array."""
     is_array = isinstance(x, list | tuple) or bool(getattr(x, "ndim", 0))
     if is_array:
         return array_entry(x, unit, kind)

@@ -87,8 +87,7 @@ def option_value(name: str, text: str, unit: str, description: str, most: float 
     """
     parts = units.split(text)
     if parts is not None and parts[0] and not parts[1]:
-        others = {"rad/s": ("rev/min", "rad/s"), "m/s": ("m/s", "mm/s")}.get(unit, (unit.replace(".", " "),))
-        examples = " or ".join(f'"{parts[0]:g} {other}"' for other in others)
+        examples = " or ".join(f'"{parts[0]:g} {symbol}"' for symbol in units.fitting(unit)[:2])
         raise InputError(f"{name} {printable(text)}: has no unit; give it as {examples}")
     quantity = Quantity(unit, description, low=0.0, open_low=True, high=most)
     if parts is not None and parts[1] and not units.converts(parts[1], unit):
@@ -281,6 +280,7 @@ def _path(error: ErrorDetails) -> list[str]:
 
 
 def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
+    """The refusal of a value by pydantic in one line of our words."""
     path = error["loc"]
     full_name = prefix + printable(".".join(_path(error)), 80)
     if error["type"] == "extra_forbidden":
@@ -421,6 +421,7 @@ def text_faults(data: Any) -> list[InputError]:
 
 
 def _wrong_texts(data: Any, key: str) -> Iterator[InputError]:
+    """See `text_faults`; `key` is the full name of the data."""
     if isinstance(data, Mapping):
         for name, value in data.items():
             inner = f"{key}.{name}" if key else str(name)

@@ -185,6 +185,7 @@ def digits_text(value: float, digits: int = 3, *, full: bool = True) -> str:
 
 
 def _share(value: float, kind: str, digits: int, full: bool) -> tuple[str, str]:
+    """A share as the number, or words in its place, and the sign that follows it."""
     if kind == "dip" and value >= 0.995:
         return "stands" if value < 1.005 else "turns back", ""
     if abs(value) < _NOTHING:

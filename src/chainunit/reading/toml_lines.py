@@ -101,6 +101,7 @@ def _heading(data: Mapping[str, Any], numbers: dict[str, int]) -> str:
 
 
 def _names(data: Mapping[str, Any], prefix: str) -> Iterator[str]:
+    """The full names of all keys in a table, also of inner ones; entries of lists count from 1."""
     for key, value in data.items():
         yield prefix + key
         if isinstance(value, Mapping):

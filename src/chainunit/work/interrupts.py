@@ -74,6 +74,7 @@ def remembered() -> Iterator[None]:
 
 
 def _on_signal(number: int, frame: Any) -> None:
+    """The handler of the signals."""
     again = number in _received
     _received.append(number)
     if not _state["held"]:
@@ -91,6 +92,7 @@ def _on_lost(lost: Any) -> None:
 
 
 def _raise_again(number: int) -> None:
+    """Send this process the signal once more, after a pause."""
     time.sleep(_PAUSE)
     if _state["held"]:
         return

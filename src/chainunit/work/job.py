@@ -151,6 +151,7 @@ class BatchStore:
                         new[CHECKS][batch] = old[CHECKS][batch]
 
     def _declare(self, file: Any) -> None:
+        """Write the dimensions, the variables and the attributes of an empty file."""
         job = self.job
         file.setncatts({"title": job.title, "source": f"chainunit {__version__}", "declaration": job.layout})
         file.createDimension(job.dimension, self._points)
@@ -168,6 +169,7 @@ class BatchStore:
 
     @contextlib.contextmanager
     def _opened(self, mode: Literal["r", "r+", "w"] = "r", part: Path | None = None) -> Iterator[Any]:
+        """The file of the store, with its values as they are stored."""
         from netCDF4 import Dataset
 
         with writing(self.file), netcdf(), Dataset(part or self.file, mode, format=_FORMAT) as file:

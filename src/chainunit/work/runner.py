@@ -113,6 +113,7 @@ def _finished(store: BatchStore, gaps: list[int], hands: _Hands) -> Iterator[tup
 
 
 def _results(work: Any, task: Any, begin: int, end: int) -> Any:
+    """The results of a batch; an error of `work` becomes a RunError, which passes between processes."""
     try:
         return work(task, begin, end)
     except InterruptedRunError:
@@ -124,6 +125,7 @@ def _results(work: Any, task: Any, begin: int, end: int) -> Any:
 
 
 def _made_here(job: Job, begin: int, end: int) -> Future:
+    """A batch that was made at once, in this process."""
     future: Future = Future()
     try:
         future.set_result(_results(job.work, job.task, begin, end))

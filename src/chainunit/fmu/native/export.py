@@ -109,7 +109,7 @@ def export(
         description = model_description(interface, "", kinds, version, units)
     else:
         description = model_description_3(interface, "", kinds, version)
-    functions, room = kernels(interface)
+    functions, room = kernels(model)
     sources = {name: (recipes() / "native" / name).read_bytes() for name in layer}
     sources |= {"kernels.c": functions.encode(), "rules.h": interface.text(rules()).encode()}
     sources |= {HEADER: header().encode(), STEP: c_file(STEP).encode()}

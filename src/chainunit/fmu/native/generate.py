@@ -23,14 +23,10 @@ from ...core.quantities import Variable
 from ..description import Interface, shared_interface
 
 
-def kernels(interface: Interface) -> tuple[str, int]:
-    """``kernels.c`` with the model's functions, and the memory that they need, as a number of doubles. Start values
-    and the version of FMI do not change them."""
-    return _kernels(interface.model)
-
-
 @lru_cache(maxsize=16)
-def _kernels(model: Model) -> tuple[str, int]:
+def kernels(model: Model) -> tuple[str, int]:
+    """``kernels.c`` with the functions of a model, and the memory that they need, as a number of doubles: the same for
+    all start values and versions of FMI."""
     shared = shared_interface(model)
     programs = [Program(function) for function in kernels_of(shared.trace, shared.derived)]
     table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
