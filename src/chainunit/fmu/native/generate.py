@@ -25,8 +25,8 @@ from ..description import Interface, shared_interface
 
 @lru_cache(maxsize=16)
 def kernels(model: Model) -> tuple[str, int]:
-    """``kernels.c`` with the functions of a model, and the memory that they need, as a number of doubles: the same for
-    all start values and versions of FMI."""
+    """``kernels.c`` with the functions of a model, and the memory that they need, as a number of doubles. They are
+    the same for all start values and versions of FMI."""
     shared = shared_interface(model)
     programs = [Program(function) for function in kernels_of(shared.trace, shared.derived)]
     table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
