@@ -101,8 +101,16 @@ def base_units(unit: str) -> dict[str, int]:
     ValueError
         for an unknown unit name, or more than one stroke.
     """
-    exponents: dict[str, int] = {}
-    parts = unit.split("/")
+    exponents = dict.fromkeys(SI, 0)
+    for name, power in _powers(unit).items():
+        for base, exponent in _NAMED[name].items():
+            exponents[base] += exponent * power
+    return {base: exponent for base, exponent in exponents.items() if exponent}
+
+
+def _powers(unit: str) -> dict[str, int]:
+    """The powers of the names in a unit, in their order; see `base_units` for errors."""
+    parts, powers = unit.split("/"), dict[str, int]()
     if len(parts) > 2:
         raise ValueError(f"unit {unit!r}: must have one stroke at most, as in 'N/(m.s)'")
     for sign, part in zip((1, -1), parts, strict=False):
@@ -110,22 +118,17 @@ def base_units(unit: str) -> dict[str, int]:
             match = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", factor)
             if match is None or match[1] not in _NAMED:
                 raise ValueError(f"unknown unit {factor!r} in {unit!r}")
-            power = sign * int(match[2] or 1)
-            for base, exponent in _NAMED[match[1]].items():
-                exponents[base] = exponents.get(base, 0) + exponent * power
-    return {base: exponents[base] for base in SI if exponents.get(base)}
+            powers[match[1]] = powers.get(match[1], 0) + sign * int(match[2] or 1)
+    return powers
 
 
 def quotient(unit: str, by: str) -> str:
     """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``, an energy by the time -> ``W``."""
     if (unit, by) == ("J", "s"):
         return "W"
-    powers: dict[str, int] = {}
-    for sign, text in ((1, unit), (-1, by)):
-        numerator, _, denominator = text.partition("/")
-        for part_sign, part in ((sign, numerator), (-sign, denominator)):
-            for name, power in re.findall(r"([A-Za-z]+|1)(-?\d*)", part):
-                powers[name] = powers.get(name, 0) + part_sign * int(power or 1)
+    powers = _powers(unit)
+    for name, power in _powers(by).items():
+        powers[name] = powers.get(name, 0) - power
     powers.pop("1", None)
     above = [f"{name}{p if p > 1 else ''}" for name, p in powers.items() if p > 0]
     below = [f"{name}{-p if p < -1 else ''}" for name, p in powers.items() if p < 0]

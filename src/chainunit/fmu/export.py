@@ -49,7 +49,7 @@ def export(
 
     Parameters
     ----------
-    model : the model's class
+    model : the model
     file : path of the FMU; an existing file is replaced, in one step
     start : start values of parameters and inputs, by their names in the model, in place of the declared ones
     names : "structured" for the names of the model, "flat" for underscores in place of their dots

@@ -187,8 +187,7 @@ class TableList:
         present: set[str] = set()
 
         def named_result(entry: Entry, number: int) -> tuple[str, T]:
-            prefix = f"{entry.place}."
-            entry.raw = given_values(read_table(self.form(prefix), entry.given, prefix))
+            self._read_form(entry)
             name = entry.given.get(self.named_by, usual and f"{usual}{number}")
             self._check(entry, name, names, fixed or {})
             entry.refuse()
@@ -206,10 +205,15 @@ class TableList:
         others go to `faults`."""
 
         def named_result(entry: Entry, name: str) -> tuple[str, T]:
-            entry.raw = given_values(read_table(self.form(f"{entry.place}."), entry.given, f"{entry.place}."))
+            self._read_form(entry)
             return name, read(entry, name)
 
         return dict(read_entries(tables.items(), self.name, faults, named_result))
+
+    def _read_form(self, entry: Entry) -> None:
+        """Put the checked values of an entry, by key, in place of its table."""
+        prefix = f"{entry.place}."
+        entry.raw = given_values(read_table(self.form(prefix), entry.given, prefix))
 
     def _check(
         self, entry: Entry, name: str, names: Collection[str] | None, fixed: Mapping[str, str]
