@@ -126,17 +126,7 @@ def file_text(file: Path, most: int = TEXT) -> str:
     InputError
         in one line that begins with the name of the file.
     """
-    return decoded(file, file_bytes(file, most))
-
-
-def decoded(file: Path, data: bytes) -> str:
-    """The text in the content of a file, see `file_text`.
-
-    Raises
-    ------
-    InputError
-        in one line that begins with the name of the file.
-    """
+    data = file_bytes(file, most)
     _refuse_other_kinds(file, data)
     try:
         text = data.decode("utf-8-sig")

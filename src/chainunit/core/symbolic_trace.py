@@ -18,8 +18,7 @@ class Trace:
     """A model in symbols.
 
     `symbols` are the casadi vectors (p, u, x, derived values); `p`, `u` and `x` the same as instances of their
-    declarations, `p` prepared with the derived values; `outputs` the outputs part by part in declared order, and
-    `derivatives` the derivatives of the states.
+    declarations, `p` prepared with the derived values; `derivatives` are the derivatives of the states.
     """
 
     model: Model
@@ -27,8 +26,12 @@ class Trace:
     p: Any
     u: Any
     x: Any
-    outputs: list[Any]
     derivatives: list[Any]
+
+    @cached_property
+    def outputs(self) -> list[Any]:
+        """The outputs part by part in declared order."""
+        return self.outputs_at(self.x)
 
     @cached_property
     def columns(self) -> dict[str, tuple[Variable, Any]]:
@@ -99,5 +102,4 @@ def trace(model: Model) -> Trace:
     u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
     x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
     derivatives = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
-    empty = Trace(model, symbols, p, u, x, [], derivatives)
-    return Trace(model, symbols, p, u, x, empty.outputs_at(x), derivatives)
+    return Trace(model, symbols, p, u, x, derivatives)
