@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 from ..core.engines import casadi_
@@ -43,16 +43,15 @@ class Equations:
         """The reason of a state that meets all requirements and has no finite result."""
         return len(self.model.required) + 1
 
-    @property
-    def sizes(self) -> tuple[int, int, int]:
-        """Numbers of parameters, inputs and states."""
+    @cached_property
+    def entries(self) -> dict[tuple[int, int], Variable]:
+        """The arguments by their entries: parameters (0), inputs (1) or states (2), and the place among them."""
         layouts = (self.model.parameter_layout, self.model.input_layout, self.model.state_layout)
-        p, u, x = (len(layout.names) if layout else 0 for layout in layouts)
-        return p, u, x
-
-    def place(self, entry: tuple[int, int]) -> int:
-        """The place among all arguments of an entry of the parameters (0), inputs (1) or states (2)."""
-        return sum(self.sizes[: entry[0]]) + entry[1]
+        return {
+            (kind, k): v
+            for kind, layout in enumerate(layouts)
+            for k, v in enumerate(layout.variables if layout else ())
+        }
 
 
 def columns_of(model: Model) -> tuple[Variable, ...]:

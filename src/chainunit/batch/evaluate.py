@@ -280,8 +280,8 @@ class Grid:
     @cached_property
     def _needed(self) -> set[str]:
         """The names of the arguments on which the results depend."""
-        places = (x.entry for x in self._equations.operations.items if x.kind == ARGUMENT)
-        return {self._equations.arguments[self._equations.place(entry)].name for entry in places}
+        operations = self._equations.operations.items
+        return {self._equations.entries[x.entry].name for x in operations if x.kind == ARGUMENT}
 
     def _loops(self) -> None:
         """Divide the dimensions into outer ones and the inner one, the longest."""
@@ -371,8 +371,7 @@ class Grid:
         traced = self._equations
         if not self.size[0]:
             return
-        places = [(kind, k) for kind, size in enumerate(traced.sizes) for k in range(size)]
-        entries = dict(zip(places, self._arguments, strict=True))
+        entries = dict(zip(traced.entries, self._arguments, strict=True))
         if (kernel := self._kernel(entries)) is not None:
             kernel(
                 [entries[e][:, 0].copy() for e in kernel.inputs],

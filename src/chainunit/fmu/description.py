@@ -258,8 +258,8 @@ def model_description(
     variables = SubElement(root, "ModelVariables")
     for attributes, kind, typed, state in _variables(interface, exchange):
         # an output that repeats another one has its value reference, but a place of its own
-        if (one := interface.repeated.get(attributes["name"])) is not None:
-            attributes["valueReference"] = str(one.reference)
+        if (original := interface.repeated.get(attributes["name"])) is not None:
+            attributes["valueReference"] = str(original.reference)
         # FMI 2.0 counts variables from 1
         derivative = {} if state is None else {"derivative": str(state + 1)}
         SubElement(SubElement(variables, "ScalarVariable", attributes), kind, {**typed, **derivative})
@@ -299,9 +299,9 @@ def model_description_3(
         tag = TYPES_3[kind]
         elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **typed, **derivative})
     for signal in interface.signals_of("output"):
-        if (one := interface.repeated.get(signal.name)) is not None:
+        if (original := interface.repeated.get(signal.name)) is not None:
             description = interface.text(signal.variable.description)
-            SubElement(elements[one.name], "Alias", name=signal.name, description=description)
+            SubElement(elements[original.name], "Alias", name=signal.name, description=description)
     time = {
         "name": "time",
         "valueReference": str(last + 1),
