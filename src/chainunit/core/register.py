@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, MutableMapping
-from functools import cache, cached_property
+from functools import cache
 from importlib import metadata
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from .errors import InputError, RunError
 
@@ -40,17 +40,14 @@ class Register(MutableMapping[str, Thing]):
 
     def __init__(self, group: str) -> None:
         self._group = group
-
-    @cached_property
-    def _things(self) -> dict[str, Any]:
-        """By name the objects, or the entry points of objects that were not yet taken."""
-        return dict(entries(self._group))
+        self._things: dict[str, Thing] = {}
+        """the objects that were taken or set"""
 
     def __getitem__(self, name: str) -> Thing:
-        if isinstance(entry := self._things[name], metadata.EntryPoint):
+        if name not in self._things:
+            entry = entries(self._group)[name]
             self._things[name] = entry.load()
-        thing: Thing = self._things[name]
-        return thing
+        return self._things[name]
 
     def __setitem__(self, name: str, thing: Thing) -> None:
         self._things[name] = thing
@@ -59,10 +56,10 @@ class Register(MutableMapping[str, Thing]):
         del self._things[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._things
+        return name in self._things or name in entries(self._group)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._things)
+        return iter(dict.fromkeys((*entries(self._group), *self._things)))
 
     def __len__(self) -> int:
-        return len(self._things)
+        return len({*entries(self._group), *self._things})
