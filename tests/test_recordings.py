@@ -413,7 +413,7 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
         (table("t [s],motor.i [A]"), "has no column time [s]"),
         (table("time [s],x [A]"), "has no column of a known quantity, such as motor.i [A], "),
         (table("time [s],motor.i"), "column motor.i: has no unit; write [A] behind its name"),
-        (table("time [s],motor.i [V]"), "column motor.i [V]: V is a voltage; must be a current, such as [A] or [mA]"),
+        (table("time [s],motor.i [V]"), "column motor.i [V]: V is a voltage; must be a current in A or mA"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003,x\n"),
          "line 5, column 2, motor.i [A]: x is no number"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003\n"),
@@ -428,9 +428,9 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
          "its heads are: Zeit [s], Strom [A]; name it by the key columns, such as columns = { \"time\" = \"Zeit\" }"),
         (table("time [s],Strom [A]"),
          "heads are: time [s], Strom [A]; name it by the key columns, such as columns = { \"motor.i\" = \"Strom\" }"),
-        (table("time [s],motor.w [kg]"), "[kg]: kg is a mass; must be a speed, such as [rad/s] or [rev/min]"),
-        (table("time [s],motor.power [kWh]"), "kWh is a torque or an energy; must be a power, such as [W] or [kW]"),
-        (table("time [s],crank.tau [%]"), "[%]: % is a share; must be a torque, such as [N m] or [kN m]"),
+        (table("time [s],motor.w [kg]"), "[kg]: kg is a mass; must be a speed in rev/min, rad/s, Hz or rpm"),
+        (table("time [s],motor.power [kWh]"), "kWh is a torque or an energy; must be a power in kW or W"),
+        (table("time [s],crank.tau [%]"), "[%]: % is a share; must be a torque in N m or kN m"),
         (table("time [s],motor.w [1/s]"), "must have a unit like [rad/s]: no angle is named"),
         (table("time [s],motor.i [Foo]"), "must have a unit like [A]: Foo: is no unit"),
     ],
@@ -448,7 +448,7 @@ def test_all_faults_of_a_head_at_once(tmp_path):
     assert "columns.motor.y: no such quantity" in text and "columns.motor.i = 'Stron': no such column" in text
     assert (
         "column time: has no unit" in text
-        and "column motor.u [A]: A is a current; must be a voltage, such as [V]" in text
+        and "column motor.u [A]: A is a current; must be a voltage in V or kV" in text
     )
     with pytest.raises(InputError, match="cannot be read"):
         read_recording(tmp_path / "absent.csv")

@@ -114,10 +114,10 @@ def _too_large(place: str, most: int, subject: str = "") -> InputError:
     )
 
 
-def regular_bytes(file: Path, most: int = TEXT) -> bytes | None:
+def regular_bytes(file: Path) -> bytes | None:
     """The content of a file; None if `file_bytes` refuses it."""
     try:
-        return file_bytes(file, most)
+        return file_bytes(file)
     except InputError:
         return None
 
@@ -130,17 +130,7 @@ def file_text(file: Path, most: int = TEXT) -> str:
     InputError
         in one line that begins with the name of the file.
     """
-    return decoded(file, file_bytes(file, most))
-
-
-def decoded(file: Path, data: bytes) -> str:
-    """The text in the content of a file, see `file_text`.
-
-    Raises
-    ------
-    InputError
-        in one line that begins with the name of the file.
-    """
+    data = file_bytes(file, most)
     _refuse_other_kinds(file, data)
     try:
         text = data.decode("utf-8-sig")
@@ -308,7 +298,7 @@ def check_archive(source: Path | bytes, name: str, most: int = UNPACKED, kind: s
     Raises
     ------
     InputError
-        in one line that begins with the `name` of the archive; also where it is none of its `kind`.
+        in one line that begins with the `name` of the archive; also if it is none of its `kind`.
     """
     try:
         with source.open("rb") if isinstance(source, Path) else io.BytesIO(source) as stream:

@@ -1,4 +1,4 @@
-"""The choice of the backend for an FMU: native code where there is a C compiler, otherwise Python by pythonfmu."""
+"""The choice of the backend for an FMU: native code if there is a C compiler, otherwise Python by pythonfmu."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ Backend = Literal["native", "python"]
 
 @dataclass(frozen=True)
 class Origin:
-    """The backend that made an FMU, and a text on how and why: `words`."""
+    """The backend that made an FMU, and a `text` on how and why."""
 
     backend: Backend
-    words: str
+    text: str
 
     def __str__(self) -> str:
-        return self.words
+        return self.text
 
 
 def export(
@@ -46,7 +46,7 @@ def export(
     Parameters
     ----------
     model, file, start, names : see `chainunit.fmu.export.export`
-    backend : "native" or "python"; by default native where a C compiler is found and works
+    backend : "native" or "python"; by default native if a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
     platforms, progress : see `chainunit.fmu.native.export.export`; platforms only by the native backend
 
@@ -60,42 +60,29 @@ def export(
     if backend is not None:
         check_choice("backend", backend, get_args(Backend))
     check_choice("names", names, get_args(Names))
-    if backend == "python":
-        return _by_python(model, file, start, names, fmi, platforms, "")
+    reason = ""
     if backend is None and not platforms and not targets.compiles(fmi):
-        return _by_python(model, file, start, names, fmi, platforms, ", no C compiler for this machine found")
-    built, compiler = targets.choose(platforms, fmi)
-    try:
-        native.export(model, file, start, fmi=fmi, platforms=platforms, names=names, progress=progress)
-    except WriteError:
-        raise
-    except RunError:
-        if backend or fmi != 2 or platforms:
+        reason = ", no C compiler for this machine found"
+    elif backend != "python":
+        built, compiler = targets.choose(platforms, fmi)
+        text = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
+        if platforms:
+            text += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
+        elif backend is None:
+            text += ", the C compiler found here"
+        try:
+            native.export(model, file, start, fmi=fmi, platforms=platforms, names=names, progress=progress)
+            return Origin("native", text)
+        except WriteError:
             raise
-        return _by_python(
-            model, file, start, names, fmi, platforms, f", the C compiler {compiler.name} failed"
-        )
-    text = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
-    if platforms:
-        text += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
-    elif backend is None:
-        text += ", the C compiler found here"
-    return Origin("native", text)
-
-
-def _by_python(
-    model: Model,
-    file: Path,
-    start: dict[str, float] | None,
-    names: Names,
-    fmi: int,
-    platforms: Sequence[str],
-    why: str,
-) -> Origin:
+        except RunError:
+            if backend or fmi != 2 or platforms:
+                raise
+            reason = f", the C compiler {compiler.name} failed"
     if fmi != 2:
         raise InputError(f"fmi 3 needs the native backend, that is a C compiler ({COMPILERS})")
     if platforms:
         raise InputError("platforms: need the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start, names=names)
-    text = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
+    text = f"FMI 2.0 Co-Simulation, by pythonfmu{reason}; needs Python 3.11 in the importing process"
     return Origin("python", text)

@@ -13,8 +13,8 @@ from itertools import pairwise
 from typing import Any
 
 from ..core.planar import ZERO, Vec2
+from ..core.ports import Solver
 from ..core.quantities import Layout, Value, declaration, declared_class, group, quantity
-from ..core.solver import Solver
 from ..groups import hanging_chain
 from ..groups.chain import Rods
 from ..groups.hanging_chain import HangingChain, HeldChain, State

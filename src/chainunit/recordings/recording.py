@@ -14,7 +14,7 @@ import numpy as np
 from ..core.brief import briefly_shown
 from ..core.errors import Faults, InputError, meant, near_name, printable
 from ..core.inputs import decoded_by_marks, file_bytes, unzipped
-from ..core.units import must_be, of_other_kind, scale
+from ..core.units import of_other_kind, scale, with_units
 from ..drives.dc_motor import DcMotor
 from ..drives.induction_motor import InductionMotor
 from ..drives.motor import Motor
@@ -289,7 +289,7 @@ def _scale(table: LoggerTable, place: int, quantity: Measurand) -> tuple[float, 
         )
     other = of_other_kind(unit, quantity.unit)
     if other:
-        raise InputError(f"{file}, column {head}: {other}; {must_be(quantity.unit)}")
+        raise InputError(f"{file}, column {head}: {other}; must be {with_units(quantity.unit)}")
     try:
         return scale(unit, quantity.unit)
     except ValueError as error:

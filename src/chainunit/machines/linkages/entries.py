@@ -119,7 +119,7 @@ class EntryReader(Entry):
 
     def doubt(self, variable: Variable, entry: Any, value: float) -> None:
         """Note the `value` of a key, which the file has as `entry`, if it is of no usual size."""
-        doubt = UnusualValue.of(variable, entry, value)
+        doubt = UnusualValue.of_entry(variable, entry, value)
         if doubt is not None and doubt not in self.unusual:
             self.unusual.append(doubt)
 
