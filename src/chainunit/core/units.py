@@ -272,6 +272,10 @@ def spelling(text: str, unit: str, kind: str = "") -> str:
     return comma + (f"; was {probable} meant?" if probable else "")
 
 
+_INCHES = {'"': "in", "''": "in", "\u2033": "in", "'": "ft", "\u2032": "ft"}
+"""Signs for inches and feet."""
+
+
 def _probable_texts(text: str, unit: str, kind: str) -> list[str]:
     """The texts that the user may have meant, for a quantity of this `unit` and `kind`: with a point in place of a
     comma, or with the right case of letters. A comma after which three digits stand may also part thousands."""
@@ -279,6 +283,8 @@ def _probable_texts(text: str, unit: str, kind: str) -> list[str]:
         candidates = [text.replace(",", sign, 1).strip() for sign in ("", ".")]
         return candidates if all(_reads(candidate, unit, kind) for candidate in candidates) else []
     text = with_point(text) or text
+    if (parts := split(text)) and parts[1] in _INCHES:
+        text = f"{parts[0]:.15g} {_INCHES[parts[1]]}"
     if _reads(text, unit, kind):
         return [text.strip()]
     number, unit_text = split(text) or (math.nan, "")
