@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import time
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -344,7 +345,7 @@ def test_an_address_that_is_wrong(change, message):
         ("M[J[RP, A[0], P[0, 0], L[L1]]]", "joint 0: slides, and has fewer than two links"),
         ("M[J[R, P[0, x], L[ground, L1]]]", 'joint 0: has "x" in place of a number'),
         ("M[]", "Pyslvs: the input turns no link; it must turn one link"),
-        ("https://pmks.example/?2P.c,1T", "cannot be read"),
+        ("https://pmks.example/?2P.c,1T", "is an address without joints"),
         ("j=&l=&f=", "has no joints and links; must be the plain address"),
     ],
 )
@@ -452,3 +453,14 @@ def test_an_option_that_is_wrong(arguments, message, tmp_path):
     written(tmp_path, "[ground]\n", "machine.toml")
     done = chainunit("linkage", *arguments, cwd=tmp_path)
     assert done.returncode == 2 and message in done.stderr
+
+
+@pytest.mark.parametrize("source", ["https://example.org/pmks?mech=1", "file"])
+def test_an_address_without_joints_is_refused(source, tmp_path):
+    if source == "file":
+        source = str(tmp_path / "a.txt")
+        Path(source).write_text("https://example.org/pmks?mech=1", "utf-8")
+    with pytest.raises(
+        InputError, match=r"is an address without joints; the address of a machine in PMKS\+ has \?j="
+    ):
+        imported(source)

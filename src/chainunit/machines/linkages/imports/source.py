@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -51,7 +52,7 @@ def imported(source: str, density: str | None = None, scale: str | None = None) 
     InputError
         with a line for each fault of the source, and for each thing that cannot be carried over.
     """
-    is_text = pyslvs.begins(source) or "j=" in source
+    is_text = pyslvs.begins(source) or source.startswith("j=") or "://" in source
     name = "drawing" if is_text else source
     data = source.encode() if is_text else file_bytes(Path(source), TOML)
     text = data.decode("utf-8-sig", "replace")
@@ -59,6 +60,10 @@ def imported(source: str, density: str | None = None, scale: str | None = None) 
         linkage = linkage2.read(data, name)
     elif pyslvs.begins(text) or "?j=" in text or text.startswith("j="):
         linkage = (pyslvs if pyslvs.begins(text) else pmks).read(text, name)
+    elif re.match(r"\w+://", text):
+        raise InputError(
+            f"{name}: is an address without joints; the address of a machine in PMKS+ has ?j= and &l="
+        )
     elif density or scale:
         raise InputError(f"--density, --scale: {source} is a linkage file, and these are for drawings alone")
     else:
