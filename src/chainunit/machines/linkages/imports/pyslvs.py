@@ -61,6 +61,6 @@ def _joints(text: str, name: str) -> Iterator[tuple[str, dict[str, list[str]]]]:
         if not joint:
             near = shown(content[start : start + 40].strip() if whole else text[-40:])
             raise InputError(f"{name}: must be M[J[...], J[...], ...]; it is wrong at {near}")
-        terms = {head: [x.strip() for x in words.split(",")] for head, words in _TERM.findall(joint[2])}
-        yield joint[1], {head: [word for word in words if word] for head, words in terms.items()}
+        terms = {head: [x.strip() for x in entries.split(",")] for head, entries in _TERM.findall(joint[2])}
+        yield joint[1], {head: [entry for entry in entries if entry] for head, entries in terms.items()}
         start = joint.end()

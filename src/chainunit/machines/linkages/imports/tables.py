@@ -143,8 +143,10 @@ class _Tables:
             return self.cylinder(driver, *driver.pins)
         turned = moving.get(driver.pins[0], [])
         if len(turned) != 1 or driver.pins[0] not in self.pins[GROUND]:
-            words = f"turns {', '.join(turned) or 'no link'}; it must turn one link, about a fixed pin"
-            self.linkage.fault(driver.title, f"the input {words}")
+            links = ", ".join(turned) or "no link"
+            self.linkage.fault(
+                driver.title, f"the input turns {links}; it must turn one link, about a fixed pin"
+            )
             return {}, 0.0
         if not self.linkage.drivers:
             self.linkage.remarks.append(f"the source names no input: {turned[0]} is the driver")
