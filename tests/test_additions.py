@@ -60,7 +60,7 @@ _FORCE_OF_BEARING = warning(
     sizes={"N": "force"},
 )
 """
-WARNED = """    if (found := study.answers.get(STEADY)) is not None and found.bearing_peak > 10.0:
+WARNED = """    if (found := study.answers.get(STEADY)) is not None and (found.bearing_peak or 0.0) > 10.0:
         study.say(_FORCE_OF_BEARING, STEADY, force=found.bearing_peak)
 """
 FIGURE = '''
