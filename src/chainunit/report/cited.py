@@ -9,8 +9,9 @@ from typing import Any, TypeVar, cast
 
 from ..core.quantities import finite
 from ..reading.results import GIVEN, OWN, Estimate, InUnit, ResultPart, parts
+from ..study.heading import Heading
 from . import blocks as b
-from .lines import Line, Name, Number, Words
+from .lines import Aside, Line, Name, Number, Words, capital, filled, line
 
 T = TypeVar("T")
 
@@ -44,7 +45,9 @@ def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
     if isinstance(value, InUnit):
         return _piece(value.value, path, value.unit, value.kind)
     if isinstance(value, Estimate):
-        return Number(finite(value.value), value.unit, value.kind, path)
+        ends = (("value", path), ("low", f"{path}.low"), ("high", f"{path}.high"))
+        pieces: Any = {end: Number(finite(getattr(value, end)), value.unit, value.kind, p) for end, p in ends}
+        return Estimate(**pieces)
     if isinstance(value, Mapping):
         return {key: _piece(entry, f"{path}.{key}", unit, kind) for key, entry in value.items()}
     if unit and (isinstance(value, list | tuple) or bool(getattr(value, "ndim", False))):
@@ -63,6 +66,23 @@ def number(cited_number: object, digits: int = 0, **more: Any) -> Number:
     """A cited number with so many digits; `more` are further fields of `Number`."""
     assert isinstance(cited_number, Number), cited_number
     return replace(cited_number, digits=digits, **more)
+
+
+def exact(cited_number: object, digits: int = 0, **more: Any) -> Number:
+    """A cited number with the digits of a given value, see `number`."""
+    return number(cited_number, digits, as_given=True, **more)
+
+
+def estimate(cited_estimate: Estimate) -> Line:
+    """A cited estimate with its interval in brackets."""
+    ends = filled("{} to {}", number(cited_estimate.low), number(cited_estimate.high))
+    return line(number(cited_estimate.value), Aside(ends))
+
+
+def source_line(heading: Heading) -> Line:
+    """Project, author, date and revision of a cited heading, if it has them; its study file, and the version."""
+    labels = [filled("{}: {} · ", capital(name), label) for name, label in heading.report.items()]
+    return line(*labels, filled("Study file: {} · chainunit {}", heading.source, heading.chainunit))
 
 
 def as_name(cited_name: object) -> Name:

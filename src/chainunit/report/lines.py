@@ -67,6 +67,13 @@ def line(*parts: Line) -> tuple[Piece, ...]:
     return tuple(piece for part in parts for piece in pieces(part))
 
 
+def filled(template: str, *parts: Line) -> tuple[Piece, ...]:
+    """One line from a template, with a part in place of each ``{}``."""
+    texts = template.split("{}")
+    pairs = zip(texts, (*parts, ""), strict=True)
+    return tuple(piece for pair in pairs for piece in line(*pair) if piece)
+
+
 def join(lines: Iterable[Line], between: str = ", ") -> tuple[Piece, ...]:
     """One line from several lines, with `between` between two of them."""
     return line(*(part for entry in lines for part in (between, entry)))[1:]
