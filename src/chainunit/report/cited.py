@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import is_dataclass, replace
+from operator import attrgetter
 from typing import Any, TypeVar, cast
 
+from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import finite
 from ..reading.results import GIVEN, OWN, Estimate, InUnit, ResultPart, parts
 from ..study.heading import Heading
@@ -31,7 +33,7 @@ class _Cited:
         self._parts: dict[str, ResultPart] = {part.attribute: part for part in parts(result_type)}
 
     def __getattr__(self, name: str) -> Any:
-        value, declared = getattr(self._result, name), self._parts.get(name)
+        value, declared = attrgetter(name)(self._result), self._parts.get(name)
         if declared is None:
             return value
         path = self._path if declared.inline else f"{self._path}.{declared.name}".removeprefix(".")
@@ -89,6 +91,19 @@ def as_name(cited_name: object) -> Name:
     """A cited text as a name, whose letters stay as they are."""
     assert isinstance(cited_name, Words), cited_name
     return Name(cited_name.text)
+
+
+def quantity_rows(
+    cited_result: object, driver: str = USUAL_DRIVER, only: str = "", **more: Any
+) -> tuple[b.TableRow, ...]:
+    """A row (description, number) for each number of a cited result, or for the one with the name `only`; `driver` is
+    the noun of the driver in descriptions, `more` are further fields of `Number`."""
+    assert isinstance(cited_result, _Cited), cited_result
+    return tuple(
+        b.TableRow((of_driver(declared.description, driver), number(getattr(cited_result, name), **more)))
+        for name, declared in cited_result._parts.items()
+        if declared.unit and only in ("", declared.name)
+    )
 
 
 def table(
