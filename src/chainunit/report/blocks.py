@@ -24,8 +24,8 @@ from .motion import Animation
 
 Form = Literal["both", "short", "long", "sheet", "screen"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
-Content: TypeAlias = "Number | Words | str"
-"""The content of a given value: a number, words of the result, or the text of a switch or a list."""
+Content: TypeAlias = "Number | str"
+"""The content of a given value: a number, or the text of a choice, a switch or a list."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class _Cited:
         path = self._path if declared.inline else f"{self._path}.{declared.name}".removeprefix(".")
         if declared.unit == OWN:
             return _piece(value, path, self._result.unit, getattr(self._result, "kind", ""))
-        return value if declared.unit == GIVEN else _piece(value, path, declared.unit, declared.kind)
+        return _piece(value, path, declared.unit, declared.kind)
 
 
 def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
@@ -52,6 +52,8 @@ def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
         return Estimate(**pieces)
     if isinstance(value, Mapping):
         return {key: _piece(entry, f"{path}.{key}", unit, kind) for key, entry in value.items()}
+    if unit == GIVEN:
+        return Words(value, path) if isinstance(value, str) else value
     if unit and (isinstance(value, list | tuple) or bool(getattr(value, "ndim", False))):
         place = path if ".value." in path else f"{path}.value"
         return [_piece(entry, f"{place}.{k}", unit, kind) for k, entry in enumerate(value)]
@@ -60,7 +62,7 @@ def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
     if isinstance(value, list | tuple):
         return [_piece(entry, f"{path}.{k}") for k, entry in enumerate(value)]
     if isinstance(value, str):
-        return Words(str(value), path)
+        return Words(value, path)
     return _Cited(value, path) if is_dataclass(value) else value
 
 
@@ -90,7 +92,7 @@ def source_line(heading: Heading) -> Line:
 def as_name(cited_name: object) -> Name:
     """A cited text as a name, whose letters stay as they are."""
     assert isinstance(cited_name, Words), cited_name
-    return Name(cited_name.text)
+    return Name(str(cited_name))
 
 
 def quantity_rows(

@@ -8,26 +8,27 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import check_kind
+from ...reading.results import as_data
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.stored_result import StoredResult, read_result, stored_result
 from ...work.progress import TaskProgress
+from .comparison import Comparison
 from .page import TASK
 
 
-class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], Mapping[str, Any]]):
+class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], Comparison]):
     """Two results side by side, A and B. Its `repr` shows the verdicts of both and the given values that differ."""
 
     _task = TASK
 
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """Each measure of each run that both have: the values of both, the difference, and its share."""
+        columns = ("a", "b", "difference", "relative")
         return {
-            f"{run.removeprefix('answers.')}.{name}": {
-                column: measure[column] for column in ("a", "b", "difference", "relative")
-            }
-            for run, entries in self._outcome["runs"].items()
-            for name, measure in entries["measures"].items()
+            f"{run.removeprefix('answers.')}.{name}": as_data(dict(zip(columns, measure.values, strict=True)))
+            for run, compared in self._outcome.runs.items()
+            for name, measure in compared.measures.items()
         }
 
 
