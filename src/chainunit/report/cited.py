@@ -51,7 +51,8 @@ def _piece(value: Any, path: str, unit: str = "", kind: str = "") -> Any:
         pieces: Any = {end: Number(finite(getattr(value, end)), value.unit, value.kind, p) for end, p in ends}
         return Estimate(**pieces)
     if isinstance(value, Mapping):
-        return {key: _piece(entry, f"{path}.{key}", unit, kind) for key, entry in value.items()}
+        places = {key: f"{path}.{key}".removeprefix(".") for key in value}
+        return {key: _piece(entry, places[key], unit, kind) for key, entry in value.items()}
     if unit == GIVEN:
         return Words(value, path) if isinstance(value, str) else value
     if unit and (isinstance(value, list | tuple) or bool(getattr(value, "ndim", False))):
