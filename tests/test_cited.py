@@ -130,8 +130,8 @@ def test_a_table_has_a_row_for_each_item():
 
 
 PATH = re.compile(r'\.(?:number|value)\(\s*f?"[a-z_]+(?:\.[a-z_0-9{}]+)+"')
-UNDECLARED = {"comparison/page.py": 1, "report/linkage_report.py": 3, "report/linkage_rest.py": 2}
-"""Reports on results that nobody declares: two results beside each other, and numbers in the unit of the driver."""
+UNDECLARED = {"report/linkage_report.py": 3, "report/linkage_rest.py": 2}
+"""Reports on results that nobody declares: numbers in the unit of the driver."""
 
 
 def test_a_report_takes_no_number_of_a_declared_result_by_a_string_path():

@@ -184,7 +184,7 @@ def test_a_text_from_outside_is_no_template(tmp_path):
 
 OUTSIDE = {"title", "titles", "title_of", "description", "designation", "noun", "source", "label"}
 """Names of attributes and variables that hold texts of a user or of a foreign FMU."""
-TEMPLATES = {"line": 0, "warn": 1, "note": 1, "of": 2}
+TEMPLATES = {"line": 0, "filled": 0, "warn": 1, "note": 1, "of": 2}
 """By method that fills a template, the place of the template among its arguments."""
 
 

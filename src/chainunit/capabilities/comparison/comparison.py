@@ -65,11 +65,6 @@ class ComparedMeasure:
     difference: InUnit = part("difference B - A")
     relative: InUnit = part("share of A's, of values that are not negative and no shares themselves")
 
-    @property
-    def values(self) -> tuple[InUnit, InUnit, InUnit, InUnit]:
-        """Both values, the difference and its share."""
-        return self.a, self.b, self.difference, self.relative
-
 
 @result
 class ComparedRun:

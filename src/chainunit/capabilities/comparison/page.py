@@ -118,13 +118,12 @@ def _runs(x: Comparison, comparison: Comparison) -> Iterator[b.Block]:
         short = {name for name in different if _is_short(run, name)}
         if not different:
             equal.append(compared.title)
-        cited_measures = x.runs[run].measures
         rows = tuple(
             b.TableRow(
-                (measure.title, *map(number, cited_measures[name].values)),
+                (str(shown.title), *map(number, (shown.a, shown.b, shown.difference, shown.relative))),
                 form="both" if name in short else "long",
             )
-            for name, measure in measures
+            for name, shown in x.runs[run].measures.items()
         )
         if rows:
             heads, title = b.heads("", "A", "B", "B - A", "relative"), capital(compared.title)

@@ -24,9 +24,10 @@ class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], Compari
 
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """Each measure of each run that both have: the values of both, the difference, and its share."""
-        columns = ("a", "b", "difference", "relative")
         return {
-            f"{run.removeprefix('answers.')}.{name}": as_data(dict(zip(columns, measure.values, strict=True)))
+            f"{run.removeprefix('answers.')}.{name}": {
+                column: entry for column, entry in as_data(measure).items() if column != "title"
+            }
             for run, compared in self._outcome.runs.items()
             for name, measure in compared.measures.items()
         }

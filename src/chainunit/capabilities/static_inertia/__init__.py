@@ -12,6 +12,8 @@ from ...mechanism.models import InverseMachine
 from ...reading.results import result
 from ...report.blocks import Source, Text
 from ...report.capability import AnswerBlocks, Capability
+from ...report.cited import cited, number
+from ...report.lines import filled
 from ...study.analysis import Analysis, Findings, Work
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
@@ -79,11 +81,9 @@ class StaticInertiaCapability(Capability):
         findings = StaticInertiaFindings.found_in(study)
         if findings is None or abs(findings.static - findings.machine) <= _ALIKE * findings.machine:
             return AnswerBlocks()
-        sentence = (
-            "A constant-inertia calculation takes RMS {static_inertia.static} instead of "
-            "{static_inertia.machine} at the {driver}."
-        )
-        return AnswerBlocks(end=[Text(s.line(sentence))])
+        x = cited(findings, "findings.static_inertia")
+        sentence = f"A constant-inertia calculation takes RMS {{}} instead of {{}} at the {s.driver}."
+        return AnswerBlocks(end=[Text(filled(sentence, number(x.static), number(x.machine)))])
 
 
 CAPABILITY = StaticInertiaCapability()
