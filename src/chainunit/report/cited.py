@@ -96,17 +96,30 @@ def as_name(cited_name: object) -> Name:
     return Name(str(cited_name))
 
 
+def numbers(cited_result: object) -> dict[str, Number]:
+    """The numbers of a cited result by their names."""
+    return {declared.name: cited_number for declared, cited_number in _numbers(cited_result)}
+
+
 def quantity_rows(
     cited_result: object, driver: str = USUAL_DRIVER, only: str = "", **more: Any
 ) -> tuple[b.TableRow, ...]:
     """A row (description, number) for each number of a cited result, or for the one with the name `only`; `driver` is
     the noun of the driver in descriptions, `more` are further fields of `Number`."""
-    assert isinstance(cited_result, _Cited), cited_result
     return tuple(
-        b.TableRow((of_driver(declared.description, driver), number(getattr(cited_result, name), **more)))
-        for name, declared in cited_result._parts.items()
-        if declared.unit and only in ("", declared.name)
+        b.TableRow((of_driver(declared.description, driver), replace(cited_number, **more)))
+        for declared, cited_number in _numbers(cited_result)
+        if only in ("", declared.name)
     )
+
+
+def _numbers(cited_result: object) -> Iterator[tuple[ResultPart, Number]]:
+    assert isinstance(cited_result, _Cited), cited_result
+    for name, declared in cited_result._parts.items():
+        if declared.unit:
+            cited_number = number(getattr(cited_result, name))
+            if not declared.optional or cited_number.value is not None:
+                yield declared, cited_number
 
 
 def table(

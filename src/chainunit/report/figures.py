@@ -11,16 +11,20 @@ import numpy as np
 
 from ..core.descriptions import of_driver
 from ..core.engines import numpy_
-from ..reading.text import forms, number
+from ..reading.text import forms
+from ..reading.text import number as number_words
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
 from ..study.readings import crank_speed, crank_torque, has_turn
 from ..study.record import StudyRecord
+from ..study.result import assumed_ranges
 from . import blocks as b
 from . import figure as fig
 from . import linkage_loads, load_figures, run_names
-from .lines import capital
+from .cited import cited, number
+from .given_numbers import asked_speed
+from .lines import Line, capital, filled, join, line
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
 from .study_motion import machine_state
@@ -116,8 +120,10 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
         of_driver("Torque over {a driver} turn at constant speed", driver),
         f"{' and '.join(torques).capitalize()} torque over the {driver} angle: {', '.join(study.statics.cycles)}.",
         fig.stacked(angle_axis(study), items.items()),
-        s.line(
-            f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed:4}} of the {driver}, without a motor."
+        line(
+            f"Inverse dynamics{' of two bars' * organs} at ",
+            asked_speed(study),
+            f" of the {driver}, without a motor.",
         ),
     )
 
@@ -175,7 +181,9 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
             yield fig.Mark(narrowest.crossover, "crossover", look="mark")
         if ordinate == "phase":
             margin = narrowest.phase_margin
-            yield fig.Label(narrowest.crossover, -180.0 + margin, f"margin {number(margin, 'deg')}", "left")
+            yield fig.Label(
+                narrowest.crossover, -180.0 + margin, f"margin {number_words(margin, 'deg')}", "left"
+            )
 
     return fig.Figure(
         "speed-loop",
@@ -268,7 +276,7 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
             ((axis, (*curves, *marks(axis is of_torque))) for axis, curves in items.items()),
         ),
-        s.line(_after(s, study, name)) if event is not None else (),
+        _after(study, name) if event is not None else (),
         half=True,
     )
 
@@ -316,39 +324,41 @@ def _load_change(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
     return float(time[places[0]]), float(time[places[-1] + 1])
 
 
-def _after(s: b.Source, study: StudyRecord, run: str) -> str:
-    """The sentence on the speed after the event, as a template."""
-    caption = "Upright, dashed: the event. Shaded: the loads change."
-    if run not in s.result["answers"]:
+def _after(study: StudyRecord, run: str) -> Line:
+    """The sentence on the speed after the event."""
+    caption: Line = "Upright, dashed: the event. Shaded: the loads change."
+    if run not in study.answers:
         return caption
-    least, dip, back = (f"answers.{run}.{name}" for name in ("speed_least", "speed_dip", "recovery_time"))
-    share, recovery = s.value(dip), s.value(back)
-    if share is None or share <= 0.0:
-        caption += f" The least speed is {{{least}}}"
-    elif not forms(share, "1", "dip")[0][1]:
+    answers = cited(study.answers[run], f"runs.answers.{run}")
+    least, dip, recovery = map(number, (answers.speed_least, answers.speed_dip, answers.recovery_time))
+    if dip.value is None or dip.value <= 0.0:
+        caption = filled("{} The least speed is {}", caption, least)
+    elif not forms(dip.value, "1", "dip")[0][1]:
         # a dip so large is shown as words in place of a number
-        caption += f" The {{driver}} {{{dip}}}"
+        caption = filled(f"{{}} The {study.driver_noun} {{}}", caption, dip)
     else:
-        caption += f" The speed dips by {{{dip}}}"
+        caption = filled("{} The speed dips by {}", caption, dip)
     if not study.returns:
-        caption += "; the motor does not reach the speed asked for, so that there is no band to return to."
-    elif recovery is None:
-        caption += "; it does not return to its steady band within the time followed."
-    elif recovery == 0.0:
-        caption += "; it does not leave its steady band."
+        back: Line = "; the motor does not reach the speed asked for, so that there is no band to return to."
+    elif recovery.value is None:
+        back = "; it does not return to its steady band within the time followed."
+    elif recovery.value == 0.0:
+        back = "; it does not leave its steady band."
     else:
-        caption += f"; it is back in its steady band after {{{back}}}."
-    if run in s.result["block_peaks"]:
-        path, ends = f"block_peaks.{run}", s.result["block_peaks"][run]
-        names = [name.removesuffix("_low") for name in ends if name.endswith("_low")]
-        ranges = {name: f"{{{path}.{name}_low}} to {{{path}.{name}_high}}" for name in names}
-        assumptions = (
-            f"{name} {ranges[name]}" for name in names if ends[f"{name}_low"].get("kind") == "assumed"
-        )
-        caption += (
-            f" Assumed: {', '.join(assumptions)}; the {{driver}} torque peaks at {ranges['crank_torque']}."
-        )
-    return caption
+        back = filled("; it is back in its steady band after {}.", recovery)
+    return line(caption, back, _assumed(study, run) if run in study.spreads else ())
+
+
+def _assumed(study: StudyRecord, run: str) -> Line:
+    """The ranges that an event assumes, and the torque of the driver over them."""
+    sizes = cited(assumed_ranges(study, run), f"runs.block_peaks.{run}")
+    ranges = {
+        name: filled("{} to {}", *(number(sizes[f"{name}_{end}"]) for end in ("low", "high")))
+        for name in (*study.spreads[run].ranges, *study.spreads[run].peaks)
+    }
+    assumptions = join(filled("{} {}", name, ranges[name]) for name in study.spreads[run].ranges)
+    peaks = f" Assumed: {{}}; the {study.driver_noun} torque peaks at {{}}."
+    return filled(peaks, assumptions, ranges["crank_torque"])
 
 
 @PICTURES.declare(lambda study: study.pins, "reactions.png")
@@ -378,8 +388,6 @@ def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Forces in the pins",
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
         ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
-        s.line(
-            f"RMS is taken over whole {{driver}} turns of {of_run}. Beside a bar: the run of the largest peak."
-        ),
+        f"RMS is taken over whole {study.driver_noun} turns of {of_run}. Beside a bar: the run of the largest peak.",
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

@@ -125,8 +125,8 @@ def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     never = "trips in running" if relay.before >= TRIPS_AT * relay.setting else "never"
     x = cited(relay, f"{PATH}.relay")
     heat = (
-        "The start heats a relay as much as 7.2 times its setting of {} does in {}; the rotor may be locked for {}. A "
-        "cold relay surely holds up to the least trip time of its class, and the slowest relay of the class has to "
+        "The start heats a relay as much as 7.2 times its setting of {} does in {}; the rotor may be locked for {}. "
+        "A cold relay surely holds up to the least trip time of its class, and the slowest relay of the class has to "
         "trip before that time. The tolerance of IEC 60034-1 permits a motor 20 % more current, with 1.44 times the "
         "heat of a start."
     )
