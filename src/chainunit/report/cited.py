@@ -35,7 +35,9 @@ class _Cited:
     def __getattr__(self, name: str) -> Any:
         value, declared = attrgetter(name)(self._result), self._parts.get(name)
         if declared is None:
-            return value
+            # the parts of a group have its name before theirs
+            is_group = any(part.startswith(f"{name}.") for part in self._parts)
+            return _Cited(value, f"{self._path}.{name}") if is_group else value
         path = self._path if declared.inline else f"{self._path}.{declared.name}".removeprefix(".")
         if declared.unit == OWN:
             return _piece(value, path, self._result.unit, getattr(self._result, "kind", ""))

@@ -46,7 +46,7 @@ class ChainsCapability(Capability):
         """The speeds to avoid."""
         from .page import speeds_to_avoid
 
-        return AnswerBlocks(warnings=speeds_to_avoid(s))
+        return AnswerBlocks(warnings=speeds_to_avoid(study))
 
 
 CAPABILITY = ChainsCapability()
