@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import metadata
-from typing import Any, cast
+from typing import Any
 
 from .. import __version__
 from ..core.descriptions import of_driver
@@ -160,33 +160,34 @@ def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     ]
     yield b.Given(
         tuple(
-            (section.title, tuple(_values(study, section, unused_names))) for section in given_sections(study)
+            (section.title, tuple(_values(s, study, section, unused_names)))
+            for section in given_sections(study)
         )
     )
 
 
-def _values(study: StudyRecord, section: GivenSection, unused_names: Iterable[str]) -> Iterator[b.GivenValue]:
+def _values(
+    s: b.Source, study: StudyRecord, section: GivenSection, unused_names: Iterable[str]
+) -> Iterator[b.GivenValue]:
     """The quantities and choices of a section as given values, except those with a name in `unused_names`. A range
     gives two values, its ends."""
-    for name, text, content in _contents(study, section):
+    for name, text, content in _contents(s, study, section):
         full = f"{section.name}.{name}".removeprefix(".")
         if full not in unused_names:
             yield b.GivenValue(full, text, content, origin_of(study, full), place_of(study, full))
 
 
-def _contents(study: StudyRecord, section: GivenSection) -> Iterator[tuple[str, str, b.Content]]:
+def _contents(s: b.Source, study: StudyRecord, section: GivenSection) -> Iterator[tuple[str, str, b.Content]]:
     """Name, description and content of each value of a section."""
-    place = f"given.{section.place}".removesuffix(".")
-    quantities = [] if section.values is None else variables(type(section.values))
-    values = cited(section.values, place)
-    for v in quantities:
-        text = v.described(study.driver_noun)
+    for v in () if section.values is None else variables(type(section.values)):
+        # findings may have the value that the study uses in place of this one
+        place, text = f"{section.place}.{v.name}", v.described(study.driver_noun)
         if v.name in section.ranges:
-            range_ends = cited(InUnit(section.ranges[v.name], v.unit, v.kind), f"{place}.{v.name}")
-            for end, size in zip(("least", "most"), cast("list[Number]", range_ends), strict=True):
-                yield v.name, f"{text}, {end}", exact(size)
+            for k, end in enumerate(("least", "most")):
+                yield v.name, f"{text}, {end}", s.number(place, k, as_given=True)
         elif v.name not in section.unused_names:
-            yield v.name, text, exact(getattr(values, v.name), none="none")
+            yield v.name, text, s.number(place, as_given=True, none="none")
+    place = f"given.{section.place}".removesuffix(".")
     for key, choice in section.choices.items():
         if isinstance(choice, str):
             content: b.Content = cited(choice, f"{place}.{key}")

@@ -221,8 +221,8 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         fig.stacked(over, panels),
         filled(
             "The crank turns at constant speed; {} starts of {} turns each. Shaded: speeds to avoid; dash-dotted: "
-            f"the speed of normal running; thin lines: critical speeds. {_ORDERS} Two bars do not go slack: their curve "
-            "shows the share of the time in which the mean pull of a bar is negative.",
+            f"the speed of normal running; thin lines: critical speeds. {_ORDERS} Two bars do not go slack: their "
+            "curve shows the share of the time in which the mean pull of a bar is negative.",
             exact(x.starts),
             exact(x.turns),
         ),

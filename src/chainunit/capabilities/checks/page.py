@@ -79,7 +79,7 @@ def _note(s: b.Source, row: CheckRow, x: CheckRow) -> Line:
 def _coupling_to_order(candidates: Sequence[CouplingCandidate], x: CouplingCandidate) -> b.Text:
     """The flexible coupling of the catalogues that is checked, cited as `x`."""
     best = candidates[0]
-    data = number(x.rated_torque), number(x.stiffness), number(x.damping)
+    data = map(exact, (x.rated_torque, x.stiffness, x.damping))
     parts = [
         line(x.designation),
         *([line("order number ", x.order_number)] if best.order_number else []),
