@@ -178,23 +178,23 @@ def _values(
 
 
 def _contents(s: b.Source, study: StudyRecord, section: GivenSection) -> Iterator[tuple[str, str, b.Content]]:
-    """Name, description and content of each value of a section."""
+    """Name, description and content of each value of a section. A finding of the same place is what the study uses
+    in place of the value."""
     for v in () if section.values is None else variables(type(section.values)):
-        # findings may have the value that the study uses in place of this one
         place, text = f"{section.place}.{v.name}", v.described(study.driver_noun)
         if v.name in section.ranges:
             for k, end in enumerate(("least", "most")):
                 yield v.name, f"{text}, {end}", s.number(place, k, as_given=True)
         elif v.name not in section.unused_names:
             yield v.name, text, s.number(place, as_given=True, none="none")
-    place = f"given.{section.place}".removesuffix(".")
     for key, choice in section.choices.items():
+        place = f"{section.place}.{key}".removeprefix(".")
         if isinstance(choice, str):
-            content: b.Content = cited(choice, f"{place}.{key}")
+            content: b.Content = s.words(place)
         elif isinstance(choice, bool):
             content = "yes" if choice else "no"
         elif isinstance(choice, float):
-            content = exact(cited(InUnit(choice, "1"), f"{place}.{key}"))
+            content = s.number(place, as_given=True)
         else:
             content = ", ".join(x if isinstance(x, str) else f"{x:g}" for x in choice)
         yield key, description(f"{section.name}.{key}".removeprefix(".")), content
