@@ -237,7 +237,7 @@ def toml_of(result):
         table, _, inner = name.partition(".")
         for place in (name, f"{table}.asked.{inner}"):
             with contextlib.suppress(KeyError):
-                return text(blocks.at(result, place))
+                return text(at(result, place))
         raise KeyError(name)
 
     lines += [

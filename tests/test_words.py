@@ -13,11 +13,11 @@ from command import chainunit
 from event_tables import event_line
 from reports import report_of, said_of
 
+from chainunit.core.descriptions import of_driver
 from chainunit.core.quantities import Quantity
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import chosen_units, number, shown_in
-from chainunit.report.blocks import Source
-from chainunit.report.lines import Words
+from chainunit.report.lines import Words, filled
 from chainunit.report.markdown import markdown
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
@@ -78,8 +78,8 @@ def test_a_text_has_slots_for_the_driver():
     speed = Quantity("rad/s", "{driver} speed over {a driver} turn")
     assert speed.description == "crank speed over a crank turn"
     assert speed.described("eccentric") == "eccentric speed over an eccentric turn"
-    source = Source({"title": "Crank shaper"}, "gear")
-    assert source.line("The {driver} of the {title}") == ("The gear of the ", Words("Crank shaper", "title"))
+    title = Words("{driver}", "title")
+    assert filled(of_driver("The {driver} of the {}", "gear"), title) == ("The gear of the ", title)
 
 
 def test_the_units_of_words_end_where_they_are_written():

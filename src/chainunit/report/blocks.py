@@ -239,11 +239,6 @@ def found_at(result: Any, path: str) -> tuple[str, Any]:
     raise KeyError(path)
 
 
-def at(result: Any, path: str) -> Any:
-    """The entry of a result at the dotted `path`, see `found_at`."""
-    return found_at(result, path)[1]
-
-
 def _matches(node: Any, path: str) -> Iterator[Any]:
     keys: Mapping[str, Any] = {}
     if isinstance(node, Mapping):
