@@ -23,10 +23,10 @@ from .runs import number
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The drive where it was chosen, first in a sentence; the verdicts, the cards and the warnings."""
     yield from sentence(study)
-    parts = [part.answer(s, study) for part in capabilities()]
+    parts = [part.answer(study) for part in capabilities()]
     yield from chain.from_iterable(part.head for part in parts)
     verdicts = cited(Verdicts(study.verdict, motor_verdict(study)), "verdict")
     for verdict in (verdicts.model, verdicts.motor):

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from ..core.descriptions import USUAL_DRIVER
 from ..reading.result_entries import PARTS
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
@@ -254,11 +253,9 @@ def _matches(node: Any, path: str) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Source:
-    """Makes numbers and words for a report from the entries of a `result`, whose places are data themselves, on a
-    machine with the noun `driver` for the link that the motor turns."""
+    """Makes numbers and words for a report from the entries of a `result` whose places are data themselves."""
 
     result: Mapping[str, Any]
-    driver: str = USUAL_DRIVER
 
     def number(self, path: str, *items: int, **more: Any) -> Number:
         """The number at `path`; where an array stands there, the number at the places `items` in it. `more` are

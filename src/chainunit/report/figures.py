@@ -19,7 +19,6 @@ from ..study.drive import Drive
 from ..study.readings import crank_speed, crank_torque, has_turn
 from ..study.record import StudyRecord
 from ..study.result import assumed_ranges
-from . import blocks as b
 from . import figure as fig
 from . import linkage_loads, load_figures, run_names
 from .cited import cited, number
@@ -38,7 +37,7 @@ _CURRENT = fig.Axis("motor current", "A")
 @PICTURES.declare(
     lambda study: run_names.motor_runs(study) and study.drive.foreign is None, "torque_speed.png"
 )
-def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _torque_speed(study: StudyRecord) -> fig.Figure:
     """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
     names, panels = run_names.motor_runs(study), []
     # an event that is a start of its own would squeeze the loops of the others
@@ -69,7 +68,7 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
         x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
         limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
-        items = (*curves, limit, *_duty(s, study))
+        items = (*curves, limit, *_duty(study))
         panels.append(fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group)))
     return fig.Figure(
         "torque-speed",
@@ -82,7 +81,7 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     )
 
 
-def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
+def _duty(study: StudyRecord) -> Iterator[fig.Item]:
     """The speed of normal running and, where the motor has a nameplate, its rated point and the rated torque, which
     it may give without a limit of time (S1)."""
     if "steady" in study.answers:
@@ -103,7 +102,7 @@ def _group_title(study: StudyRecord, runs: list[str]) -> str:
 
 
 @PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
-def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _turn(study: StudyRecord) -> fig.Figure:
     driver = study.driver_noun
     torques: dict[str, Callable[[Cycle], Any]] = {driver: lambda c: c.crank_torque}
     organs = bool(study.drive.machine.model.sides)
@@ -133,19 +132,19 @@ def _is_steady(study: StudyRecord) -> bool:
 
 
 @PICTURES.declare(_is_steady, "power_turn.png")
-def _power(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _power(study: StudyRecord) -> fig.Figure:
     return load_figures.power_over_turn(study.drive, study.steady, angle_axis(study))
 
 
 @PICTURES.declare(_is_steady, "load_histogram.png")
-def _histogram(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _histogram(study: StudyRecord) -> fig.Figure:
     return load_figures.load_histogram(study.drive, study.steady)
 
 
 @PICTURES.declare(
     lambda study: _is_steady(study) and not study.drive.foreign_machine, "force_over_stroke.png"
 )
-def _stroke(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
+def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
     names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
     parts = {"steady": study.steady} | {
         name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in names
@@ -155,7 +154,7 @@ def _stroke(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
 
 
 @PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")
-def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _speed_loop(study: StudyRecord) -> fig.Figure:
     loops = list(enumerate(study.statics.loops.items()))
     ends = [loop.frequency[k] for _, (_, loop) in loops for k in (0, -1)]
     frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
@@ -203,20 +202,20 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 
 @PICTURES.declare(lambda study: "start_up" in study.runs, "start_up.png")
-def _start_up(s: b.Source, study: StudyRecord) -> fig.Figure:
-    return _transient(s, study, "start_up")
+def _start_up(study: StudyRecord) -> fig.Figure:
+    return _transient(study, "start_up")
 
 
 @PICTURES.declare(run_names.motor_runs)
-def _others(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
-    return (_transient(s, study, name) for name in run_names.motor_runs(study) if name != "start_up")
+def _others(study: StudyRecord) -> Iterator[fig.Figure]:
+    return (_transient(study, name) for name in run_names.motor_runs(study) if name != "start_up")
 
 
 @PICTURES.declare(lambda study: run_names.groups(study, study.overloads), "overload_time.png")
-def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _overloads(study: StudyRecord) -> fig.Figure:
     """The overloads beside each other, for print: a band of rows for each side, and the same scales in all panels."""
     groups = [
-        [_transient(s, study, name) for name in group] for group in run_names.groups(study, study.overloads)
+        [_transient(study, name) for name in group] for group in run_names.groups(study, study.overloads)
     ]
     rows: list[list[fig.Panel | None]] = []
     for group in groups:
@@ -236,7 +235,7 @@ def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
     )
 
 
-def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
+def _transient(study: StudyRecord, name: str) -> fig.Figure:
     """Torque, speed and current of a run over time."""
     run, drive, event = study.runs[name], study.drive, run_names.event_time(study, name)
     time = run["time"].values - (event or 0.0)
@@ -362,7 +361,7 @@ def _assumed(study: StudyRecord, run: str) -> Line:
 
 
 @PICTURES.declare(lambda study: study.pins, "reactions.png")
-def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _reactions(study: StudyRecord) -> fig.Figure:
     reference = "steady" if "steady" in study.pins else next(iter(study.pins))
     steady, pins = study.pins[reference], list(study.pins[reference])
     largest = {pin: hardest_run(study.pins, pin) for pin in pins}

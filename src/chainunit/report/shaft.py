@@ -35,7 +35,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Table(modes, title="The driveline's torsion")
     if study.statics.rigid_line is not None:
         yield _rigid(study, study.statics.rigid_line)
-    yield from PICTURES.figures(s, study)
+    yield from PICTURES.figures(study)
 
 
 def _rigid(study: StudyRecord, rigid: RigidLine) -> b.Judgement:
@@ -62,7 +62,7 @@ def _shaft(study: StudyRecord) -> b.Table:
 
 
 @PICTURES.declare(lambda study: shaft_findings(study).answers, "driveline.png")
-def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _driveline(study: StudyRecord) -> fig.Figure:
     """The torque in the driveline beside that in a rigid one, and its rainflow cycles."""
     shaft = shaft_findings(study)
     largest = max(answers.range_largest for answers in shaft.answers.values())

@@ -32,7 +32,6 @@ _LABELS = ("project", "author", "date", "revision")
 
 def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     """The sheet of a study with this report."""
-    s = b.Source(report.result, study.driver_noun)
     report_sections = {section.name: section for section in report.sections}
     sheets = [name for part in capabilities() for name in part.on_sheet() if name in report_sections]
     sections = [
@@ -41,7 +40,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
         b.Section(
             "assumptions", "Assumptions: values that no file gives", tuple(_assumed(report_sections, study))
         ),
-        *([_basis(s, study)] if "basis" in report_sections else []),
+        *([_basis(study)] if "basis" in report_sections else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
     # what was not checked, and what is assumed, stand on the sheet
@@ -75,9 +74,9 @@ def _without_figures(section: b.Section) -> b.Section:
     return replace(section, blocks=tuple(block for block in section.blocks if not isinstance(block, Figure)))
 
 
-def _basis(s: b.Source, study: StudyRecord) -> b.Section:
+def _basis(study: StudyRecord) -> b.Section:
     """Basis and validity, with the speed up to which the numbers hold at its head."""
-    head = [block for part in capabilities() for block in part.answer(s, study).validity]
+    head = [block for part in capabilities() for block in part.answer(study).validity]
     return b.Section("basis", "Basis and validity", (*_speed(study), *head, *basis(study)))
 
 

@@ -43,7 +43,7 @@ _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """The report on a study; `result` has its numbers, as `chainunit.study.result.as_dict` gives them."""
-    s = b.Source(result, study.driver_noun)
+    s = b.Source(result)
     with shown_in(study.config.units):
         sections = [
             b.Section(name, contents.heading, tuple(contents.blocks(s, study)), beside=name == QUESTION)
@@ -57,7 +57,7 @@ def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
         return b.Report(
             study.config.title,
             study.kind,
-            s.result,
+            result,
             (),
             tuple(sections),
             source=source_line(cited(Heading.of(study.config.title, study.config.file))),
@@ -68,10 +68,9 @@ def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
 
 def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
-    s = b.Source(result, study.driver_noun)
     blocks: list[b.Block] = list(answer.sentence(study))
     with shown_in(study.config.units):
-        for block in answer.blocks(s, study):
+        for block in answer.blocks(study):
             if isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
                 blocks.append(replace(block, form="both"))
         if study.answers:
@@ -80,7 +79,7 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
         return b.Report(
             study.config.title,
             study.kind,
-            s.result,
+            result,
             (),
             (b.Section("summary", "Summary", tuple(blocks)),),
             failure=_failure(study),
@@ -295,14 +294,14 @@ def _version(name: str) -> str:
 def _sections() -> Mapping[str, Contents]:
     """By name, all sections that a report may have."""
     return {
-        "answer": Contents("The answer", answer.blocks),
+        "answer": Contents("The answer", lambda s, study: answer.blocks(study)),
         QUESTION: Contents("The question", _question),
         "live": Contents("Try it", _live),
         **{name: contents for name, contents in analysis_sections().items() if contents.before == "runs"},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
         **analysis_sections(),
-        "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
+        "plots": Contents("Plots", lambda s, study: figures.PICTURES.figures(study), figures.PICTURES.files),
         "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),
         "basis": Contents("Basis of the results", _basis),
         "given": Contents("Given values", _given),

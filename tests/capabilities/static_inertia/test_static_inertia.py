@@ -12,7 +12,6 @@ from chainunit.capabilities.static_inertia import CAPABILITY, StaticInertiaAnaly
 from chainunit.machines.api import ChainUnitMachine
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.machine import Machine
-from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
@@ -58,7 +57,7 @@ def test_a_machine_that_turns_slowly_has_the_same_torque(name):
 
 def said(findings):
     study = SimpleNamespace(findings={"static_inertia": findings})
-    blocks = CAPABILITY.answer(Source({}), study).end
+    blocks = CAPABILITY.answer(study).end
     return [plain_line(block.line) for block in blocks]
 
 

@@ -74,7 +74,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield _sweep(x)
     if chain.critical:
         yield from _critical(chain, x)
-    yield from PICTURES.figures(s, study)
+    yield from PICTURES.figures(study)
 
 
 def speeds_to_avoid(study: StudyRecord) -> Iterator[b.Judgement]:
@@ -173,7 +173,7 @@ def _critical(chain: ChainResult, x: ChainResult) -> Iterator[b.Block]:
 
 
 @PICTURES.declare(lambda study: len(ChainResult.of_study(study).speeds) > 1, "chain_sweep.png")
-def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _over_speed(study: StudyRecord) -> fig.Figure:
     """Torques of chains and two bars, and the share of the time with a slack rod, over the crank speed."""
     result = ChainResult.of_study(study)
     x, rows = cited(result, "findings.chain"), result.speeds

@@ -84,7 +84,7 @@ class Alone:
 
 
 @result
-class Comparison:
+class StudyComparison:
     """Two results of studies side by side: the content of comparison.json."""
 
     chainunit: str = part("version of chainunit")
@@ -99,7 +99,7 @@ class Comparison:
     only: Mapping[str, Alone] = part("by result, what it has alone")
 
 
-def compare(a: StoredResult, b: StoredResult) -> Comparison:
+def compare(a: StoredResult, b: StoredResult) -> StudyComparison:
     """Both results side by side."""
     results, pairs = {"a": a, "b": b}, (SIDES, SIDES[::-1])
     values = {side: dict(_given_values(stored.data)) for side, stored in results.items()}
@@ -109,7 +109,7 @@ def compare(a: StoredResult, b: StoredResult) -> Comparison:
     names = dict.fromkeys([*values["a"], *values["b"]])
     different = [name for name in names if not _same(*(values[side].get(name) for side in SIDES))]
     origins = {side: as_mapping(stored.data.get("origins")) for side, stored in results.items()}
-    return Comparison(
+    return StudyComparison(
         __version__,
         {side: _head(stored) for side, stored in results.items()},
         {side: _verdicts(stored) for side, stored in results.items()},

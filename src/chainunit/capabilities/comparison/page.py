@@ -11,7 +11,7 @@ from ...report.lines import Aside, Line, Name, capital, filled, join, line
 from ...report.task import Task
 from ...study.measures import MEASURES
 from ...study.stored_result import StoredResult
-from .comparison import SIDES, ComparedValue, Comparison, compare
+from .comparison import SIDES, ComparedValue, StudyComparison, compare
 
 _FOLLOWS = {"tuned": "tuned", "catalogue": "of the catalogue", "sizing": "by sizing"}
 """By origin, the words beside a given value that the file does not give."""
@@ -20,7 +20,7 @@ _DIGITS = (0, 9, 12, 15)
 """Digits with which two given values are shown until they differ; 0 is the usual number."""
 
 
-def comparison_report(comparison: Comparison) -> b.Report:
+def comparison_report(comparison: StudyComparison) -> b.Report:
     """The report on a comparison."""
     x = cited(comparison)
     return b.Report(
@@ -37,7 +37,7 @@ def comparison_report(comparison: Comparison) -> b.Report:
     )
 
 
-def _opening(x: Comparison) -> Iterator[b.Block]:
+def _opening(x: StudyComparison) -> Iterator[b.Block]:
     """Both files, their verdicts, and the warnings that only one has."""
     for side, compared in x.files.items():
         titled = line(side.upper(), ": ", compared.title) if compared.title else side.upper()
@@ -53,7 +53,7 @@ def _opening(x: Comparison) -> Iterator[b.Block]:
             yield b.Judgement("warning", line(f"only {side.upper()}: ", warning))
 
 
-def _given(x: Comparison, comparison: Comparison) -> Iterator[b.Block]:
+def _given(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
     names, equal = comparison.given, exact(x.given_equal)
     # of an event that one of them has alone the terminal gives the name of its run
     alone = tuple(f"event.{event}." for side in comparison.only.values() for event in side.events)
@@ -103,14 +103,14 @@ def _digits(compared: ComparedValue) -> int:
     return next(differ, _DIGITS[-1])
 
 
-def _only(comparison: Comparison) -> Iterator[b.Block]:
+def _only(comparison: StudyComparison) -> Iterator[b.Block]:
     for side, alone in comparison.only.items():
         for noun, titles in (("runs", alone.runs), ("measures", alone.measures)):
             if titles:
                 yield b.Text(f"Only {side.upper()} has the {noun}: {'; '.join(titles)}.")
 
 
-def _runs(x: Comparison, comparison: Comparison) -> Iterator[b.Block]:
+def _runs(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
     equal = []
     for run, compared in comparison.runs.items():
         measures = compared.measures.items()
@@ -138,6 +138,6 @@ def _is_short(run: str, name: str) -> bool:
     return not run.startswith("pins.") and (measure is None or not measure.minor)
 
 
-TASK: Task[tuple[StoredResult, StoredResult], Comparison] = Task(
+TASK: Task[tuple[StoredResult, StoredResult], StudyComparison] = Task(
     "compare", lambda pair, folder, progress: compare(*pair), comparison_report
 )

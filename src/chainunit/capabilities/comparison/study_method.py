@@ -13,11 +13,11 @@ from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.stored_result import StoredResult, read_result, stored_result
 from ...work.progress import TaskProgress
-from .comparison import Comparison
+from .comparison import StudyComparison
 from .page import TASK
 
 
-class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], Comparison]):
+class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], StudyComparison]):
     """Two results side by side, A and B. Its `repr` shows the verdicts of both and the given values that differ."""
 
     _task = TASK

@@ -15,7 +15,7 @@ from ...report.cited import cited, number
 from ...report.lines import Name, filled, line
 from ...report.task import Task, Writer
 from ...study.record import LOAD_CYCLE
-from .sizing import CYCLE, RUN, STUDY, Sizing, by_name, sizing_of
+from .sizing import CYCLE, RUN, STUDY, HandedDrive, by_name, sizing_of
 from .studied import read_study
 from .tables import CANDIDATES, CHECKS, candidates_csv, checks_csv, cycle_csv
 
@@ -23,7 +23,7 @@ from .tables import CANDIDATES, CHECKS, candidates_csv, checks_csv, cycle_csv
 class Handover(NamedTuple):
     """The files for other programs, ready to be written: the content of sizing.json, and those beside it by name."""
 
-    sizing: Sizing
+    sizing: HandedDrive
     files: Mapping[str, bytes]
 
 
@@ -64,7 +64,7 @@ def handover_report(handover: Handover) -> b.Report:
     )
 
 
-def _opening(x: Sizing) -> Iterator[b.Block]:
+def _opening(x: HandedDrive) -> Iterator[b.Block]:
     rows = tuple(
         b.TableRow((Name(name), value if isinstance(value, str) else number(value, 5)))
         for name, value in by_name(x.parts)
@@ -75,7 +75,7 @@ def _opening(x: Sizing) -> Iterator[b.Block]:
     yield b.Table(rows, b.heads("name", "value"), numeric=False, title="Values of the drive", form="long")
 
 
-def _left_open(sizing: Sizing) -> Iterator[b.Block]:
+def _left_open(sizing: HandedDrive) -> Iterator[b.Block]:
     if not sizing.open:
         yield b.Text("Every value of sizing.json is known.")
         return

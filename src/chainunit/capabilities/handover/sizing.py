@@ -48,7 +48,7 @@ class Message:
 
 
 @result
-class Sizing:
+class HandedDrive:
     """The numbers of a sized drive: the content of sizing.json."""
 
     chainunit: str = part("version of chainunit")
@@ -65,7 +65,7 @@ class Sizing:
     open: list[str] = part("names of the values that the study does not know")
 
 
-def sizing_of(study: StudiedDrive) -> Sizing:
+def sizing_of(study: StudiedDrive) -> HandedDrive:
     """The numbers of the drive of a study."""
     parts: dict[str, dict[str, InUnit | str | None]] = {}
     for name, unit, value in _values(study):
@@ -77,7 +77,7 @@ def sizing_of(study: StudiedDrive) -> Sizing:
     written = datetime.fromtimestamp(int(study.result.file.stat().st_mtime), UTC)
     with suppress(ValueError):  # of a study without a date in ISO 8601
         written = datetime.combine(date.fromisoformat(study.text("report/date")), time(), UTC)
-    return Sizing(
+    return HandedDrive(
         __version__,
         study.text("title"),
         study.text("report/project"),

@@ -18,19 +18,19 @@ _LARGEST = "crank_torque_peak"
 """The quantity of random overloads that the answer states."""
 
 
-def summary(s: b.Source, study: StudyRecord) -> Line:
+def summary(study: StudyRecord) -> Line:
     """The sentence on random overloads: the largest quantile of the crank torque, and how often a run ends badly."""
     x = cited(MonteCarloResult.of_study(study), PATH)
     quantiles = x.quantiles
     ends = OUTCOMES if study.config.coupling else {"stalls": OUTCOMES["stalls"]}
     parts = [
-        filled("{} in {}", of_driver(outcome, s.driver), estimate(quantiles[name]["share"]))
+        filled("{} in {}", of_driver(outcome, study.driver_noun), estimate(quantiles[name]["share"]))
         for name, outcome in ends.items()
         if name in quantiles
     ]
     if sizes := list(quantiles.get(_LARGEST, {}).items()):
         name, largest = sizes[-1]
-        stay = f"{name[1:]} % stay below a {s.driver} torque of {{}}"
+        stay = f"{name[1:]} % stay below a {study.driver_noun} torque of {{}}"
         parts.insert(0, filled(stay, estimate(largest)))
     return filled("Of {} overloads at random: {}.", exact(x.runs), join(parts, "; "))
 
@@ -53,7 +53,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     rows = tuple(
         b.TableRow(
             (
-                of_driver(descriptions[name], s.driver),
+                of_driver(descriptions[name], study.driver_noun),
                 *(estimate(sizes[column]) if column in sizes else "" for column in columns),
             )
         )

@@ -25,7 +25,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     x = cited(OrganFindings.of_study(study), "findings.organs")
     yield _factors(study, x)
     yield from _limits(study, x)
-    yield from PICTURES.figures(s, study)
+    yield from PICTURES.figures(study)
 
 
 def _factors(study: StudyRecord, x: OrganFindings) -> b.Table:
@@ -68,7 +68,7 @@ def _limits(study: StudyRecord, x: OrganFindings) -> Iterator[b.Block]:
     yield b.Table(rows, title="Limits of the model", form="long")
 
 
-def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def up_to_speed(study: StudyRecord) -> Iterator[b.Block]:
     """The crank speeds up to which two bars stand for chains; nothing where no run has two bars."""
     findings, verdict = OrganFindings.found_in(study), study.verdict
     if findings is None or verdict is None:
@@ -103,7 +103,7 @@ _SHADED = (
 
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
-def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _sides(study: StudyRecord) -> fig.Figure:
     sides = OrganFindings.of_study(study).sides
     titles = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 

@@ -32,7 +32,7 @@ _EMPTY_START = (
 )
 
 
-def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def answer(study: StudyRecord) -> Iterator[b.Block]:
     """Cards with the motor of all runs, its gear, flywheel and protection, and a table of the share that this drive
     takes of each limit."""
     findings = SizingFindings.found_in(study)
@@ -48,7 +48,7 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             ((best.designation, str(findings.best.verdict)),),
             (*_data(study), *_starter(study, drive, sized, best.numbers)),
         ),
-        b.Card("Gear ratio", ((ratio, f"motor turns per {s.driver} turn"),), gear),
+        b.Card("Gear ratio", ((ratio, f"motor turns per {study.driver_noun} turn"),), gear),
         b.Card(
             "Flywheel",
             ((number(x.flywheel.J) if findings.best.disc else "none", "flywheel on the motor shaft"),),
@@ -61,7 +61,7 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         cards.append(b.Card("Protection", (setting,)))
     elif isinstance(drive.protection, DriveProtection):
         torque: Line = number(protection.trip_torque) if drive.protection.trip_torque else "none"
-        limiter = torque, of_driver(_TRIP_TORQUE, s.driver)
+        limiter = torque, of_driver(_TRIP_TORQUE, study.driver_noun)
         cards.append(b.Card("Protection", (limiter,), tuple(_protection(drive.protection, protection))))
     yield b.Cards(tuple(cards))
     yield from _parts(drive, sized)

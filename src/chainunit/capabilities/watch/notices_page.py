@@ -32,7 +32,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield _who_notices(study, x)
     steady = quantity_rows(x.steady, study.driver_noun)
     yield b.Table(steady, title="The load observer in normal running", form="long")
-    yield from PICTURES.figures(s, study)
+    yield from PICTURES.figures(study)
 
 
 def _who_notices(study: StudyRecord, x: ObserverFindings) -> b.Table:
@@ -62,7 +62,7 @@ _SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
 
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices, "observer.png")
-def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _print(study: StudyRecord) -> fig.Figure:
     """All events beside each other, for print."""
     events = [_event(study, name) for name in ObserverFindings.of_study(study).notices]
     rows = zip(*(figure.panels for figure in events), strict=True)
@@ -78,7 +78,7 @@ def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices)
-def _events(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
+def _events(study: StudyRecord) -> Iterator[fig.Figure]:
     return (_event(study, name) for name in ObserverFindings.of_study(study).notices)
 
 
