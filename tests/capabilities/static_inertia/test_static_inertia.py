@@ -56,7 +56,7 @@ def test_a_machine_that_turns_slowly_has_the_same_torque(name):
 
 
 def said(findings):
-    study = SimpleNamespace(findings={"static_inertia": findings})
+    study = SimpleNamespace(findings={"static_inertia": findings}, driver_noun="crank")
     blocks = CAPABILITY.answer(study).end
     return [plain_line(block.line) for block in blocks]
 

@@ -151,9 +151,9 @@ def _data(study: StudyRecord) -> Iterator[Line]:
     """The data of the motor of all runs."""
     if study.plate is not None:
         x = rating(study.plate)
-        given = "{}, {} poles, {}, {}, {}, {}, {}"
+        plate = "{}, {} poles, {}, {}, {}, {}, {}"
         sizes = map(exact, (x.rated_power, x.poles, x.rated_voltage, x.rated_frequency))
-        yield filled(given, *sizes, *map(number, (x.rated_speed, x.rated_torque, x.rated_current)))
+        yield filled(plate, *sizes, *map(number, (x.rated_speed, x.rated_torque, x.rated_current)))
 
 
 def _gear_torque(x: SizedDrive) -> Iterator[Line]:
