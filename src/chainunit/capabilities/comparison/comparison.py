@@ -25,6 +25,9 @@ _RUNS = {"answers": "", "shaft": ": driveline", "pins": ": forces in the bearing
 """By table of a result with numbers of each run, what follows the title of the run."""
 _RANDOM = "monte_carlo.quantiles"
 
+_TEXTS = ("unit", "kind", "title")
+"""The texts beside the value of a number."""
+
 Numbers = dict[str, InUnit]
 """Numbers of a run by their dotted names."""
 
@@ -170,7 +173,7 @@ def _warnings(stored: StoredResult) -> Iterator[tuple[Any, str]]:
 def _leaves(node: Any, path: str) -> Iterator[tuple[str, Any]]:
     """All values below a node with their dotted names: numbers in their units, switches, lists of numbers, texts."""
     if _is_entry(node):
-        yield path.removeprefix("."), InUnit(node["value"], node["unit"], node.get("kind", ""))
+        yield path.removeprefix("."), InUnit(*(node.get(key, "") for key in ("value", *_TEXTS)))
     elif isinstance(node, Mapping):
         for name, below in node.items():
             yield from _leaves(below, f"{path}.{printable(name)}")
@@ -187,7 +190,7 @@ def _is_entry(node: Any) -> bool:
     """Whether a node is a number or a list of numbers with its unit, as this program writes it."""
     if not isinstance(node, Mapping) or "value" not in node:
         return False
-    value, texts = node["value"], (node.get("unit"), node.get("kind", ""))
+    value, texts = node["value"], (node.get("unit"), *(node.get(key, "") for key in _TEXTS[1:]))
     numbers = value if isinstance(value, list) else [] if value is None else [value]
     return all(map(_is_finite, numbers)) and all(
         isinstance(text, str) and text.isprintable() for text in texts
@@ -275,8 +278,8 @@ def _measure(title: str, a: InUnit, b: InUnit) -> ComparedMeasure:
             share = difference / x
     return ComparedMeasure(
         title,
-        a._replace(value=x),
-        b._replace(value=y),
+        InUnit(x, a.unit, a.kind),
+        InUnit(y, b.unit, b.kind),
         InUnit(difference, a.unit, of_difference),
         InUnit(share, "1", "percent"),
     )
