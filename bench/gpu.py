@@ -95,10 +95,8 @@ class Device:
     def kernels(self, values: dict[str, Any], count: int, resident: int) -> tuple[float, dict[str, Any]]:
         """The time of the kernels alone, with so many blocks on a processor; registers and local bytes."""
         own = equations(self.machine.model, CHOSEN, ())
-        names = [v.name for v in own.arguments]
         start = {v.name: v.quantity.start for v in own.arguments} | self.machine.by_name | values
-        entries = [(kind, k) for kind, size in enumerate(own.sizes) for k in range(size)]
-        entry = dict(zip(names, entries, strict=True))
+        entry = {variable.name: place for place, variable in own.entries.items()}
         before, cuda._RESIDENT = cuda._RESIDENT, resident
         try:
             kernel = cuda.CudaKernel(own, [entry[name] for name in ENDS], (), self.cupy)

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 from figures import parser, save, table
 
+from chainunit import GeometryError
 from chainunit.capabilities.identification.posterior import posterior
 from chainunit.capabilities.identification.suspects import (
     REJECTION,
@@ -333,9 +334,17 @@ def is_shown(of: Stated, name: str, known: KnownNumbers) -> bool:
 
 
 def stated_result(trial: str, k: int) -> dict[str, Any]:
-    """The identification of the machine of this number."""
+    """The identification of the machine of this number. A machine that cannot turn with the stated lengths is refused
+    before a fit: its suspects are the lengths that the refusal names."""
     of = stated(trial, k)
-    asked = stated_problem(of)
+    try:
+        asked = stated_problem(of)
+    except GeometryError as refusal:
+        named = {"names": [f"machine.{name}" for name in refusal.names], "excess": 0.0, "describes": None}
+        return {
+            "wrong": of.wrong, "shown": [], "is_described": False, "refusal": str(refusal), "sets": [named],
+            "numbers": [], "rounds": 0, "seconds": 0.0,
+        }  # fmt: skip
     began = time.perf_counter()
     best = fit(asked)
     known, around = known_number_tests(asked, best), posterior(asked, best)

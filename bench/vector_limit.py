@@ -27,7 +27,7 @@ from typing import Any
 
 from figures import least
 
-from chainunit.batch.equations import arguments_of, equations
+from chainunit.batch.equations import equations
 from chainunit.batch.native import aligned, load
 from chainunit.core.native.compilers import compiler
 from chainunit.core.printing.vector_code import VectorCode, header
@@ -116,11 +116,8 @@ def time_of(kind: str) -> float:
 def operations(model: Any, outputs: Sequence[str], varying: Sequence[str], by: Sequence[str] = ()) -> Counter:
     """Numbers of instructions on a vector, by kind, in the code of these outputs over arrays of these arguments."""
     own = equations(model, tuple(outputs), tuple(by))
-    names = [v.name for v in arguments_of(model)]
-    p, u, _ = own.sizes
-    places = [names.index(name) for name in varying]
-    entries = [(0, k) if k < p else (1, k - p) if k < p + u else (2, k - p - u) for k in places]
-    code = VectorCode(own.operations, entries)
+    entries = {variable.name: entry for entry, variable in own.entries.items()}
+    code = VectorCode(own.operations, [entries[name] for name in varying])
     uses: Counter = Counter(k for each in code._items for k in each.operands)
     uses.update(place for group in code._results for place in group)
     counts: Counter = Counter()

@@ -26,9 +26,9 @@ class ForeignMotor(Fmi2Slave):
             self.vars[len(self.vars) - 1].setter = lambda value, name=name: self.u.update({name: value})
         self.declare("phi", Fmi2Causality.output, lambda: self.x[0])
         self.declare("w", Fmi2Causality.output, lambda: self.x[1])
-        self.declare("a", Fmi2Causality.output, lambda: self.rates(self.x)[1])
-        if "tau" not in LEFT_OUT:
-            self.declare("tau", Fmi2Causality.output, self.torque)
+        for name, getter in {"a": lambda: self.rates(self.x)[1], "tau": self.torque}.items():
+            if name not in LEFT_OUT:
+                self.declare(name, Fmi2Causality.output, getter)
         self.drag = DRAG
         drag = Real(
             "drag",

@@ -15,8 +15,8 @@ from chainunit.core.engines import casadi_
 from chainunit.core.native.compilers import compile_code, compiler
 from chainunit.core.printing import c_code
 from chainunit.core.printing.c_elementary import header
+from chainunit.core.printing.kernels import ModelFunction, kernels
 from chainunit.fmu.description import Interface
-from chainunit.fmu.native import generate
 from chainunit.models import MODELS
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -47,6 +47,10 @@ def called(tmp_path):
     return call
 
 
+def function(arguments, groups, offsets):
+    return ModelFunction("some", "", arguments, groups, offsets, "OFTEN")
+
+
 def expressions():
     """Two arguments, and groups that share operations, take one another's results, arguments and numbers."""
     a, b = casadi.SX.sym("a", 3), casadi.SX.sym("b", 2)
@@ -65,7 +69,7 @@ def test_only_what_is_wanted_is_written_and_right(called, longest, monkeypatch):
     monkeypatch.setattr(c_code, "_LONGEST", longest)
     arguments, groups = expressions()
     offsets = [2, 10, 20]
-    program = c_code.Program("some", arguments, groups, offsets, "OFTEN")
+    program = c_code.Program(function(arguments, groups, offsets))
     exact = casadi.Function("f", arguments, [casadi.vertcat(*groups)])
     rng = np.random.default_rng(1)
     for reference in (1, 2, 4, 5, 7):
@@ -80,7 +84,7 @@ def test_only_what_is_wanted_is_written_and_right(called, longest, monkeypatch):
 
 def test_each_operation_stands_once():
     arguments, groups = expressions()
-    program = c_code.Program("some", arguments, groups, [0, 4, 7], "OFTEN")
+    program = c_code.Program(function(arguments, groups, [0, 4, 7]))
     for operation in ("sine_and_cosine(", "sqrt(", "arctangent2(", "least_of(", "exponential("):
         assert program.text.count(operation) == 1, operation
 
@@ -88,8 +92,8 @@ def test_each_operation_stands_once():
 @pytest.mark.parametrize("name", ["ChamberForces", "ChainUnitFlexible"])
 def test_groups_of_a_model_share_their_operations(name):
     """Less than a tenth more than all outputs in one function, in parts that a compiler is fast with."""
-    program = next(iter(generate._programs(Interface(MODELS[name], {}))))
     t = Interface(MODELS[name], {}).trace
+    program = c_code.Program(next(kernels(t, [])))
     symbols, outputs = t.symbols, t.outputs
     single = casadi.Function("f", symbols, [casadi.cse(casadi.vertcat(*outputs))]).n_instructions()
     parts = re.split(r"static void values_", program.text)[1:]
@@ -105,7 +109,7 @@ def test_every_operation_of_an_engine_is_known(called):
     rows += [xp.minimum(x, 0.3), xp.maximum(x, 0.3), x**3, 1.0 / x, -x, 2.0 - x, x * x]
     both = casadi.vertcat(*rows)
     both = casadi.vertcat(both, casadi.jtimes(both, x, casadi.SX(1.0)))
-    program = c_code.Program("all", [x], [both], [0], "OFTEN")
+    program = c_code.Program(function([x], [both], [0]))
     for at in (0.2, 0.7):
         want = np.array(casadi.Function("f", [x], [both])(at)).ravel()
         np.testing.assert_allclose(called(program, [[at]], 1)[: len(want)], want, rtol=2e-15)

@@ -8,12 +8,12 @@ import math
 
 import numpy as np
 import pytest
+from basic_operations import ARRAYS as XP
 
 from chainunit.core.native.compilers import compile_code, compiler
 from chainunit.core.printing import elementary
 from chainunit.core.printing.c_elementary import HEADER, header
 
-XP = elementary.numpy_basic()
 LONG = np.longdouble
 long_doubles = pytest.mark.skipif(np.finfo(LONG).nmant < 63, reason="long doubles have no 64 bits here")
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")

@@ -527,6 +527,21 @@ def test_a_motor_without_a_torque_whose_parameters_are_set(folder, tmp_path):
         run.run_study(config.parse(wrong, str(tmp_path / "x.toml")), tmp_path / "out")
 
 
+def test_a_motor_without_an_acceleration_is_the_cause_of_the_missing_energy(folder, tmp_path):
+    """A shorter step, which the verdict named, left the same residual."""
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.read_text().replace("class ForeignMotor", "class SteadyMotor"))
+    build(tmp_path, OTHER, ["a", "tau"], script)
+    text = (folder / "foreign.toml").read_text().replace("ForeignMotor", "SteadyMotor")
+    study = run.run_study(config.parse(text, str(tmp_path / "x.toml")), tmp_path / "out")
+    (remark,) = [remark for remark in study.warnings if remark.code == "no-acceleration"]
+    assert "SteadyMotor.fmu does not give its acceleration" in remark.text
+    assert "the energy balance is not kept" in study.verdict.text
+    assert (
+        "run.step" not in study.verdict.text and "give the acceleration a of the motor" in study.verdict.text
+    )
+
+
 def test_a_block_has_no_peaks_of_what_is_not_known(folder):
     """The range of an assumption is told of the torques that there are."""
     text = (folder / "foreign.toml").read_text().replace('type = "jam"\nside = "left"', 'type = "blocked"')

@@ -329,7 +329,7 @@ def test_lengths_beside_those_of_the_example_are_named(tmp_path):
     config = load(file)
     remark = lengths_of_example(config.file.given, bool(config.machine.model.sides))
     assert remark.text.startswith(
-        "The file gives the lengths r, l, z of the chain unit. The lengths h, c, hy, e, l1, l2 are"
+        "The file gives the lengths r, l, z of the chain unit. The lengths h, c, hy, e, l1, l2 come"
     )
     assert remark.remedy.startswith("Give them, too, or rho = r/l")
     assert remark.text in remarks_on_export(config)

@@ -28,8 +28,8 @@ from chainunit.core import inputs
 from chainunit.core.errors import Faults, InputError
 from chainunit.drives.catalogue import offer
 from chainunit.drives.catalogue_rows import MOST_FAULTS, MOST_ROWS
+from chainunit.machines.linkages.entries import MOST_POINTS
 from chainunit.machines.linkages.file import description_of, read_linkage
-from chainunit.machines.linkages.load_entries import MOST_POINTS
 from chainunit.reading import toml_lines
 from chainunit.recordings.recording import read_recording
 from chainunit.report.series import LOAD_CYCLE_HEADS

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from basic_operations import ARRAYS
 from javascript_hosts import HOSTS, chromium, in_node, node, profile_numbers
 
 from chainunit import InputError
@@ -151,11 +152,10 @@ def by_numpy_operations():
         "AND": np.logical_and, "OR": np.logical_or, "NOT": np.logical_not,
         "IF_ELSE_ZERO": lambda c, x: np.where(c, x, 0.0),
     }  # fmt: skip
-    xp = elementary.numpy_basic()
     for kind, (function, _, place) in elementary.OWN.items():
 
         def own(*x, function=function, place=place):
-            result = function(xp, *x)
+            result = function(ARRAYS, *x)
             return result[place] if isinstance(result, tuple) else result
 
         forms[kind] = own
@@ -265,7 +265,7 @@ def test_a_thousand_states_in_chromium(name):
 
 def test_own_functions_have_the_bits_of_the_definition():
     """Each as the output of a model."""
-    rng, xp = np.random.default_rng(4), elementary.numpy_basic()
+    rng, xp = np.random.default_rng(4), ARRAYS
     x = rng.choice([-1.0, 1.0], (500, 2)) * 10.0 ** rng.uniform(-4.0, 4.0, (500, 2))
     x[:100] = rng.uniform(-1.1, 1.1, (100, 2))
     x = np.concatenate([x, np.full((1, 2), np.nan), np.zeros((1, 2)), -np.zeros((1, 2))])

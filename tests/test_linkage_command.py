@@ -115,7 +115,7 @@ def test_export(tmp_path, direct):
         (("linkage", "nope.toml"), "nope.toml: cannot be read"),
         (
             ("linkage", str(PRESS), "--speed", "60 mm"),
-            '--speed "60 mm": mm is a length; must be a speed in rev/min, rad/s, deg/s or Hz',
+            '--speed "60 mm": mm is a length; must be a speed in rev/min, rad/s, Hz or rpm',
         ),
         (
             ("linkage", str(PRESS), "--speed", "60 furlong"),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 import re
+from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -16,8 +18,10 @@ from chainunit.core.errors import InputError
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
-from chainunit.machines.linkages.file import description_of
+from chainunit.machines.linkages import model as linkage_model
+from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
+from chainunit.machines.linkages.parts import LinkageParts
 from chainunit.machines.machine import Machine
 
 STATES = [(name, state) for name, each in MACHINES.items() for state in each["states"]]
@@ -45,6 +49,32 @@ def test_groups_are_those_of_the_description(name):
     assert [group.kind for group in groups] == KINDS[name]
     told = [(g["kind"], {*g["bodies"]}) for g in MACHINES[name]["description"]["groups"]]
     assert [(group.kind, {*group.links}) for group in groups] == told
+
+
+@pytest.mark.parametrize("name", ["slider_crank_press", "cylinder_lift", "straight_line_pump"])
+def test_the_start_values_are_reckoned_once(name, monkeypatch):
+    """One linkage of numbers from the file to the check of the start values, and what is kept of it is right."""
+    engines, make = [], LinkageParts.__init__
+
+    def counted(parts, geometry, sides):
+        engines.append(geometry.xp)
+        make(parts, geometry, sides)
+
+    monkeypatch.setattr(LinkageParts, "__init__", counted)
+    linkage_model._machine_of.cache_clear()
+    machine = read_linkage(Path(__file__).parents[1] / "examples" / "linkages" / f"{name}.toml")
+
+    def derived_and_limits(p):
+        derived = machine.derive(MATH, p)
+        object.__setattr__(p, "derived", derived)
+        return [*derived, *np.ravel([*machine.requirements(MATH, p)])]
+
+    at_start = derived_and_limits(machine.Parameters())
+    assert engines.count(MATH) == 1
+    # gravity has no part in them, but other values are reckoned anew
+    heavier = derived_and_limits(dataclasses.replace(machine.Parameters(), g=20.0))
+    assert engines.count(MATH) == 3
+    np.testing.assert_allclose(at_start, heavier, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["blake_crusher", "pump_jack"])

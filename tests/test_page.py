@@ -36,7 +36,6 @@ from chainunit.reading.results import InUnit
 from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.reading.text import number as told_as
 from chainunit.report import html, study_motion
-from chainunit.report import study as study_report
 from chainunit.report.blocks import Report, Section, at, found_at
 from chainunit.report.figure import Label, Mark, Shade
 from chainunit.report.live_block import Live
@@ -920,7 +919,7 @@ def test_any_linkage_moves(knife):
 def test_one_bearing_has_room_for_its_bars(study):
     """A panel without height stops the script of the page, and with it the animation."""
     pins = {run: dict([next(iter(table.items()))]) for run, table in study.pins.items()}
-    figures = study_report.report(dataclasses.replace(study, pins=pins)).figures
+    figures = report_of(dataclasses.replace(study, pins=pins)).figures
     (reactions,) = (figure for figure in figures if figure.name == "reactions")
     layout = plotly_figure(reactions, DEFAULT_UNITS).layout
     assert layout.height - layout.margin.t - layout.margin.b > 100

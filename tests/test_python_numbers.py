@@ -11,16 +11,23 @@ import pytest
 import xarray as xr
 
 from chainunit import ChainUnitMachine, InputError, SideLoads, Study, linearize, linkage
-from chainunit.batch import Beyond, Histogram
+from chainunit.batch import Beyond, Histogram, evaluate
+from chainunit.core.bounds import complaint
+from chainunit.core.declared_numbers import one_number
+from chainunit.core.named import Named
+from chainunit.core.quantities import Quantity, Variable
 from chainunit.machines.api import ChainUnitOfChains
 from chainunit.machines.chain_unit import Feed
 from chainunit.machines.crank_rocker import CrankRocker
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.machine import Machine
 from chainunit.models import MODELS
-from chainunit.system import CompiledSimulation, ModelComponent, System, shaft_joints
+from chainunit.system import CompiledSimulation, ModelComponent, Profile, System, monolithic, shaft_joints
+from chainunit.work.runner import check_scheduler
 
 UNITS = pint.UnitRegistry()
+DC_MOTOR = MODELS["DcMotor"]
+MOTOR = {"motor": ModelComponent(DC_MOTOR, DC_MOTOR.Parameters())}
 MM, RPM, DEG, KG, N = UNITS.mm, UNITS.rpm, UNITS.deg, UNITS.kg, UNITS.newton
 
 
@@ -267,6 +274,19 @@ def test_a_system_takes_them_too():
         simulation.run("3 kg", 0.002)
 
 
+@pytest.mark.parametrize("kind", ["Real", "Integer", "Boolean"])
+def test_a_variable_without_a_description_has_no_empty_brackets(kind):
+    """Of an FMU of somebody else."""
+    with pytest.raises(InputError) as refusal:
+        one_number(Variable("drag", "drag", Quantity("1", "", type=kind)), "x")
+    assert "()" not in str(refusal.value)
+    assert "()" not in complaint("drag", 3.0, "1", "<= 2", True, "")
+
+
+def test_a_long_profile_has_a_short_repr():
+    assert len(repr(Profile(1.0, [(float(k), 0.5, 2.0) for k in range(200)]))) < 500
+
+
 def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, **values):
     options = {"by": by, "over": over, "reduce": reduce, "out": out, "workers": workers}
     return ChainUnitMachine().batch({"phi": [0.0, 0.5]} | values, outputs, **options, engine="numpy")
@@ -344,6 +364,11 @@ def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, 
         (lambda: batch(outputs=["tau"], by=[3]), "by = 3: must be a text, or a list of texts"),
         (lambda: batch(outputs="tau", workers="x"), 'workers = "x": must be a number of threads'),
         (lambda: batch(outputs="tau", out=3), "out = 3: must be the result of an earlier call"),
+        (
+            lambda: batch(w=xr.DataArray([1.0], dims="x", attrs={"units": "kg"})),
+            "w in kg: must be a number in rad/s",
+        ),
+        (lambda: MODELS["DcMotr"], '"DcMotr": no such model; was "DcMotor" meant? there are'),
         (lambda: batch(w=xr.DataArray(["1 rpm", "2 kg"], dims="x")), 'w = "2 kg": must be a number in rad/s'),
         (
             lambda: batch(w=xr.DataArray(np.array([None, 1.0], object), dims="x")),
@@ -374,6 +399,51 @@ def batch(outputs=None, by=(), over="phi", reduce=None, out=None, workers=None, 
         (lambda: Study().run(3), "folder = 3: must be the path of a folder"),
         (lambda: Study().run(progress=3), "progress = 3: must be a function"),
         (lambda: Study().export("x.fmu", progress=3), "progress = 3: must be a function"),
+        (lambda: ChainUnitMachine(r=[1, 2] * MM), 'millimeter": must be one number'),
+        (lambda: ChainUnitMachine().evaluate(3 * KG), 'inputs = "3 kilogram": must be a mapping'),
+        (lambda: batch(outputs=3 * KG), 'outputs = "3 kilogram": must be a text, or a list of texts'),
+        (lambda: batch(outputs=np.array(3)), "outputs = 3: must be a text, or a list of texts"),
+        (lambda: Study(title=np.longdouble(3)), "title = 3.0: must be a text"),
+        (lambda: Study(machine={"r": np.clongdouble(3)}), "machine.r = (3+0j): must be a number in m"),
+        (lambda: linearize(3), "of = 3: must be a study, a study file"),
+        (lambda: linearize(""), ": no such model; there are"),
+        (lambda: linearize("DcMotor", config=3), "config = 3: must be the path of a study file"),
+        (lambda: Study().export("x.fmu", fmi=np.ones(2)), "fmi = [1.0, 1.0]: must be 2 or 3"),
+        (lambda: Study().export("x.fmu", names=np.ones(2)), "names = [1.0, 1.0]: must be one of structured"),
+        (lambda: Study().export("x.fmu", backend=np.ones(2)), "backend = [1.0, 1.0]: must be one of native"),
+        (
+            lambda: evaluate("DcMotor", {}),
+            'model = "DcMotor": must be a model, such as MODELS["DcMotor"] of chainunit.models',
+        ),
+        (
+            lambda: ChainUnitMachine().batch({}, engine=np.ones(2)),
+            "engine = [1.0, 1.0]: must be one of native",
+        ),
+        (lambda: Machine("KnifeDrive"), 'model = "KnifeDrive": must be a machine'),
+        (lambda: CrankRocker("3 kg", 1.0, 1.0, 1.0), 'r = "3 kg": must be a number in m'),
+        (lambda: Study(event=[]).run(scheduler=3), "scheduler = 3: is for random overloads"),
+        (lambda: check_scheduler(3), "scheduler = 3: must be the address of a Dask scheduler"),
+        (lambda: Named({"a": 1})[[1]], "[1]: is no name; there are a"),
+        (lambda: System(3), "components = 3: must be a mapping of names to components"),
+        (lambda: System({"motor": 3}), "components.motor = 3: must be a ModelComponent"),
+        (lambda: System({}, 3), "joints = 3: must be a list of pairs"),
+        (lambda: System({}, start=3), "start = 3: must be a mapping of full names"),
+        (lambda: System(MOTOR, start={"motor.w_ref": None}), "motor.w_ref = None: must be a number in rad/s"),
+        (lambda: System(MOTOR, start={"motor.w_ref": [1.0]}), "motor.w_ref = [1.0]: must be one number"),
+        (lambda: ModelComponent(DC_MOTOR, 3), "parameters = 3: must be the Parameters of DcMotor"),
+        (
+            lambda: ModelComponent(DC_MOTOR, DC_MOTOR.Parameters(w_start=[1.0])),
+            "w_start = [1.0]: must be one number",
+        ),
+        (lambda: CompiledSimulation(System(MOTOR), 3), "signals = 3: must be a mapping of full names"),
+        (
+            lambda: CompiledSimulation(System(MOTOR), {"motor.w_ref": [1.0]}),
+            "motor.w_ref = [1.0]: must be one number",
+        ),
+        (lambda: Profile("3 kg"), 'start = "3 kg": must be a pure number'),
+        (lambda: Profile(0.0, [1.0]), "changes = [1.0]: must be a list of (begin, duration, value after it)"),
+        (lambda: Profile(0.0, [("1 kg", 1.0, 2.0)]), 'begin = "1 kg": must be a number in s'),
+        (lambda: monolithic(System(MOTOR), {}, 3.0), "times = 3.0: must be a list of times"),
     ],
 )
 def test_a_wrong_type_is_refused_in_one_line(call, line):

@@ -16,6 +16,7 @@ from chainunit.capabilities.identification.reading import PlannedRun
 from chainunit.capabilities.watch.watch import watch
 from chainunit.recordings.inspection import (
     Expectation,
+    _turning_speed,
     inspect_columns,
     inspect_motion,
     inspect_steadiness,
@@ -106,6 +107,15 @@ def test_a_good_recording_has_no_fault():
 def test_a_fault_names_its_column(changes, column, words):
     (fault,) = faults(recorded(**changes))
     assert fault.startswith(f"run.csv, column {column}: ") and words in fault
+
+
+@pytest.mark.parametrize(("head", "values", "true"), [("mA", 1.0, "A"), ("kA", 1.0, "A"), ("kA", 1e3, "mA")])
+def test_the_likely_unit_is_another_one_than_the_head_has(head, values, true):
+    """The numbers of the column as they stand in the file, with a wrong unit."""
+    factor = {"mA": 1e-3, "kA": 1e3}[head]
+    recording = recorded(**{"motor.i": factor * values * I})
+    (fault,) = faults(replace(recording, heads=recording.heads | {"motor.i": f"motor.i [{head}]"}))
+    assert f"the values look like {true}; write [{true}] into its head" in fault
 
 
 def wandering(share, **more):
@@ -207,7 +217,10 @@ def test_faults_of_the_rows():
     assert missing.missing == pytest.approx(0.4, abs=1e-3) and missing.gaps == [(1.999, 6.001)]
     slow = recorded(rate=5.0, duration=60.0)
     (fault,) = faults(slow)
-    assert "5 rows a second are 10 in a turn of the crank; record >= 19 rows a second" in fault
+    assert (
+        "5 rows a second are 10 in a turn of the crank; record >= 20 rows a second, correct crank_speed"
+        in fault
+    )
     (fault,) = faults(GOOD.part(0.0, 2.5))
     assert (
         "2.5 s are 1.19 turns of the crank at crank_speed; record >= 3 turns, or correct crank_speed" in fault
@@ -289,6 +302,16 @@ def test_a_stated_speed_far_from_that_of_the_recording_is_the_one_cause(stated, 
     assert speed == pytest.approx(SPEED, rel=0.01) and inspect_motion(recording, (speed, speed), RATIO) == []
 
 
+@pytest.mark.parametrize("stated", [0.45, 0.3])
+@pytest.mark.parametrize("left_out", [("mark",), ("mark", "motor.w")])
+def test_a_column_that_repeats_after_several_turns_tells_the_time_of_one(stated, left_out):
+    """At half the speed the refusal named a third of it, with the remedy to state this third."""
+    whole = recorded(rate=200.0, duration=60.0)
+    columns = {name: x for name, x in whole.columns.items() if name not in left_out}
+    name, speed, error = _turning_speed(replace(whole, columns=columns), stated * SPEED, RATIO, 0.01)
+    assert name in ("motor.i", "motor.u", "motor.w") and speed == pytest.approx(SPEED, rel=error)
+
+
 def test_a_stated_speed_is_not_blamed_for_another_fault():
     """Marks and measured speed contradict each other; a time without its unit slows down the mark alone."""
     columns = {name: x for name, x in GOOD.columns.items() if name != "motor.w"}
@@ -315,6 +338,15 @@ def test_an_encoder_counts_up_and_does_not_begin_anew():
     assert "motor.count [1]: counts down, while the motor turns forward: change its sign" in fault
     (fault,) = of_count(count % 65536.0)
     assert "falls by 65" in fault and "the counter begins anew; write the count without the jump" in fault
+    # by less than 10,000: a counter that is set back by hand, and one of the turn
+    (fault,) = of_count(np.where(GOOD.time < 0.05, count, count - count[50]))
+    assert "at 0.05 s: the counter begins anew" in fault
+    (fault,) = of_count(count % 9000.0)
+    assert "the counter begins anew" in fault
+    # after the motor was switched off, the crank rocks back about as fast as it turned
+    after = np.maximum(GOOD.time - 5.0, 0.0)
+    rocking = np.where(after > 0.0, count[5000] - 9000.0 * np.sin(12.0 * after) * np.exp(-after), count)
+    assert np.diff(rocking).min() < -100.0 and of_count(rocking) == []
 
 
 def coast(current=0.0):
@@ -381,7 +413,7 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
         (table("t [s],motor.i [A]"), "has no column time [s]"),
         (table("time [s],x [A]"), "has no column of a known quantity, such as motor.i [A], "),
         (table("time [s],motor.i"), "column motor.i: has no unit; write [A] behind its name"),
-        (table("time [s],motor.i [V]"), "column motor.i [V]: V is a voltage; must be a current, such as [A] or [mA]"),
+        (table("time [s],motor.i [V]"), "column motor.i [V]: V is a voltage; must be a current in A or mA"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003,x\n"),
          "line 5, column 2, motor.i [A]: x is no number"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003\n"),
@@ -396,9 +428,9 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
          "its heads are: Zeit [s], Strom [A]; name it by the key columns, such as columns = { \"time\" = \"Zeit\" }"),
         (table("time [s],Strom [A]"),
          "heads are: time [s], Strom [A]; name it by the key columns, such as columns = { \"motor.i\" = \"Strom\" }"),
-        (table("time [s],motor.w [kg]"), "[kg]: kg is a mass; must be a speed, such as [rad/s] or [rev/min]"),
-        (table("time [s],motor.power [kWh]"), "kWh is a torque or an energy; must be a power, such as [W] or [kW]"),
-        (table("time [s],crank.tau [%]"), "[%]: % is a share; must be a torque, such as [N m] or [kN m]"),
+        (table("time [s],motor.w [kg]"), "[kg]: kg is a mass; must be a speed in rev/min, rad/s, Hz or rpm"),
+        (table("time [s],motor.power [kWh]"), "kWh is a torque or an energy; must be a power in kW or W"),
+        (table("time [s],crank.tau [%]"), "[%]: % is a share; must be a torque in N m or kN m"),
         (table("time [s],motor.w [1/s]"), "must have a unit like [rad/s]: no angle is named"),
         (table("time [s],motor.i [Foo]"), "must have a unit like [A]: Foo: is no unit"),
     ],
@@ -416,7 +448,7 @@ def test_all_faults_of_a_head_at_once(tmp_path):
     assert "columns.motor.y: no such quantity" in text and "columns.motor.i = 'Stron': no such column" in text
     assert (
         "column time: has no unit" in text
-        and "column motor.u [A]: A is a current; must be a voltage, such as [V]" in text
+        and "column motor.u [A]: A is a current; must be a voltage in V or kV" in text
     )
     with pytest.raises(InputError, match="cannot be read"):
         read_recording(tmp_path / "absent.csv")

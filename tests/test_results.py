@@ -12,7 +12,12 @@ import numpy as np
 import pytest
 from records import record_of
 
+from chainunit import __version__, linkage
 from chainunit.capabilities.blade.analysis import BladeAnalysis
+from chainunit.capabilities.comparison import page as comparison
+from chainunit.capabilities.handover import page as handover
+from chainunit.capabilities.linear import page as linear
+from chainunit.capabilities.linear.result import LinearQuestion
 from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.reading.results import OWN, Estimate, InUnit, as_data, derived, documented, part, result
 from chainunit.study import config as study_files
@@ -22,6 +27,7 @@ from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.provenance import provenance, study_text
 from chainunit.study.rig import Rig
+from chainunit.study.stored_result import StoredResult
 from chainunit.study.turn import TurnAnalysis
 
 
@@ -156,3 +162,17 @@ def test_the_provenance_has_the_digest_of_each_file():
         provenance(tables)["seeds"]
         and study_files.parse(study_text(tables.file)).machine.by_name["r"] == 0.14
     )
+
+
+def test_a_result_without_a_study_has_its_provenance(tmp_path):
+    """Of a linkage, a comparison, a linear model, and files for other programs: the software and the files."""
+    file = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
+    linkage(file, folder=tmp_path / "press")
+    linkage(file, folder=tmp_path / "press")  # its own file is replaced
+    about = json.loads((tmp_path / "press" / "provenance.json").read_text("utf-8"))
+    assert about["files"] == {str(file): hashlib.sha256(file.read_bytes()).hexdigest()}
+    assert about["chainunit"] == __version__ and about["libraries"]["numpy"] and about["platform"]
+    stored = StoredResult(tmp_path / "result.json", {})
+    assert list(comparison.TASK.sources((stored, stored))) == [stored.file] * 2
+    assert list(linear.TASK.sources(LinearQuestion("a.toml", config=file))) == [Path("a.toml"), file]
+    assert list(handover.TASK.sources(tmp_path)) == [stored.file]

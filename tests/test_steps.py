@@ -18,8 +18,8 @@ from chainunit.core import integrators
 from chainunit.core.engines import MATH
 from chainunit.core.model import Model, Part
 from chainunit.core.native.compilers import compiler
+from chainunit.core.ports import Solver
 from chainunit.core.quantities import Layout, Value, declaration, declared_class, group, quantity
-from chainunit.core.solver import Solver
 from chainunit.fmu.backends import export
 
 NOTES, ROWS, STEP = 30, 11, 0.02

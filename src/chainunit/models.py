@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections import ChainMap
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from .core.errors import InputError, near_name
+from .core.errors import InputError, UnknownNameError, meant, near_name, shown
 from .core.inputs import TOML, file_text
 from .core.register import Register
 
@@ -17,11 +17,21 @@ if TYPE_CHECKING:
     from .drives.motor import Motor
     from .mechanism.models import InverseMachine
 
+
+class _Models(ChainMap[str, "Model"]):
+    """Models by name, which refuses an unknown one with the similar one."""
+
+    def __missing__(self, name: Any) -> Model:
+        raise UnknownNameError(
+            f"{shown(name)}: no such model{meant(str(name), self)} there are {', '.join(self)}"
+        )
+
+
 MACHINES: Register[InverseMachine] = Register("chainunit.machines")
 """The machines that study files may name."""
 MOTORS: Register[Motor] = Register("chainunit.motors")
 """The types of motor that study files may name."""
-MODELS: Mapping[str, Model] = ChainMap(Register("chainunit.models"), MOTORS, MACHINES)  # type: ignore[arg-type]
+MODELS: Mapping[str, Model] = _Models(Register("chainunit.models"), MOTORS, MACHINES)  # type: ignore[arg-type]
 """All models."""
 
 
@@ -55,7 +65,7 @@ def model_named(name: str, direct: bool = False, rods: int | None = None) -> Mod
         return machine.direct() if direct else machine
     if name not in MODELS:
         there = f"there are {', '.join(MODELS)}, and study and linkage files (.toml)"
-        file = Path(name).with_suffix(".toml")
+        file = Path(name).parent / f"{Path(name).stem}.toml"
         near = f'; was "{file}" meant?' if file.exists() else near_name(name, MODELS)
         raise InputError(f"{name}: no such model{near or ';'} {there}")
     if direct:

@@ -273,11 +273,23 @@ def _write_schema() -> None:
 
 @app.command("linkage")
 def linkage_command(
-    file: Annotated[Path, typer.Argument(help="Linkage file (TOML).")],
+    source: Annotated[
+        str,
+        typer.Argument(help="Linkage file (TOML); or a drawing: of Linkage, Pyslvs, or an address of PMKS+."),
+    ],
     output: OutputFolder = Path("linkage"),
     speed: Annotated[
         str | None,
         typer.Option("--speed", help='Speed of the driver with its unit; "60 rpm" by default, or "0.1 m/s".'),
+    ] = None,
+    to: Annotated[
+        Path | None, typer.Option("--to", help="Of a drawing: write it as this linkage file, and stop.")
+    ] = None,
+    density: Annotated[
+        str | None, typer.Option("--density", help='Of a drawing: mass of its links, such as "20 kg/m".')
+    ] = None,
+    scale: Annotated[
+        str | None, typer.Option("--scale", help='Of a drawing: its unit of length, such as "mm".')
     ] = None,
     whole: AllOption = False,
     png: PicturesOption = False,
@@ -286,15 +298,30 @@ def linkage_command(
 
     Writes report.html, linkage.json, linkage.md and pictures into the output folder.
     """
+    from ..core.files import write_file
     from ..machines.linkages.file import linkage_in
+    from ..machines.linkages.imports.source import imported
     from ..machines.machine import Machine
     from ..report.linkage_report import TASK, LinkageQuestion
     from ..study.linkage_turn import speed_of_driver
+    from ..study.study_file import toml_text
 
-    model, unusual = linkage_in(file)
+    drawn = imported(source, density, scale)
+    if to is not None:
+        if drawn is None or to.suffix != ".toml" or Path(source).resolve() == to.resolve():
+            raise InputError(
+                f"--to {to}: writes a drawing of another program as a linkage file, such as machine.toml"
+            )
+        comments = "".join(f"# {remark}\n" for remark in drawn.remarks)
+        write_file(to, comments + toml_text(drawn.tables))
+        print(f"{to}: the linkage file; {', '.join(drawn.remarks)}")
+        linkage_in(to)
+        return
+    model, unusual = drawn.machine() if drawn else linkage_in(Path(source))
     show_slips(unusual)
-    machine = Machine(model)
-    question = LinkageQuestion(machine, speed_of_driver(machine, speed), str(file), unusual)
+    machine, remarks = Machine(model), drawn.remarks if drawn else ()
+    name = drawn.name if drawn else source
+    question = LinkageQuestion(machine, speed_of_driver(machine, speed), name, unusual, remarks)
     carry_out(TASK, question, output, whole=whole, png=png)
 
 

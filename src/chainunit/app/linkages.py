@@ -11,14 +11,14 @@ from ..core.declared_numbers import as_text
 from ..core.errors import RemarkWarning, check_kind
 from ..machines.linkages.file import linkage_in
 from ..machines.machine import Machine
-from ..reading.tables import UnusualValue, slips_of
-from ..report.linkage_report import TASK, LinkageQuestion
+from ..reading.tables import slips_of
+from ..report.linkage_report import TASK, LinkageOutcome, LinkageQuestion
 from ..report.reported_result import ReportedResult
 from ..study.linkage_turn import LinkageFindings, speed_of_driver
 from ..work.progress import TaskProgress
 
 
-class LinkageResult(ReportedResult[LinkageQuestion, tuple[LinkageFindings, str, tuple[UnusualValue, ...]]]):
+class LinkageResult(ReportedResult[LinkageQuestion, LinkageOutcome]):
     """A linkage over the way of its driver. Its `repr` shows its groups, its motion and its torque."""
 
     _task = TASK

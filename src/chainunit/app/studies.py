@@ -420,8 +420,11 @@ def _plain(value: Any) -> Any:
         return {str(name): _plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
+    if isinstance(value, np.longdouble):  # which Python lacks
+        return float(value)
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        plain = value.tolist()
+        return value if type(plain) is type(value) else _plain(plain)
     value = as_text(value)
     return str(value) if isinstance(value, Path) else value
 

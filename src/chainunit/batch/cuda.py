@@ -35,7 +35,7 @@ def cupy_() -> Any:
     Raises
     ------
     InputError
-        where it is not installed, and without a GPU.
+        if it is not installed, and without a GPU.
     """
     try:
         import cupy
@@ -157,7 +157,7 @@ class CudaKernel:
         self._launch("finish", outer, count, length, pieces, part, part_reason, results, reason)
 
     def _packed(self, arrays: Sequence[Any]) -> Any:
-        """The arrays one after the other on the device; those of the host by one transfer."""
+        """The arrays one after the other on the device; arrays of the host need one transfer."""
         if any(map(on_device, arrays)):
             return self._cupy.concatenate([self._cupy.asarray(x, float) for x in arrays])
         return self._cupy.asarray(np.concatenate(arrays))
@@ -183,7 +183,7 @@ def cuda_kernel(
     InputError
         see `cupy_` and `CudaKernel`.
     RunError
-        where the compiler of the device fails.
+        if the compiler of the device fails.
     """
     cupy = cupy_()
     try:

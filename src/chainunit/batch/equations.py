@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 from ..core.engines import casadi_
@@ -12,7 +12,7 @@ from ..core.errors import InputError, near_name
 from ..core.model import Model
 from ..core.printing.operations import Operations
 from ..core.quantities import Variable, quotient
-from ..core.symbolic_trace import trace
+from ..core.symbolic_trace import chosen_columns, trace
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Equations:
     """What a batch computes.
 
     `arguments` are the parameters, inputs and states of the model in declared order. `operations` has two groups of
-    results: the `results`, and one number, which is 0 where all requirements of the model are met, and else the
+    results: the `results`, and one number, which is 0 if all requirements of the model are met, and else the
     place of the first that is not, from 1.
     """
 
@@ -43,16 +43,15 @@ class Equations:
         """The reason of a state that meets all requirements and has no finite result."""
         return len(self.model.required) + 1
 
-    @property
-    def sizes(self) -> tuple[int, int, int]:
-        """Numbers of parameters, inputs and states."""
+    @cached_property
+    def entries(self) -> dict[tuple[int, int], Variable]:
+        """The arguments by their entries: parameters (0), inputs (1) or states (2), and the place among them."""
         layouts = (self.model.parameter_layout, self.model.input_layout, self.model.state_layout)
-        p, u, x = (len(layout.names) if layout else 0 for layout in layouts)
-        return p, u, x
-
-    def place(self, entry: tuple[int, int]) -> int:
-        """The place among all arguments of an entry of the parameters (0), inputs (1) or states (2)."""
-        return sum(self.sizes[: entry[0]]) + entry[1]
+        return {
+            (kind, k): v
+            for kind, layout in enumerate(layouts)
+            for k, v in enumerate(layout.variables if layout else ())
+        }
 
 
 def columns_of(model: Model) -> tuple[Variable, ...]:
@@ -97,35 +96,27 @@ def equations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> Eq
     """
     import casadi
 
-    t, arguments, declared = trace(model), arguments_of(model), columns_of(model)
-    places = find(outputs, names_of(declared), "output")
+    t, arguments = trace(model), arguments_of(model)
+    variables = chosen_columns(t, outputs)
     columns = find(by, names_of(arguments), "parameter, input or state")
     p, u, x, _ = t.symbols
-    traced = [value for _, value in t.columns.values()]
-    rows = casadi.vertcat(*(casadi.SX(traced[place]) for place in places), casadi.SX(0, 1))
+    rows = casadi.vertcat(*(casadi.SX(t.columns[name][1]) for name in outputs), casadi.SX(0, 1))
     rows, codes = t.explicit([rows, _first_unmet(list(model.requirements(casadi_(), t.p)))])
     point = casadi.vertcat(p, u, x)
-    slopes = [casadi.jtimes(rows, point, _unit_vector(point.numel(), column)) for column in columns]
-    results = [Result(v.name, v.unit, v.description) for v in (declared[place] for place in places)]
+    unit_vectors = casadi.SX(casadi.DM.eye(point.numel()))
+    slopes = [casadi.jtimes(rows, point, unit_vectors[:, column]) for column in columns]
+    results = [Result(v.name, v.unit, v.description) for v in variables]
     results += [
         Result(
-            f"d({declared[place].name})/d({arguments[column].name})",
-            quotient(declared[place].unit, arguments[column].unit),
-            f"derivative of {declared[place].description} by {arguments[column].description}",
+            f"d({v.name})/d({argument.name})",
+            quotient(v.unit, argument.unit),
+            f"derivative of {v.description} by {argument.description}",
         )
-        for column in columns
-        for place in places
+        for argument in (arguments[column] for column in columns)
+        for v in variables
     ]
     operations = Operations([p, u, x], [casadi.vertcat(rows, *slopes), codes])
     return Equations(model, arguments, tuple(results), operations)
-
-
-def _unit_vector(size: int, place: int) -> Any:
-    import casadi
-
-    vector = casadi.DM.zeros(size, 1)
-    vector[place] = 1.0
-    return casadi.SX(vector)
 
 
 def _first_unmet(limits: Sequence[tuple[Any, Any, Any]]) -> Any:

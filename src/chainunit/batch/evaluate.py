@@ -14,54 +14,52 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.declared_numbers import in_declared_unit, magnitude_and_unit, number_in
-from ..core.errors import InputError, RemarkWarning, RunError, check_kind, texts_in
+from ..core.declared_numbers import in_declared_unit, kind_words, magnitude_and_unit, number_in
+from ..core.errors import InputError, RemarkWarning, RunError, check_choice, check_kind, printable, texts_in
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from ..core.printing.operations import ARGUMENT
 from ..core.quantities import Variable
 from ..core.symbolic_trace import outputs_of
-from ..core.units import scale
+from ..core.units import of_other_kind, scale
 from . import arrays
 from .cuda import cuda_kernel, cupy_, host, namespace, on_device
 from .equations import Equations, Result, equations, find, names_of
 from .native import aligned, native_kernel
-from .reductions import REDUCTIONS, Beyond, Histogram, ReducedColumn, by_array, column_of, flat_numbers
+from .reductions import REDUCTIONS, Beyond, Histogram, ReducedColumn, Reductions, Request, flat_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
 
 ENGINES = ("native", "numpy", "cuda")
-Request = str | Beyond | Histogram
-Reduced = tuple[tuple[ReducedColumn, Request], ...]
-"""Reductions with their requests."""
 _LEAST_INNER = 64
 """A last dimension that is shorter is no loop of its own: all dimensions are one loop then."""
 
 
 class ReasonKind(Enum):
-    """Why a state has no result, with its text; the first is that of a state with a result."""
+    """Why a state has no result, with its text; ``NONE`` is for a state with a result."""
 
     NONE = "valid"
-    REQUIREMENT = "{subject}: {words}"
+    REQUIREMENT = "{subject}: {detail}"
     POSITION = "the machine cannot be assembled in this position, or stands in a dead position"
-    BOUNDS = "{subject}: must be {words}"
+    BOUNDS = "{subject}: must be {detail}"
 
 
 @dataclass(frozen=True)
 class StateReason:
-    """A reason for which there is no result: its kind, whose value is its text, and what the text is about."""
+    """A reason for which there is no result: its kind, whose value is a text with slots for the `subject`, such as
+    the name of a parameter, and a `detail`."""
 
     kind: Enum
     subject: str = ""
-    words: str = ""
+    detail: str = ""
 
     def __str__(self) -> str:
-        return str(self.kind.value).format(subject=self.subject, words=self.words)
+        return str(self.kind.value).format(subject=self.subject, detail=self.detail)
 
 
 def reasons_of(model: Model) -> list[StateReason]:
-    """The reasons of a model by their codes; those of values outside their bounds follow them."""
+    """The reasons of a model by their codes. The reasons for values outside their bounds follow them."""
     return [
         StateReason(ReasonKind.NONE),
         *(
@@ -105,7 +103,7 @@ def evaluate(
     parameters : an instance of `model.Parameters` with the values of all other parameters
     engine : "native" (compiled C, SIMD, threads), "numpy", or "cuda" (a GPU of NVIDIA, by CuPy); without a C compiler
         "native" is numpy, with a warning
-    workers : number of threads of the native engine; by default that of the processors
+    workers : number of threads of the native engine; by default one for each processor
     out : the result of an earlier call with the same outputs and dimensions. Its memory takes the new results, and
         its own values are gone; new memory takes as long as the computation.
     on_host : whether results of "cuda" are copied to the host, as arrays of numpy. Without it they stay on the
@@ -126,6 +124,7 @@ def evaluate(
     """
     import xarray as xr
 
+    check_kind("model", model, Model, 'a model, such as MODELS["DcMotor"] of chainunit.models')
     check_kind("values", values, Mapping, "a mapping of names to values")
     check_kind("over", over, str | None, "the name of a dimension")
     check_kind("workers", workers, int | None, "a number of threads")
@@ -138,8 +137,7 @@ def evaluate(
         outputs = list(reduce)
     names = texts_in("outputs", outputs) if outputs is not None else tuple(v.name for v in outputs_of(model))
     traced = equations(model, names, texts_in("by", by))
-    reduced = _reduced(reduce or {}, traced.results)
-    grid = Grid(traced, values, parameters, over, engine, reduced)
+    grid = Grid(traced, values, parameters, over, engine, _reductions(reduce or {}, traced.results))
     try:
         memory = grid.memory(out)
         grid.compute(memory, workers or os.cpu_count() or 1)
@@ -160,25 +158,24 @@ def check_engine(engine: str) -> None:
     InputError
         see `evaluate`.
     """
-    if engine not in ENGINES:
-        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
+    check_choice("engine", engine, ENGINES)
     if engine == "cuda":
         cupy_()
 
 
-def _reduced(reduce: Mapping[str, Request | Sequence[Request]], results: Sequence[Result]) -> Reduced:
-    """The requests with the places of their outputs, whose `results` have units, checked; one request is a list of
-    one."""
-    requests = [
-        (place, output, _in_unit(request, results[place].unit))
-        for place, (output, listed) in enumerate(reduce.items())
-        for request in (listed if isinstance(listed, list | tuple) else [listed])
-    ]
-    histograms = [output for _, output, request in requests if isinstance(request, Histogram)]
-    for output in histograms:
-        if histograms.count(output) > 1:
-            raise InputError(f"{output}: has {histograms.count(output)} histograms; give one, with more bins")
-    return tuple((column_of(place, request, output), request) for place, output, request in requests)
+def _reductions(reduce: Mapping[str, Request | Sequence[Request]], results: Sequence[Result]) -> Reductions:
+    """The checked requests; one request is a list of one. The output at each place has the unit of its result."""
+    columns: list[ReducedColumn] = []
+    for place, (output, listed) in enumerate(reduce.items()):
+        requests = listed if isinstance(listed, list | tuple) else [listed]
+        count = sum(isinstance(request, Histogram) for request in requests)
+        if count > 1:
+            raise InputError(f"{output}: has {count} histograms; give one, with more bins")
+        columns += [
+            ReducedColumn.checked(place, _in_unit(request, results[place].unit), output)
+            for request in requests
+        ]
+    return tuple(columns)
 
 
 def _in_unit(request: Any, unit: str) -> Any:
@@ -209,7 +206,7 @@ class ResultRows:
 
     @property
     def dims(self) -> list[str]:
-        """Its dimensions before those of the states."""
+        """Its dimensions before the dimensions of the states."""
         return [] if self.bins is None else [self.result.name.replace("histogram(", "bin(", 1)]
 
 
@@ -224,7 +221,11 @@ class Memory:
 
 
 class Grid:
-    """The states of a batch: arguments over named dimensions."""
+    """The states of a batch: arguments over named dimensions.
+
+    `sizes` are the lengths of the dimensions, `dims` their names, last the one that is reduced or the longest; `size`
+    is the number of states over the outer dimensions, and over the inner one.
+    """
 
     def __init__(
         self,
@@ -233,10 +234,10 @@ class Grid:
         parameters: Any,
         over: str | None,
         engine: str,
-        reduced: Reduced,
+        reductions: Reductions,
     ) -> None:
         model = equations.model
-        self._equations, self._engine, self._reduced = equations, engine, reduced
+        self._equations, self._engine, self._reductions = equations, engine, reductions
         places = find(texts_in("values", values), names_of(equations.arguments), "parameter, input or state")
         variations = {
             name: _array(equations.arguments[k], x)
@@ -279,8 +280,8 @@ class Grid:
     @cached_property
     def _needed(self) -> set[str]:
         """The names of the arguments on which the results depend."""
-        places = (x.entry for x in self._equations.operations.items if x.kind == ARGUMENT)
-        return {self._equations.arguments[self._equations.place(entry)].name for entry in places}
+        operations = self._equations.operations.items
+        return {self._equations.entries[x.entry].name for x in operations if x.kind == ARGUMENT}
 
     def _loops(self) -> None:
         """Divide the dimensions into outer ones and the inner one, the longest."""
@@ -312,7 +313,7 @@ class Grid:
         return self._shaped(x.copy(data=inside))
 
     def _shaped(self, x: xr.DataArray) -> Any:
-        """The values over the outer and the inner dimensions, each flat, or of length 1 where they do not vary."""
+        """The values, shape (1 or outer, 1 or inner): 1 for dimensions along which they do not vary."""
         dims = set(map(str, x.dims))
         sides = [side if dims & set(side) else [] for side in (self._outer, self._inner)]
         order = [d for side in sides for d in side]
@@ -321,14 +322,14 @@ class Grid:
         return namespace(full.data).ascontiguousarray(full.data, float).reshape(shape)
 
     def memory(self, earlier: xr.Dataset | None) -> Memory:
-        """New memory for the results, or that of an `earlier` result.
+        """New memory for the results, or the memory of an `earlier` result.
 
         Raises
         ------
         InputError
-            where the earlier result has no memory for these results.
+            if the earlier result has no memory for these results.
         """
-        shape = self.size[:1] if self._reduced else self.size
+        shape = self.size[:1] if self._reductions else self.size
         columns = self._columns
         if earlier is None:
             ends = np.cumsum([0, *(column.rows for column in columns)])
@@ -367,10 +368,10 @@ class Grid:
 
     def compute(self, memory: Memory, workers: int) -> None:
         """Fill the memory with results and reasons."""
-        traced, reduced = self._equations, self._reduced
+        traced = self._equations
         if not self.size[0]:
             return
-        entries = self._entries()
+        entries = dict(zip(traced.entries, self._arguments, strict=True))
         if (kernel := self._kernel(entries)) is not None:
             kernel(
                 [entries[e][:, 0].copy() for e in kernel.inputs],
@@ -378,15 +379,15 @@ class Grid:
                 memory.results,
                 memory.reason,
                 self.size,
-                flat_numbers([request for _, request in reduced]),
+                flat_numbers(self._reductions),
                 workers,
             )
         else:
             states = memory
-            if reduced:
+            if self._reductions:
                 states = Memory(np.empty((len(traced.results), *self.size)), np.zeros(self.size, np.int16))
             arrays.by_numpy(traced.operations, entries, states.results, states.reason, traced.not_finite)
-            if reduced:
+            if self._reductions:
                 self._reduce(states, memory)
         self._refuse(memory)
 
@@ -395,28 +396,21 @@ class Grid:
         largest reason of its states, and no results."""
         memory.reason[...] = np.max(states.reason, axis=1)
         rows = iter(memory.results)
-        for column, request in self._reduced:
+        for column in self._reductions:
             with np.errstate(invalid="ignore"):
-                reduced = by_array(request, states.results[column.place])
-            # several for a histogram, one for each bin
+                reduced = column.of_array(states.results[column.place])
             for result in reduced:
                 next(rows)[...] = np.where(memory.reason == 0, result, np.nan)
 
-    def _entries(self) -> dict[tuple[int, int], Any]:
-        sizes = self._equations.sizes
-        entries = [(kind, k) for kind, size in enumerate(sizes) for k in range(size)]
-        return dict(zip(entries, self._arguments, strict=True))
-
     def _kernel(self, entries: Mapping[tuple[int, int], Any]) -> Any:
-        """The compiled loop of the engine; None where numpy computes."""
+        """The compiled loop of the engine; None if numpy computes."""
         if self._engine == "numpy":
             return None
         varying = tuple(entry for entry, x in entries.items() if x.shape[1] > 1)
-        reductions = tuple(column for column, _ in self._reduced)
         if self._engine == "cuda":
-            return cuda_kernel(self._equations, varying, reductions)
+            return cuda_kernel(self._equations, varying, self._reductions)
         try:
-            kernel = native_kernel(self._equations, varying, reductions)
+            kernel = native_kernel(self._equations, varying, self._reductions)
         except RunError as error:
             warnings.warn(
                 f"the native engine is not available, numpy computes: {error}", RemarkWarning, stacklevel=4
@@ -455,18 +449,18 @@ class Grid:
     @property
     def _dims(self) -> list[str]:
         """The dimensions of the states that the results have."""
-        return self.dims[:-1] if self._reduced else self.dims
+        return self.dims[:-1] if self._reductions else self.dims
 
     @property
     def _columns(self) -> list[ResultRows]:
         """The variables of the results."""
         results = self._equations.results
-        if not self._reduced:
+        if not self._reductions:
             return [ResultRows(result) for result in results]
-        return [reduced_column(results[column.place], request) for column, request in self._reduced]
+        return [_reduced_rows(results[column.place], column.request) for column in self._reductions]
 
     def dataset(self, memory: Memory, on_host: bool) -> xr.Dataset:
-        """The results with names, units and coordinates; those of a GPU as arrays of the device, or `on_host`."""
+        """The results with names, units and coordinates; of a GPU as arrays of the device, unless `on_host`."""
         import xarray as xr
 
         dims, take = self._dims, host if on_host else (lambda x: x)
@@ -496,7 +490,7 @@ class Grid:
         return xr.Dataset(variables, coords)
 
 
-def reduced_column(result: Result, request: Request) -> ResultRows:
+def _reduced_rows(result: Result, request: Request) -> ResultRows:
     """The variable of a reduced result."""
     if isinstance(request, Histogram):
         counts = Result(f"histogram({result.name})", "1", f"number of states by value, {result.description}")
@@ -506,7 +500,7 @@ def reduced_column(result: Result, request: Request) -> ResultRows:
         text = f"number of states with a size beyond {size} {result.unit}, {result.description}"
         return ResultRows(Result(f"beyond({result.name}, {size})", "1", text))
     return ResultRows(
-        Result(f"{request}({result.name})", result.unit, f"{REDUCTIONS[request].words}, {result.description}")
+        Result(f"{request}({result.name})", result.unit, f"{REDUCTIONS[request].title}, {result.description}")
     )
 
 
@@ -526,7 +520,9 @@ def _array(variable: Variable, x: Any) -> xr.DataArray:
             try:
                 factor, offset = scale(str(unit), variable.unit, variable.kind)
             except ValueError as error:
-                raise InputError(f"{variable.name} in {unit}: {error}") from error
+                kind = of_other_kind(str(unit), variable.unit)
+                line = f"{variable.name} in {printable(str(unit))}: must be {kind_words(variable)}"
+                raise InputError(f"{line}; {kind}" if kind else line, variable.name) from error
             values = values * factor + offset
         x = x.copy(data=values).assign_attrs(attributes)
         if x.dims == (variable.name,):

@@ -33,8 +33,11 @@ _BLOCK = 64
 """Number of states that are kept in the first cache before they are stored."""
 
 
-def defines(equations: Equations, code: VectorCode, reductions: Reductions, more: Mapping[str, int]) -> str:
-    """The sizes and statements that the generated code defines for its loop, see states.h, and `more` sizes."""
+def defines(
+    equations: Equations, code: VectorCode, reductions: Reductions, own_sizes: Mapping[str, int]
+) -> str:
+    """The sizes and statements that the generated code defines for its loop, see states.h, with the `own_sizes` of a
+    language."""
     sizes = {
         "INPUTS": len(code.inputs),
         "COLUMNS": len(code.columns),
@@ -43,7 +46,7 @@ def defines(equations: Equations, code: VectorCode, reductions: Reductions, more
         "REDUCED": int(bool(reductions)),
         "NOT_FINITE": equations.not_finite,
     }
-    values = {**sizes, **more, **loop_text(reductions)}
+    values = {**sizes, **own_sizes, **loop_text(reductions)}
     return "\n".join(f"#define {name} {value}" for name, value in values.items())
 
 
@@ -94,7 +97,7 @@ class NativeKernel:
             the parts
         reason : array to be filled, of the same shape
         size : (outer, inner)
-        numbers : those of the reductions, see `flat_numbers`
+        numbers : see `chainunit.batch.reductions.flat_numbers`
         workers : number of threads
         """
         outer, inner = size
@@ -143,6 +146,7 @@ def aligned(shape: tuple[int, ...]) -> Any:
 
 
 def _pointers(arrays: Any) -> Any:
+    """The addresses of some arrays, and one more, as C has no empty arrays."""
     if isinstance(arrays, np.ndarray):
         first, step = arrays.ctypes.data, arrays.strides[0]
         return (ctypes.c_void_p * (len(arrays) + 1))(*range(first, first + step * len(arrays), step))
@@ -150,7 +154,7 @@ def _pointers(arrays: Any) -> Any:
 
 
 def _pieces(outer: int, inner: int, workers: int, divide: bool) -> list[tuple[int, int, int, int]]:
-    """Ranges of both dimensions; the inner one is divided only where there are too few outer ones."""
+    """Ranges of both dimensions; the inner one is divided only if there are too few outer ones."""
     count = 1 if workers == 1 else _PIECES * workers
     if outer >= count or not divide:
         cuts = [outer * k // count for k in range(count + 1)]
@@ -165,7 +169,7 @@ def load(source: str, compiler: Compiler, files: Mapping[str, str] | None = None
     Raises
     ------
     RunError
-        where the compiler fails.
+        if the compiler fails.
     """
     native = flags_for_this_processor(compiler)
     arguments = (*native.flags, "batch.c", "-o", "batch.so", *native.libraries)
@@ -186,7 +190,7 @@ def native_kernel(
     Raises
     ------
     RunError
-        where the compiler fails.
+        if the compiler fails.
     """
     local_compiler = compiler()
     return None if local_compiler is None else NativeKernel(equations, varying, reductions, local_compiler)

@@ -22,7 +22,7 @@ class PythonLoop:
     ----------
     model, outputs, varying, driven, guarded : see `chainunit.batch.transients.Transients`
     symbols, groups : the vectors of parameters, inputs and states; the derivatives of the states, the kept rows, and
-        the states that meet the constraints, none where the integrator has equal steps
+        the states that meet the constraints, none if the integrator has equal steps
 
     Raises
     ------
@@ -77,19 +77,18 @@ class PythonLoop:
             `chainunit.batch.transients.Transients.run`, the runs last
         x : states at the begin, shape (states, runs); those at the end replace them
         out : rows to be filled, shape (outputs, runs, rows)
-        count : numbers of rows to be filled, shape (runs,); negative where the last one is not finite
+        count : numbers of rows to be filled, shape (runs,); negative if the last one is not finite
         """
         uniform, varying, signals, begin, stop, limits = arrays
         for r in range(*runs):
             p, u = uniform[: self._count].copy(), uniform[self._count :].copy()
             p[self._varying] = varying[: len(self._varying), r]
             ends = float(begin[r]), float(stop[r])
-            count[r] = self._run(p, u, signals[:, :, r], ends, numbers, limits[:, r], x[:, r], out[:, r])
+            count[r] = self._run((p, u), signals[:, :, r], ends, numbers, limits[:, r], x[:, r], out[:, r])
 
     def _run(
         self,
-        p: Any,
-        u: Any,
+        constants: tuple[Any, Any],
         signals: Any,
         ends: tuple[float, float],
         numbers: Sequence[float],
@@ -98,7 +97,8 @@ class PythonLoop:
         out: Any,
     ) -> int:
         """Fill the rows of a run, shape (outputs, rows), and replace its states; gives the number of rows, negative
-        where the last one is not finite."""
+        if the last one is not finite. `constants` are the parameters and the inputs, whose driven ones change."""
+        p, u = constants
         step, longest, tolerance, most = numbers
         time, stop = ends
         signals = signals[: len(self._driven)]
@@ -112,6 +112,21 @@ class PythonLoop:
             state[:] = states
             return evaluated[function]()
 
+        def advanced(size: float) -> tuple[list[float], float]:
+            """The states after a step of this size [s] from the present time, and the next substep [s]."""
+
+            def rates(since: float, states: Sequence[float]) -> list[float]:
+                return values_at(self._rates, time + since, states)
+
+            def close(since: float, states: Sequence[float]) -> list[float]:
+                return values_at(self._closed, time + since, states)
+
+            if not self._controlled:
+                return integrators.rk4(rates, now, size, longest, most), 0.0
+            return integrators.controlled(
+                rates, close, now, size, pace, longest, tolerance, self._nominal, most
+            )
+
         now, pace, rows = [float(start) for start in x], 0.0, out.shape[-1]
         for n in range(rows):
             if n:
@@ -119,9 +134,7 @@ class PythonLoop:
                 if not following > time:
                     return n
                 try:
-                    now, pace = self._advanced(
-                        values_at, now, time, following - time, pace, longest, tolerance, most
-                    )
+                    now, pace = advanced(following - time)
                 except ArithmeticError:
                     now = [math.nan] * len(now)
                 time = following
@@ -132,30 +145,6 @@ class PythonLoop:
             if (np.abs(out[self._guarded, n]) > limits[: len(self._guarded)]).any():
                 return n + 1
         return rows
-
-    def _advanced(
-        self,
-        values_at: Any,
-        x: list[float],
-        time: float,
-        size: float,
-        pace: float,
-        longest: float,
-        tolerance: float,
-        most: float,
-    ) -> tuple[list[float], float]:
-        """The states after a step of this size [s], and the next step of the integrator."""
-
-        def rates(since: float, states: Sequence[float]) -> list[float]:
-            return values_at(self._rates, time + since, states)
-
-        if not self._controlled:
-            return integrators.rk4(rates, x, size, longest, most), 0.0
-
-        def close(since: float, states: Sequence[float]) -> list[float]:
-            return values_at(self._closed, time + since, states)
-
-        return integrators.controlled(rates, close, x, size, pace, longest, tolerance, self._nominal, most)
 
 
 class _Evaluation:

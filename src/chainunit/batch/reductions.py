@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Any
 
@@ -19,7 +19,7 @@ MOST_BINS = 1024
 
 @dataclass(frozen=True)
 class Reduction:
-    """A reduction of a column over the last dimension: in words, as a function of an array, and in C.
+    """A reduction of a column over the last dimension: its title, as a function of an array, and in C.
 
     In C each lane starts with `begin` and takes up each value by `take`, where ``{a}`` is the lane, ``{y}`` the
     value, ``{one}`` 1 for a lane that counts and 0 for one that does not, and ``{limit}`` the limit of a count. The
@@ -27,7 +27,7 @@ class Reduction:
     ``{a}``, and of the number of values, ``{n}``.
     """
 
-    words: str
+    title: str
     of_array: Callable[..., Any]
     begin: str
     take: str
@@ -85,6 +85,15 @@ class Beyond:
         if isinstance(self.limit, numbers.Real) and not (math.isfinite(self.limit) and self.limit >= 0.0):
             raise InputError(f"Beyond: limit = {self.limit}: must be a finite number >= 0, a size")
 
+    @property
+    def numbers(self) -> tuple[float, float]:
+        """The numbers that the code takes: the limit, and 0."""
+        return self.limit, 0.0
+
+    def of_array(self, x: Any) -> Any:
+        """The numbers over the last of two dimensions: shape (1, outer)."""
+        return _COUNT.of_array(x, self.limit)[None]
+
 
 @dataclass(frozen=True)
 class Histogram:
@@ -113,6 +122,11 @@ class Histogram:
             )
 
     @property
+    def numbers(self) -> tuple[float, float]:
+        """The numbers that the code takes: the begin, and the bins per unit."""
+        return self.low, self.bins / (self.high - self.low)
+
+    @property
     def middles(self) -> Any:
         """The middle of each bin, shape (bins,)."""
         return self.low + (np.arange(self.bins) + 0.5) * (self.high - self.low) / self.bins
@@ -126,59 +140,59 @@ class Histogram:
         return counts.reshape(len(x), self.bins).T
 
 
+Request = str | Beyond | Histogram
+"""A reduction: a name of `REDUCTIONS`, or one that has numbers."""
+
+
 @dataclass(frozen=True)
 class ReducedColumn:
-    """A reduction of the column at a `place` for which code is made: its `name`, one of `REDUCTIONS`, "beyond", or
-    "histogram" with `bins`. The numbers of the latter two, see `numbers_of`, are no part of the code."""
+    """The reduction `request` of the column at a `place`, with so many rows of results: the `bins` of a histogram, or
+    1. Two columns are equal if they have the same code, into which the numbers of a request do not go."""
 
     place: int
+    request: Request = field(compare=False)
     name: str
     bins: int = 1
+
+    @classmethod
+    def checked(cls, place: int, request: Request, output: str) -> ReducedColumn:
+        """The column for a reduction of the `output` at this place.
+
+        Raises
+        ------
+        InputError
+            for a name that is not in `REDUCTIONS`.
+        """
+        if isinstance(request, Histogram):
+            return cls(place, request, "histogram", request.bins)
+        if isinstance(request, Beyond):
+            return cls(place, request, "beyond")
+        if not isinstance(request, str) or request not in REDUCTIONS:
+            raise InputError(
+                f"{output}: no reduction {shown(request)}; there are {', '.join(REDUCTIONS)}, Beyond(limit) and "
+                "Histogram(low, high, bins)"
+            )
+        return cls(place, request, request)
 
     @property
     def reduction(self) -> Reduction:
         """The reduction of a column that is no histogram."""
         return REDUCTIONS.get(self.name, _COUNT)
 
+    @property
+    def numbers(self) -> tuple[float, float]:
+        """The numbers that the code takes."""
+        return (0.0, 0.0) if isinstance(self.request, str) else self.request.numbers
+
+    def of_array(self, x: Any) -> Any:
+        """The reduction of the values of the column, shape (outer, inner): shape (bins, outer)."""
+        if isinstance(self.request, str):
+            return self.reduction.of_array(x)[None]
+        return self.request.of_array(x)
+
 
 Reductions = tuple[ReducedColumn, ...]
-"""Empty where the results themselves are stored."""
-
-
-def column_of(place: int, request: str | Beyond | Histogram, output: str) -> ReducedColumn:
-    """The column for the `request` of a reduction of the `output` at this place.
-
-    Raises
-    ------
-    InputError
-        for a name that is not in `REDUCTIONS`.
-    """
-    if isinstance(request, Histogram):
-        return ReducedColumn(place, "histogram", request.bins)
-    if isinstance(request, Beyond):
-        return ReducedColumn(place, "beyond")
-    if not isinstance(request, str) or request not in REDUCTIONS:
-        raise InputError(
-            f"{output}: no reduction {shown(request)}; there are {', '.join(REDUCTIONS)}, Beyond(limit) and "
-            "Histogram(low, high, bins)"
-        )
-    return ReducedColumn(place, request)
-
-
-def numbers_of(request: str | Beyond | Histogram) -> tuple[float, float]:
-    """The numbers of a request that its code takes: a limit, or the begin of a histogram and its bins per unit."""
-    if isinstance(request, Histogram):
-        return request.low, request.bins / (request.high - request.low)
-    return (request.limit if isinstance(request, Beyond) else 0.0), 0.0
-
-
-def by_array(request: str | Beyond | Histogram, x: Any) -> Any:
-    """The reduction of a column, shape (outer, inner): shape (rows, outer), a row for each bin of a histogram."""
-    if isinstance(request, Histogram):
-        return request.of_array(x)
-    if isinstance(request, Beyond):
-        return _COUNT.of_array(x, request.limit)[None]
-    return REDUCTIONS[request].of_array(x)[None]
+"""Empty if the results themselves are stored."""
 
 
 def row_count(reductions: Reductions) -> int:
@@ -187,8 +201,8 @@ def row_count(reductions: Reductions) -> int:
 
 
 def loop_text(reductions: Reductions) -> Mapping[str, str]:
-    """The statements of a loop, by name: BEGIN before it, TAKE for each vector, PARTS after it, where it is a part of
-    a loop whose parts are put together later, and END at last.
+    """The statements of a loop, by name: BEGIN before it, TAKE for each vector, PARTS after it if it is a part of a
+    loop whose parts are put together later, and END at last.
 
     The loop has the vectors ``y`` of results, the vector ``one``, the numbers ``L``, two for each reduction, and the
     number of all states ``n``. It defines BINS (memory for the counts of a histogram), COUNT (of a vector, into
@@ -215,6 +229,6 @@ def loop_text(reductions: Reductions) -> Mapping[str, str]:
     return {name: " ".join(lines) for name, lines in statements.items()}
 
 
-def flat_numbers(requests: Sequence[str | Beyond | Histogram]) -> Any:
-    """The numbers of all requests, shape (2*requests,), and not empty."""
-    return np.array([x for request in requests for x in numbers_of(request)] or [0.0])
+def flat_numbers(reductions: Reductions) -> Any:
+    """The numbers of all reductions, shape (2*reductions,), and not empty."""
+    return np.array([x for column in reductions for x in column.numbers] or [0.0])

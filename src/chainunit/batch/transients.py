@@ -29,6 +29,7 @@ from ..core.errors import InputError, RunError
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS, Compiler, compiler
 from ..core.printing.c_forms import STEP, c_file, constant
+from ..core.printing.kernels import STEP_NUMBERS
 from ..core.printing.operations import Operations
 from ..core.printing.vector_code import VectorCode, header
 from ..core.symbolic_trace import outputs_of, trace
@@ -36,11 +37,6 @@ from .equations import arguments_of, find, names_of
 from .native import load, threads
 from .python_loop import PythonLoop
 
-_NUMBERS = (
-    "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR "
-    "DENSE"
-).split()
-"""The numbers of `chainunit.core.integrators` that the loops need."""
 _LANES = 8
 """The number of runs is filled up to a multiple of it, a multiple of the lanes of every vector."""
 
@@ -56,7 +52,7 @@ def profile_rows(signal: Any, changes: int) -> list[float]:
     """
     changes_of_signal = getattr(signal, "changes", ())
     if len(changes_of_signal) > changes:
-        raise ValueError(f"a profile with {len(changes_of_signal)} changes, where {changes} are the most")
+        raise ValueError(f"a profile with {len(changes_of_signal)} changes: at most {changes} are allowed")
     rows = [
         float(getattr(signal, "start", signal)),
         *(float(x) for change in changes_of_signal for x in change),
@@ -82,8 +78,8 @@ def signal_table(
 class Runs:
     """The results of a block of runs.
 
-    `rows` has the shape (outputs, runs, rows); a run has `count` rows, shape (runs,), behind which the values have no
-    meaning. Where `failed`, shape (runs,), the last of them is not finite. `states` are those at the end, shape
+    `rows` has the shape (outputs, runs, rows); a run has `count` rows, shape (runs,), after which the values have no
+    meaning. If `failed`, shape (runs,), the last of them is not finite. `states` are those at the end, shape
     (states, runs), and `times` the times of the rows [s], shape (runs, rows). With directions, `slopes` are the
     derivatives of the rows, of the same shape, and the derivatives of the states follow the states.
     """
@@ -212,7 +208,7 @@ class Transients:
         limits : of the guarded outputs, shape (guarded, runs): a run ends with the row beyond its limit
         directions : of each run, the change of each quantity in `by`, shape (by, runs). The error of the derivative
             is held to the tolerance of the states themselves: a change of the size that matters is a good one.
-        longest : longest step of the integrator [s]; by default that of the model
+        longest : longest step of the integrator [s]; by default the one of the model
         workers : number of threads
         """
         stop = np.atleast_1d(np.asarray(stop, float))
@@ -224,7 +220,7 @@ class Transients:
         room = x.shape[-1]
         arrays = [
             self._uniform(parameters, inputs),
-            self._given(varying, directions, runs),
+            self._run_values(varying, directions, runs),
             self._filled(signals if self._driven else 0.0, runs, len(self._driven), 1 + 3 * self._changes),
             self._filled(begin, runs),
             self._filled(stop, runs),
@@ -258,11 +254,11 @@ class Transients:
         """The values of all runs, filled up to whole vectors by the values of the last run; a new array of the shape
         (*shape, lanes)."""
         full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
-        more = np.repeat(full[..., -1:], -runs % self._loop.lanes, -1)
-        return np.ascontiguousarray(np.concatenate([full, more], -1))
+        padding = np.repeat(full[..., -1:], -runs % self._loop.lanes, -1)
+        return np.ascontiguousarray(np.concatenate([full, padding], -1))
 
-    def _given(self, varying: Any, directions: Any, runs: int) -> Any:
-        """The values that runs have for themselves: varying parameters, and directions."""
+    def _run_values(self, varying: Any, directions: Any, runs: int) -> Any:
+        """The constant values that differ between runs: varying parameters, then directions."""
         parts = [(varying, len(self._varying)), (directions, len(self._by))]
         return np.concatenate([self._filled(x if n else 0.0, runs, n) for x, n in parts])
 
@@ -285,12 +281,12 @@ def _compiled(
     changes: int,
     compiler: Compiler,
 ) -> _NativeLoop:
-    """The compiled loop."""
+    """The compiled loop of a model, see `Transients`."""
     operations = _operations(model, outputs, by)
     assert model.state_layout is not None
     sides = 2 if by else 1
     states = model.state_layout.variables * sides
-    count = len(varying) + len(by)
+    constants = len(varying) + len(by)
     entries = [
         *((0, k) for k in find(varying, model.parameter_layout.names, "parameter")),
         *((3, k) for k in range(len(by))),
@@ -299,18 +295,17 @@ def _compiled(
     ]
     find(guarded, outputs, "output that is kept")
     code = VectorCode(operations, entries)
-    sizes = len(model.parameter_layout.names), len(model.input_layout.names)
     places = {entry: k for k, entry in enumerate(entries)}
-    put = []
-    for column, entry in enumerate(code.columns):
+
+    def argument(entry: tuple[int, int]) -> str:
+        """The vector of an argument that differs between runs: a constant of each run, a signal, or a state."""
         k = places[entry]
-        if k < count:
-            put.append(f"a[{column}] = b->given[{k}];")
-        elif k < count + len(driven):
-            offset = (k - count) * (1 + 3 * changes)
-            put.append(f"a[{column}] = signal_at(b->signal + {offset} * b->runs, b->runs, t);")
-        else:
-            put.append(f"a[{column}] = x[{entry[1]}];")
+        if k < constants:
+            return f"b->given[{k}]"
+        if k < constants + len(driven):
+            return f"signal_at(b->signal + {(k - constants) * (1 + 3 * changes)} * b->runs, b->runs, t)"
+        return f"x[{entry[1]}]"
+
     guards = [
         f"if (fabs(y[{outputs.index(name)}][l]) > limit[{k} * runs + r + l]) ends = 1;"
         for k, name in enumerate(guarded)
@@ -318,22 +313,21 @@ def _compiled(
     defines = {
         "STATES": len(states),
         "ROWS": len(outputs) * sides,
-        "PARAMS": count,
+        "PARAMS": constants,
         "COLUMNS": len(code.columns),
         "ROOM": code.room,
         "CHANGES": changes,
         "SIGNALS": len(driven),
         "METHOD": _method(model),
-        "PUT": " ".join(put),
+        "PUT": " ".join(f"a[{k}] = {argument(entry)};" for k, entry in enumerate(code.columns)),
         "GUARDED": " ".join(guards),
     }
-    constants = {name: value for name, value in vars(integrators).items() if name in _NUMBERS}
-    constants["NOMINAL"] = tuple(v.quantity.nominal or 1.0 for v in states)
+    numbers = STEP_NUMBERS | {"NOMINAL": tuple(v.quantity.nominal or 1.0 for v in states)}
     source = "\n".join(
         [
             header(),
             *(f"#define {name} {value}" for name, value in defines.items()),
-            *(constant(name, value) for name, value in constants.items()),
+            *(constant(name, value) for name, value in numbers.items()),
             code.uniform(),
             code.body("rates", (0,)),
             code.body("results", (1,)),
@@ -341,11 +335,10 @@ def _compiled(
             c_file("transients.h", __package__),
         ]
     )
-    names = [v.name for v in arguments_of(model)]
-    starts = (0, sizes[0], sum(sizes))
+    layouts = model.parameter_layout, model.input_layout
+    uniform = [layouts[kind].names[k] for kind, k in code.inputs]
     files = {STEP: c_file(STEP)}
     digest = hashlib.sha256((source + files[STEP]).encode()).hexdigest()
-    uniform = [names[starts[kind] + k] for kind, k in code.inputs]
     return _NativeLoop(digest, load(source, compiler, files), uniform)
 
 
@@ -365,7 +358,8 @@ def _operations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> 
 def _equations(model: Model, outputs: tuple[str, ...], by: tuple[str, ...]) -> tuple[list[Any], list[Any]]:
     """The arguments, and three groups: the derivatives of the states, these outputs and states, and the states that
     meet the constraints of a model with error control. The derivatives of each group in a direction follow it; the
-    direction consists of derivatives of the states, behind the states, and of those `by` names, a fourth argument."""
+    direction consists of derivatives of the states, which follow the states, and of the changes of the quantities in
+    `by`, a fourth argument."""
     import casadi
 
     t = trace(model)

@@ -17,7 +17,7 @@ def admits(x: Any, low: float, high: float, slack: float, open_low: bool, whole:
 
 
 def within(x: float, low: float, high: float) -> float:
-    """The admitted number `x`, set to the bound where it is beyond it by rounding."""
+    """The admitted number `x`; the bound in place of a number that is beyond it by rounding."""
     return low if x < low else high if x > high else x
 
 
@@ -26,7 +26,7 @@ def complaint(name: str, x: float, unit: str, allowed: str, bounded: bool, descr
     if not math.isfinite(x):
         allowed = messages.FINITE.format(allowed=allowed) if bounded else messages.NUMBER
     line = messages.VALUE.format(name=name, value=x, unit=messages.unit_behind(unit), allowed=allowed)
-    return f"{line} ({description})"
+    return f"{line} ({description})" if description else line
 
 
 def refusal(
@@ -42,7 +42,9 @@ def refusal(
     value, low, high = limits
     unit = messages.unit_behind(unit)
     formats = (messages.FIRST_PARAMETER, *[messages.NEXT_PARAMETER] * len(context))
-    those = "".join(f.format(name=n, value=x) for f, (n, x) in zip(formats, context.items(), strict=False))
+    parameters = "".join(
+        f.format(name=n, value=x) for f, (n, x) in zip(formats, context.items(), strict=False)
+    )
     sides = math.isfinite(low), math.isfinite(high)
     text = {(True, False): messages.ABOVE, (False, True): messages.BELOW}.get(sides, messages.BETWEEN)
     return messages.REQUIREMENT.format(
@@ -50,7 +52,7 @@ def refusal(
         value=value,
         unit=unit,
         why=why,
-        parameters=those,
+        parameters=parameters,
         limits=(text if low < high else messages.NO_VALUE).format(
             low=low, high=high, unit=unit, remedy=remedy
         ),

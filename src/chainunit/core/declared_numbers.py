@@ -3,6 +3,7 @@ library such as pint."""
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -21,15 +22,17 @@ def may_be_share(variable: Variable) -> bool:
 
 
 def kind_words(variable: Variable) -> str:
-    """Words on what a value of a file has to be: ``a number in m, or a text such as "2 mm" (crank O1-A)``."""
+    """The allowed form of a value of a file: ``a number in m, or a text such as "2 mm" (crank O1-A)``."""
     fitting = units.fitting(variable.unit, variable.kind)
+    # a variable of an FMU may have no description
+    meaning = f" ({variable.description})" if variable.description else ""
     if variable.type != "Real":
-        return f"{variable.quantity.allowed_range} ({variable.description})"
+        return f"{variable.quantity.allowed_range}{meaning}"
     if variable.unit == "1":
         share = ', or a text such as "8 %"' if may_be_share(variable) else ""
-        return f"a pure number{share} ({variable.description})"
+        return f"a pure number{share}{meaning}"
     declared = variable.unit.replace(".", " ")
-    return f'a number in {declared}, or a text such as "2 {fitting[0]}" ({variable.description})'
+    return f'a number in {declared}, or a text such as "2 {fitting[0]}"{meaning}'
 
 
 def number_of_text(variable: Variable, text: str) -> float:
@@ -40,20 +43,17 @@ def number_of_text(variable: Variable, text: str) -> float:
     ValueError
         in one line, for a text that is no number and a unit of another kind.
     """
-    parts = units.split(text)
-    try:
-        if parts is not None:
-            number, written = parts
-            if set(written) & set("%‰") and not may_be_share(variable):
-                raise ValueError(written)
-            return units.convert(number, written, variable.unit, variable.kind) if written else number
-    except ValueError:
-        pass
+    number, unit = units.split(text) or (None, "")
+    if number is not None and not unit:
+        return number
+    if number is not None and (may_be_share(variable) or not set(unit) & set("%‰")):
+        with contextlib.suppress(ValueError):
+            return units.convert(number, unit, variable.unit, variable.kind)
     is_pure = variable.type != "Real" or (variable.unit == "1" and not may_be_share(variable))
     hint = "" if is_pure else units.spelling(text, variable.unit, variable.kind)
-    other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
-    other = f"; {printable(other)}" if other else ""
-    raise ValueError(f"{variable.name} = {shown(text)}: must be {kind_words(variable)}{other}{hint}")
+    kind = units.of_other_kind(unit, variable.unit) if unit else ""
+    kind = f"; {printable(kind)}" if kind else ""
+    raise ValueError(f"{variable.name} = {shown(text)}: must be {kind_words(variable)}{kind}{hint}")
 
 
 def magnitude_and_unit(value: Any) -> tuple[Any, str] | None:
@@ -66,19 +66,12 @@ def magnitude_and_unit(value: Any) -> tuple[Any, str] | None:
         return value.values, str(attributes["units"])
     if not all(hasattr(value, name) for name in ("magnitude", "units", "to")):
         return None
+    # a unit that only the library knows is converted to its base units
     for quantity in (value, value.to_base_units()):
         unit = f"{quantity.units:~C}" or "1"
-        if _is_unit(unit):
+        if units.is_unit(unit):
             return quantity.magnitude, unit
     return value.magnitude, f"{value.units:~C}"
-
-
-def _is_unit(unit: str) -> bool:
-    try:
-        units.dimension(unit)
-    except ValueError:
-        return False
-    return True
 
 
 def has_own_unit(value: Any) -> bool:
@@ -138,7 +131,7 @@ def in_declared_unit(variable: Variable, value: Any) -> Any:
 
 
 def _read(variable: Variable, text: str) -> float:
-    """The number of a text; see `number_of_text`, whose error it raises as an InputError."""
+    """See `number_of_text`; its error is an InputError."""
     try:
         return number_of_text(variable, text)
     except ValueError as error:
@@ -160,5 +153,5 @@ def one_number(variable: Variable, value: Any) -> float:
 
 
 def number_in(unit: str, name: str, value: Any, description: str) -> float:
-    """One number in the `unit`, of an argument that no model declares; errors are those of `one_number`."""
+    """One number in the `unit`, of an argument that no model declares; see `one_number` for its errors."""
     return one_number(Variable(name, description, Quantity(unit, description)), value)

@@ -4,8 +4,8 @@ A kernel uses operators and exactly the names of `NAMES`; each engine here offer
 name that one engine lacks cannot slip into a kernel.
 
 ========  ==============================================================================
-`MATH`    floats at one point, five times as fast as numpy there; where numpy returns NaN it raises an
-          error, and `minimum` and `maximum` may ignore a NaN
+`MATH`    floats at one point, five times as fast as numpy; raises an error in place of a NaN, and
+          `minimum` and `maximum` may ignore a NaN
 `numpy_`  arrays of any broadcastable shape
 `casadi_` symbols, from which C code, exact derivatives and sparsity come
 `dual`    first-order dual numbers on top of any of the others: exact slopes
@@ -116,14 +116,13 @@ def slope(x: Any) -> Any:
 
 
 class _DualEngine(SimpleNamespace):
-    pass
+    """An engine on dual numbers."""
 
 
 def dual(xp: Any) -> SimpleNamespace:
     """The engine on dual numbers over `xp`; plain numbers pass through it unchanged.
 
-    At a kink (`abs`, `minimum`, `maximum`) the derivative is that of either side, as
-    in every automatic differentiation.
+    At a kink (`abs`, `minimum`, `maximum`) the derivative is the one of either side.
 
     Raises
     ------
@@ -136,6 +135,8 @@ def dual(xp: Any) -> SimpleNamespace:
         )
 
     def lift(f: Any, df: Any) -> Any:
+        """A function of one argument for dual numbers; `df` gives its slope from the argument and the value."""
+
         def g(x: Any) -> Any:
             if isinstance(x, Dual):
                 y = f(x.v)
@@ -149,9 +150,6 @@ def dual(xp: Any) -> SimpleNamespace:
             return xp.atan2(y, x)
         yv, xv = value(y), value(x)
         return Dual(xp.atan2(yv, xv), (xv * slope(y) - yv * slope(x)) / (xv * xv + yv * yv))
-
-    def absolute(x: Any) -> Any:
-        return maximum(x, -x)
 
     def minimum(a: Any, b: Any) -> Any:
         if not (isinstance(a, Dual) or isinstance(b, Dual)):
@@ -173,7 +171,7 @@ def dual(xp: Any) -> SimpleNamespace:
         exp=lift(xp.exp, lambda v, y: y),
         log=lift(xp.log, lambda v, y: 1.0 / v),
         atan2=atan2,
-        abs=absolute,
+        abs=lambda x: maximum(x, -x),
         minimum=minimum,
         maximum=maximum,
     )

@@ -61,7 +61,7 @@ class InputError(ShortTraceback, ValueError):
 
     @classmethod
     def joined(cls, faults: Sequence[InputError]) -> InputError:
-        """One error that stands for several, each told once."""
+        """One error that stands for several; equal ones stand once."""
         faults = list({(fault.key, str(fault)): fault for fault in faults}.values())
         return faults[0] if len(faults) == 1 else InputError("\n".join(map(str, faults)), faults=faults)
 
@@ -159,6 +159,18 @@ def check_kind(name: str, value: Any, kind: Any, description: str = "") -> None:
         raise InputError(f"{name} = {shown(value)}: must be {description or kind.__qualname__}", name)
 
 
+def check_choice(name: str, value: Any, allowed: Collection[str]) -> None:
+    """Refuse a `value` of a script that is none of the `allowed` texts.
+
+    Raises
+    ------
+    InputError
+        in one line.
+    """
+    if not isinstance(value, str) or value not in allowed:
+        raise InputError(f"{name} = {shown(value)}: must be {one_of(value, allowed)}", name)
+
+
 def texts_in(name: str, value: Any) -> tuple[str, ...]:
     """The texts of an argument of a script that is a sequence of them; one text alone is a sequence of one.
 
@@ -167,15 +179,18 @@ def texts_in(name: str, value: Any) -> tuple[str, ...]:
     InputError
         in one line.
     """
-    listed = (value,) if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    try:
+        listed = (value,) if isinstance(value, str) else tuple(value)
+    except TypeError:  # also of an array without a dimension
+        listed = (value,)
     for text in listed:
         check_kind(name, text, str, "a text, or a list of texts")
     return listed
 
 
 def near_name(text: str, allowed: Iterable[str]) -> str:
-    """Words to add to the refusal of a name that is similar to one of the `allowed` names or begins it, or of several
-    words one of which is such a name; else empty."""
+    """The question whether one of the `allowed` names was meant, to follow the refusal of a `text`: a name that is
+    similar or begins with it, or one of its words; empty if there is none."""
     names = {name.lower(): name for name in allowed}
     near = difflib.get_close_matches(text.lower(), names, n=1, cutoff=0.75)
     near = near or [name for name in names if name.startswith(f"{text.lower()}_")]
@@ -184,12 +199,12 @@ def near_name(text: str, allowed: Iterable[str]) -> str:
 
 
 def meant(text: str, allowed: Iterable[str]) -> str:
-    """Words to add to a refusal that goes on behind: with a question where a name is similar, else a semicolon."""
+    """The end of a refusal that goes on after it: the question of `near_name`, or a semicolon."""
     return near_name(text, allowed) or ";"
 
 
 def one_of(value: object, allowed: Collection[str]) -> str:
-    """Words on the allowed names: all of them, and the one that is similar to the name `value`."""
+    """All allowed names in a refusal, and the question of `near_name`."""
     return f"one of {', '.join(allowed)}{near_name(str(value), allowed)}"
 
 
@@ -201,14 +216,12 @@ def printable(text: str, most: int = 200) -> str:
     directions of writing), and invisible ones, are written as escapes. Beyond `most` characters the end is
     left out."""
     line = "".join(
-        x if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs" else _escape(x)
+        x
+        if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs"
+        else x.encode("unicode_escape").decode()
         for x in text[:most]
     )
     return line if len(text) <= most else f"{line}... ({len(text) - most} more characters)"
-
-
-def _escape(character: str) -> str:
-    return character.encode("unicode_escape").decode()
 
 
 _LETTERS, _ENTRIES, _DEPTH = 60, 4, 2
@@ -232,8 +245,12 @@ def shown(value: Any, depth: int = 0) -> str:
         return _bracketed("{ ", entries, len(value), " }")
     if isinstance(value, list | tuple):
         return _bracketed("[", [shown(x, depth + 1) for x in _first(value)], len(value), "]")
+    if hasattr(value, "magnitude"):  # of a library such as pint
+        return shown(str(value))
     if hasattr(value, "tolist"):  # of numpy
-        return shown(value.tolist(), depth)
+        plain = value.tolist()
+        # a number of numpy that Python lacks stays as it is
+        return printable(str(plain)) if type(plain) is type(value) else shown(plain, depth)
     if isinstance(value, date | time):
         return value.isoformat()
     return printable(_brief(value), 100)

@@ -11,9 +11,13 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .errors import Faults, InputError, WriteError, check_kind, shown
 from .inputs import regular_bytes
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 LOCK = ".chainunit-lock"
 """Name of the file that stands in a folder while a process writes there."""
@@ -47,9 +51,9 @@ def atomic_file(file: Path, *, is_result: bool = True) -> Iterator[Path]:
     Raises
     ------
     InputError
-        where `file` is no regular file.
+        if `file` is no regular file.
     WriteError
-        where it cannot be written, such as on a full disk; an earlier `file` stays as it was.
+        if it cannot be written, such as on a full disk; an earlier `file` stays as it was.
     """
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: is not a regular file; name another")
@@ -84,8 +88,8 @@ def named_file(file: str | Path, *endings: str) -> Path:
 
 
 def write_file(file: Path, content: str | bytes) -> list[Path]:
-    """Write a text, in UTF-8, or bytes into a file, whole or not at all; returns the file. Errors are those of
-    `atomic_file`."""
+    """Write a text, in UTF-8, or bytes into a file, whole or not at all; returns the file. See `atomic_file` for
+    errors."""
     with atomic_file(file) as part:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
     return [file]
@@ -132,7 +136,7 @@ def folder(path: Path) -> Path:
     Raises
     ------
     InputError
-        where it cannot be made or written to.
+        if it cannot be made or written to.
     """
     if path.is_file():
         raise InputError(f"{path}: is a file; must be a folder")
@@ -149,12 +153,12 @@ class FileList:
     """The files that the program wrote into a `folder`, by which it tells them from the files of others.
 
     A line has the SHA-256 of a file and its name in the folder, as ``sha256sum`` writes and checks it. While a file
-    is replaced, it has two lines: a process that is killed leaves the old or the new one, and both are its own.
+    is replaced, it has two lines, as a process that is killed leaves the old or the new file.
 
     Raises
     ------
     InputError
-        where the file of the list has other content.
+        if the file of the list has other content.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -183,7 +187,7 @@ class FileList:
         self._write()
 
     def close(self) -> None:
-        """Leave each file as it is now in the list, and none that is gone."""
+        """Keep the lines of the files as they are now."""
         files = {self.folder / line[_NAME:] for line in self._lines}
         self._lines &= {self._line(file, file) for file in files if file.is_file()}
         self._write()
@@ -215,30 +219,21 @@ def clear(folder: Path, *names: str) -> None:
 @contextmanager
 def claim(path: Path, *names: str) -> Iterator[Path]:
     """The `folder` at `path`, for this process alone as long as the context lasts; `names` are the files that are
-    going to be written. What a killed process left of a file goes, and the folder, too, if it was made here and an
-    error leaves it empty. A file system without locks gives no protection.
+    going to be written. Parts of files that a killed process left are removed, and after an error also a new folder
+    that is empty. A file system without locks gives no protection.
 
     Raises
     ------
     InputError
-        where another process writes there, and with a line for each file that no earlier run wrote and that would be
+        if another process writes there, and with a line for each file that no earlier run wrote and that would be
         lost; see also `folder`.
     """
-    from filelock import FileLock, Timeout
+    from filelock import FileLock
 
-    is_new, is_left = not path.exists(), False
+    is_new, is_complete = not path.exists(), False
     lock = FileLock(folder(path) / LOCK)
     try:
-        try:
-            lock.acquire(blocking=False)
-        except Timeout as error:
-            raise InputError(
-                f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder with -o"
-            ) from error
-        except PermissionError:
-            raise
-        except (OSError, NotImplementedError):  # a file system without locks
-            pass
+        _acquire(lock, path)
         for part in filter(lambda file: _PART.fullmatch(file.name), path.iterdir()):
             part.unlink()
         listed = FileList(path)
@@ -250,18 +245,33 @@ def claim(path: Path, *names: str) -> Iterator[Path]:
         _lists.append(listed)
         try:
             yield path
+            is_complete = True
         finally:
             _lists.remove(listed)
             with contextlib.suppress(OSError, WriteError):
                 listed.close()
-    except BaseException:
-        is_left = is_new
-        raise
     finally:
         if lock.is_locked:
             with contextlib.suppress(OSError):  # on Windows an open file stays until it is closed
                 (path / LOCK).unlink()
             lock.release()
-        for place in [*sorted(path.rglob("*"), reverse=True), path] if is_left else ():
-            with contextlib.suppress(OSError):  # a file, or a folder that holds one
-                place.rmdir()
+        if is_new and not is_complete:
+            for place in (*sorted(path.rglob("*"), reverse=True), path):
+                with contextlib.suppress(OSError):  # a file, or a folder that holds one
+                    place.rmdir()
+
+
+def _acquire(lock: FileLock, path: Path) -> None:
+    """Lock the folder at `path`, or refuse one in which another process writes."""
+    from filelock import Timeout
+
+    try:
+        lock.acquire(blocking=False)
+    except Timeout as error:
+        raise InputError(
+            f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder with -o"
+        ) from error
+    except PermissionError:
+        raise
+    except (OSError, NotImplementedError):  # a file system without locks
+        pass

@@ -43,7 +43,7 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )  # fmt: skip
 _OTHER_KINDS = {
-    b"PK\x03\x04": "a ZIP archive, such as an FMU or an SSP package",
+    b"PK\x03\x04": "a ZIP archive, such as an FMU, an SSP package or a workbook of a spreadsheet",
     b"\x89HDF": "a NetCDF or HDF5 file, such as result.nc",
     b"CDF": "a NetCDF file",
     b"%PDF": "a PDF file",
@@ -52,6 +52,10 @@ _OTHER_KINDS = {
     b"\x1f\x8b": "a compressed file",
     b"\x7fELF": "a program",
     b"MZ": "a program",
+    b"\xd0\xcf\x11\xe0": "a workbook of a spreadsheet (XLS)",
+    b"TDSm": "a TDMS file",
+    b"MDF     ": "a measurement data file (MDF)",
+    b"MATLAB 5": "a MAT file",
     b"<": "HTML or XML",
 }
 """By first bytes, the kinds of files that are no text."""
@@ -110,10 +114,10 @@ def _too_large(place: str, most: int, subject: str = "") -> InputError:
     )
 
 
-def regular_bytes(file: Path, most: int = TEXT) -> bytes | None:
+def regular_bytes(file: Path) -> bytes | None:
     """The content of a file; None if `file_bytes` refuses it."""
     try:
-        return file_bytes(file, most)
+        return file_bytes(file)
     except InputError:
         return None
 
@@ -126,17 +130,7 @@ def file_text(file: Path, most: int = TEXT) -> str:
     InputError
         in one line that begins with the name of the file.
     """
-    return decoded(file, file_bytes(file, most))
-
-
-def decoded(file: Path, data: bytes) -> str:
-    """The text in the content of a file, see `file_text`.
-
-    Raises
-    ------
-    InputError
-        in one line that begins with the name of the file.
-    """
+    data = file_bytes(file, most)
     _refuse_other_kinds(file, data)
     try:
         text = data.decode("utf-8-sig")
@@ -177,10 +171,12 @@ def decoded_by_marks(file: Path, data: bytes) -> str:
             continue
         # Ctrl-Z ends a text of DOS
         text = text.rstrip("\0\x1a")
+        # a logger that lost its power leaves lines of zeros
+        text = re.sub(r"^\0+$", "", text, flags=re.MULTILINE) if "\0" in text else text
         if not re.search(r"[\0-\x08\x0e-\x1b\x7f]", text):
             return text
         break
-    raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8")
+    raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8, or export a table as CSV")
 
 
 def unzipped(file: Path, data: bytes, most: int = TEXT) -> bytes:
@@ -277,7 +273,9 @@ def xml_of(data: bytes, name: str) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(data, ElementTree.XMLParser(target=_TreeWithoutType()))
     except _HasTypeError:
-        raise InputError(f"{name}: has a document type, which no file of an FMU has; take it out") from None
+        raise InputError(
+            f"{name}: has a document type, by which a text may grow without end; take it out"
+        ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{name}: is no XML that can be read ({printable(str(error))})") from error
 
@@ -300,7 +298,7 @@ def check_archive(source: Path | bytes, name: str, most: int = UNPACKED, kind: s
     Raises
     ------
     InputError
-        in one line that begins with the `name` of the archive; also where it is none of its `kind`.
+        in one line that begins with the `name` of the archive; also if it is none of its `kind`.
     """
     try:
         with source.open("rb") if isinstance(source, Path) else io.BytesIO(source) as stream:

@@ -4,7 +4,7 @@ generated from these. ``tests/test_steps.py`` compares the accepted steps.
 
 `rk4`, the classical Runge-Kutta method with equal steps: its cost is known beforehand, it needs no error control
 that could give up in the middle of a step, and with steps well below the model's shortest time constant its
-error (fourth order) lies far below that of the coupling (second order).
+error (fourth order) is far smaller than the error of the coupling (second order).
 
 `controlled`, the pair of Dormand and Prince of orders 5 and 4 with control of the error: for a model that is slow
 most of the time and now and then jerks. Python FMUs carry this file.
@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 
 MAX_STEPS = "solver.max_steps"
-"""Full name of the parameter `chainunit.core.solver.Solver.max_steps`."""
+"""Full name of the parameter `chainunit.core.ports.Solver.max_steps`."""
 
 
 SAME_TIME, ROUNDED, ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53
@@ -51,7 +51,7 @@ def rk4(
     Raises
     ------
     BudgetError
-        where the step takes more than `most` substeps; it is raised before the first one.
+        if the step takes more than `most` substeps; it is raised before the first one.
     """
     count = step / longest - 1e-9
     if count > most:
@@ -86,7 +86,7 @@ SHORTEST = 1e-6
 """Shortest substep over the longest: such a step is accepted whatever its error, as a snatch must not stop a
 run."""
 FIRST = 0.01
-"""First substep over the longest, where no earlier substep is known."""
+"""First substep over the longest, if no earlier substep is known."""
 SAFETY, ERROR_POWER = 0.9, -0.2
 """The next substep is chosen so that its error should be the share `SAFETY` of the permitted one."""
 LEAST_GROWTH, MOST_GROWTH = 0.2, 5.0
@@ -102,7 +102,7 @@ DENSE = (
     (0.0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844),
     (0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423),
 )
-"""Dense output of fourth order, L. F. Shampine, Math. Comp. 46 (1986) 135: behind the share z of a substep h the
+"""Dense output of fourth order, L. F. Shampine, Math. Comp. 46 (1986) 135: after the share z of a substep h the
 state has changed by the sum of the stages with the weights h*(D1*z + D2*z^2 + D3*z^3 + D4*z^4), a row for each."""
 
 
@@ -123,15 +123,15 @@ def controlled(
     ----------
     rates : gives the derivatives of the states, from the time since the start of the step and the states at that time
     close : gives states near its argument that meet the model's constraints at that time; called after each substep
-    pace, longest : first substep, 0 where none is known, and longest substep [s]
+    pace, longest : first substep, 0 if none is known, and longest substep [s]
     tolerance, nominal : permitted error of a substep, relative to each state or to its nominal size
 
     Raises
     ------
     ArithmeticError
-        where the states are not finite even after the shortest substep.
+        if the states are not finite even after the shortest substep.
     BudgetError
-        where the step takes more than `most` substeps.
+        if the step takes more than `most` substeps.
     """
     now, since, steps, pace = list(x), 0.0, 0, pace or FIRST * longest
     while since < step:

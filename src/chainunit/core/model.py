@@ -19,13 +19,11 @@ from .quantities import Layout, Variable, violations, within_bounds
 
 @dataclass(frozen=True)
 class Requirement:
-    """A condition on the parameters beyond their own bounds: `subject` in `unit` lies strictly between two
-    limits that depend on the others.
+    """A condition on the parameters beyond their own bounds: `subject` in `unit` lies strictly between two limits,
+    which the model's `requirements` compute.
 
-    `why` says what happens if the condition is not met; the refusal names the parameters of `context` with
-    their values. `depends` are further parameters that set the limits. `remedy` says what to do where no
-    value
-    fits. The words are declared once; the limits come from the model's `requirements`.
+    `why` says what happens if the condition is not met; the refusal names the parameters of `context` with their
+    values. `depends` are further parameters that set the limits. `remedy` says what to do if no value fits.
     """
 
     subject: str
@@ -43,9 +41,9 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Terminal:
-    """Variables that are connected together. `members` maps each name that both sides know to the model's own
-    name; `flows` gives the flow variables with their direction ("inflow", "outflow"); only terminals of one
-    `kind` are joined. By the `rule` "plug" both sides have all members, by "bus" those are joined that both have."""
+    """Variables that are connected together. `members` has the names of the model's variables by the names that both
+    sides have in common; `flows` has the direction of flow variables ("inflow", "outflow"); only terminals of one
+    `kind` are joined. By the `rule` "plug" both sides have all members; by "bus" their common members are joined."""
 
     name: str
     kind: str
@@ -70,9 +68,9 @@ class FmuData:
     """Data of a model that only its FMU needs."""
 
     notes: str = ""
-    """further paragraphs of the documentation, each behind an empty line: frame, signs, limits"""
+    """further paragraphs of the documentation, each after an empty line: frame, signs, limits"""
     about: About | None = None
-    """who made the model, where its user did; None for the models of this package"""
+    """who made the model; None for the models of this package"""
     experiment: Mapping[str, float] = field(default_factory=dict)
     """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, in place of the usual ones"""
     sizes: Mapping[str, float] = field(default_factory=dict)
@@ -115,8 +113,8 @@ class Extrapolation(NamedTuple):
 class Part:
     """Outputs that are evaluated together, as soon as one of them is requested.
 
-    `equations` is called as ``equations(xp, p, u, x, shared)``, where `shared` is what the
-    model's `shared` returned, and gives an instance of the declaration `declared`.
+    `equations` is called as ``equations(xp, p, u, x, shared)`` with the common values of `Model.shared`, and gives an
+    instance of the declaration `declared`.
     """
 
     def __init__(
@@ -130,7 +128,7 @@ class Part:
 
 
 Limits = Iterable[tuple[Any, Any, Any]]
-"""Value, lower limit and upper limit of each of several requirements, in order."""
+"""Value, lower limit and upper limit of each requirement, in order."""
 
 UNSTATED: Any = None
 """The default of what follows from the rest of a model unless it is stated."""
@@ -140,8 +138,8 @@ UNSTATED: Any = None
 class Model:
     """A model: four declarations, and the equations between them as plain functions.
 
-    The equations are written for any engine `xp`, parameters `p`, inputs `u` and states `x`. Inputs and outputs are
-    those of the FMU of the same name.
+    The equations are written for any engine `xp`, parameters `p`, inputs `u` and states `x`. The FMU of the same name
+    has the same inputs and outputs.
     """
 
     name: str
@@ -159,8 +157,8 @@ class Model:
     `derive`."""
     input_rates: Mapping[str, str] = UNSTATED
     """Inputs of a co-simulation FMU whose time derivative is another input (``phi`` has ``w``, ``w`` has
-    ``a``). They are extrapolated inside a step, up to their bounds; without that a turning shaft would stand
-    still in each step, and outputs at its end would be those of its begin."""
+    ``a``). They are extrapolated inside a step, up to their bounds; else a turning shaft would stand still in each
+    step."""
     start_problem: StartProblem = UNSTATED
     """Iteration for the states at the start; see `start`."""
     controlled: bool = UNSTATED
@@ -174,7 +172,7 @@ class Model:
     constant: Mapping[str, float] = field(default_factory=dict)
     """Outputs that never change, with their values by name."""
     home: str = UNSTATED
-    """The module that has it by its name: that of its parameters, unless it is stated."""
+    """The module that has it by its name; by default the module of its parameters."""
     made: tuple[Callable[..., Any], tuple[Any, ...]] | None = None
     """The function of a module that makes it, and its arguments, if no module has it by its name."""
 
@@ -216,7 +214,7 @@ class Model:
     requirement; empty if it has none."""
 
     def __post_init__(self) -> None:
-        """State what follows; a kind of models states more before."""
+        """Give the attributes that are not stated their values; a subclass gives its own before."""
         self.follow(
             home=getattr(self.Parameters, "__module__", ""),
             parts=(),
@@ -240,7 +238,7 @@ class Model:
                 _let_pickle(self, name)
 
     def follow(self, **values: Any) -> None:
-        """State these attributes, except those that are stated."""
+        """Set the attributes that are not stated."""
         followed = vars(self).setdefault("_followed", set())
         for name, value in values.items():
             if getattr(self, name) is UNSTATED:
@@ -248,7 +246,7 @@ class Model:
                 followed.add(name)
 
     def altered(self, **changes: Any) -> Self:
-        """The model with other attributes; what followed from the old ones follows from these."""
+        """The model with other attributes; attributes that were not stated follow from the new ones."""
         followed = vars(self)["_followed"]
         stated = {f.name: getattr(self, f.name) for f in fields(self) if f.init and f.name not in followed}
         return type(self)(**stated | changes)
@@ -257,7 +255,7 @@ class Model:
         return f"<{type(self).__name__} {self.name}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its place in a module, or by the call that makes it, another process gets the model."""
+        """Another process gets the model by its name in a module, or by the call that makes it."""
         if self.made is not None:
             return self.made
         if getattr(sys.modules.get(self.home), self.name, None) is not self:
@@ -266,7 +264,8 @@ class Model:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What makes this model, as JSON has it: of two processes, too, equal for equal models."""
+        """The name or the call that makes this model, as JSON has it: equal for equal models, also of two
+        processes."""
         if self.made is None:
             return {"of": f"{self.home}:{self.name}"}
         function, arguments = self.made
@@ -298,8 +297,7 @@ class Model:
         return ready
 
     def check(self, p: Any) -> Any:
-        """The parameters `with_derived`. Parameters that are out of bounds, or with which the machine does not work,
-        are refused.
+        """The parameters `with_derived`, if they are allowed.
 
         Raises
         ------
@@ -314,7 +312,7 @@ class Model:
         try:
             p = self.with_derived(MATH, p)
         except (ArithmeticError, ValueError):
-            # `math` raises where other engines give NaN, which no requirement admits
+            # `math` raises an error if other engines give NaN, which no requirement admits
             p = self.with_derived(MATH, p, [math.nan] * self.derived_count)
         try:
             self._meets(p, self.required, self.requirements(MATH, p))
@@ -325,6 +323,7 @@ class Model:
         return p
 
     def _meets(self, p: Any, requirements: tuple[Requirement, ...], limits: Limits) -> None:
+        """Refuse the first requirement whose value is not between its limits."""
         for requirement, (value, low, high) in zip(requirements, limits, strict=True):
             if not low < value < high:
                 complaint = requirement.refusal(value, low, high, self.parameter_layout.by_name(p))
@@ -335,14 +334,11 @@ class Model:
     def extrapolations(self, values: Sequence[Any]) -> list[Extrapolation]:
         """The extrapolation of each input of `input_rates`, from the `values` of all inputs."""
 
-        def rate(name: str | None) -> Any:
-            other = self.input_rates.get(name or "")
-            return values[names.index(other)] if other else 0.0
-
-        names = self.input_layout.names
+        by_name = dict(zip(self.input_layout.names, values, strict=True))
+        rates = {name: by_name[rate] for name, rate in self.input_rates.items()}
         return [
-            Extrapolation(names.index(name), rate(name), 0.5 * rate(self.input_rates[name]))
-            for name in self.input_rates
+            Extrapolation(self.input_layout.names.index(name), rates[name], 0.5 * rates.get(rate, 0.0))
+            for name, rate in self.input_rates.items()
         ]
 
     def begin(self, p: Any, u: Any) -> Any:
@@ -380,7 +376,7 @@ def _model_in(module: str, name: str) -> Any:
 
 
 def _let_pickle(model: Model, name: str) -> None:
-    """Let pickle take instances of a declaration of a model that is `made`, if no module names its class."""
+    """Let pickle take the instances of a declaration of a `made` model whose class no module has by its name."""
     declared = getattr(model, name, None)
     if declared is None or _has_name(declared):
         return

@@ -24,7 +24,7 @@ class Named(Mapping[str, T]):
         UnknownNameError
             with all names.
         """
-        if name not in self._entries:
+        if not isinstance(name, str) or name not in self._entries:
             names = ", ".join(self._entries) or "none"
             raise UnknownNameError(
                 f"{shown(name)}: is no name{meant(str(name), self._entries)} there are {names}"

@@ -139,15 +139,15 @@ class Link:
         )
 
     def third_derivative(self, r: Vec2, start: Vec2, t3: Any) -> Vec2:
-        """Third derivative by q of the point `r` away from the pin; `start` is that of the pin, `t3` that of
-        the angle."""
+        """Third derivative by q of the point `r` away from the pin; `start` and `t3` are the third derivatives of the
+        pin and of the angle."""
         t1 = self.t1
         across, along = t3 - t1 * t1 * t1, 3.0 * (t1 * self.t2)
         return Vec2(start.x - r.y * across - r.x * along, start.y + r.x * across - r.y * along)
 
     def lifted(self, start: Vec2, t3: Any) -> Link:
-        """The link with its derivatives by q as dual parts; `start` is the third one of the pin, `t3` that of
-        the angle."""
+        """The link with its derivatives by q as dual parts; `start` and `t3` are the third derivatives of the pin and
+        of the angle."""
         return Link(
             self.pin.lifted(start),
             lifted(self.u, self.u.turned() * self.t1),

@@ -1,4 +1,5 @@
-"""The load port: how a machine shows its load to the shaft that drives it.
+"""The load port: how a machine shows its load to the shaft that drives it; and other declarations that models with a
+shaft have in common.
 
 The machine gives its torque at constant speed and its reflected inertia at one point, with their slopes. The
 driver solves for its own acceleration with the linearised load inside its step. So there is no algebraic
@@ -12,7 +13,20 @@ from typing import Any
 
 from .model import Terminal
 from .quantities import Layout, Value, declaration, group, quantity
-from .solver import Solver
+
+
+@declaration
+class Solver:
+    """Limits of the internal integrator, a parameter of each model with states."""
+
+    max_steps: Value = quantity(
+        "1",
+        "most steps of its own that a communication step may take; the step is discarded where it takes more",
+        default=500_000,
+        min=1,
+        max=1_000_000_000,
+        type="Integer",
+    )
 
 
 @declaration

@@ -5,7 +5,7 @@ scalar) or `group` (a nested dataclass, whose fields have a prefix: ``crank.m``)
 Everything else - modelDescription.xml, config validation, tables, netCDF attributes - is
 generated from these declarations.
 
-Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer behind a name is its power:
+Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer after a name is its power:
 ``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number. Several factors in the denominator stand in brackets:
 ``Hz/(N.m)``.
 """
@@ -101,8 +101,16 @@ def base_units(unit: str) -> dict[str, int]:
     ValueError
         for an unknown unit name, or more than one stroke.
     """
-    exponents: dict[str, int] = {}
-    parts = unit.split("/")
+    exponents = dict.fromkeys(SI, 0)
+    for name, power in _powers(unit).items():
+        for base, exponent in _NAMED[name].items():
+            exponents[base] += exponent * power
+    return {base: exponent for base, exponent in exponents.items() if exponent}
+
+
+def _powers(unit: str) -> dict[str, int]:
+    """The powers of the names in a unit, in their order; see `base_units` for errors."""
+    parts, powers = unit.split("/"), dict[str, int]()
     if len(parts) > 2:
         raise ValueError(f"unit {unit!r}: must have one stroke at most, as in 'N/(m.s)'")
     for sign, part in zip((1, -1), parts, strict=False):
@@ -110,22 +118,17 @@ def base_units(unit: str) -> dict[str, int]:
             match = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", factor)
             if match is None or match[1] not in _NAMED:
                 raise ValueError(f"unknown unit {factor!r} in {unit!r}")
-            power = sign * int(match[2] or 1)
-            for base, exponent in _NAMED[match[1]].items():
-                exponents[base] = exponents.get(base, 0) + exponent * power
-    return {base: exponents[base] for base in SI if exponents.get(base)}
+            powers[match[1]] = powers.get(match[1], 0) + sign * int(match[2] or 1)
+    return powers
 
 
 def quotient(unit: str, by: str) -> str:
-    """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``; that of an energy by the time is ``W``."""
+    """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``, an energy by the time -> ``W``."""
     if (unit, by) == ("J", "s"):
         return "W"
-    powers: dict[str, int] = {}
-    for sign, text in ((1, unit), (-1, by)):
-        numerator, _, denominator = text.partition("/")
-        for part_sign, part in ((sign, numerator), (-sign, denominator)):
-            for name, power in re.findall(r"([A-Za-z]+|1)(-?\d*)", part):
-                powers[name] = powers.get(name, 0) + part_sign * int(power or 1)
+    powers = _powers(unit)
+    for name, power in _powers(by).items():
+        powers[name] = powers.get(name, 0) - power
     powers.pop("1", None)
     above = [f"{name}{p if p > 1 else ''}" for name, p in powers.items() if p > 0]
     below = [f"{name}{-p if p < -1 else ''}" for name, p in powers.items() if p < 0]
@@ -241,7 +244,7 @@ class Quantity(Described):
         return bounds.admits(x, self.low, self.high, self.slack, self.open_low, self.type != "Real")
 
     def within_bounds(self, x: float) -> float:
-        """The admitted number `x`, set to the bound where it is beyond it by rounding."""
+        """The admitted number `x`; the bound in place of a number that is beyond it by rounding."""
         return bounds.within(x, self.low, self.high)
 
 
@@ -315,40 +318,37 @@ Fields = Sequence[tuple[str, Any, Any]]
 
 
 def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
-    """A declaration with these fields and those of `bases`."""
+    """A declaration with these fields and the fields of `bases`."""
     return briefly_shown(dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True))
 
 
 def fields_of(declared: type, *, without: Sequence[str] = ()) -> Fields:
     """The fields of a declaration except those in `without`, to build another one from."""
-    return [
-        (f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata))
-        for f in dataclasses.fields(declared)
-        if f.name not in without
-    ]
+    return [_copied(f) for f in dataclasses.fields(declared) if f.name not in without]
+
+
+def _copied(f: dataclasses.Field[Any]) -> tuple[str, Any, Any]:
+    """A field for another declaration: a dataclass changes the fields that it is made of."""
+    return f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata)
 
 
 def pruned(declared: type, leave_out: Container[str], prefix: str = "") -> type | None:
     """The declaration without the quantities whose full names, after `prefix`, are in `leave_out`: `declared` itself
-    where nothing is left out, None where nothing is left."""
+    if it has none of them, None if it has no others."""
+    left = [prefix + v.name not in leave_out for v in variables(declared)]
+    if all(left) or not any(left):
+        return declared if any(left) else None
     fields = []
     for f in dataclasses.fields(declared):
         name = prefix + f.name
         if "quantity" in f.metadata:
             if name not in leave_out:
-                fields.append((f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata)))
-            continue
-        inner = pruned(f.metadata["of"], leave_out, f"{name}.")
-        if inner is not None:
+                fields.append(_copied(f))
+        elif (inner := pruned(f.metadata["of"], leave_out, f"{name}.")) is not None:
             default = f.metadata["default"]
-            if default is not None and inner is not f.metadata["of"]:
-                default = narrowed(default, inner)
+            default = None if default is None else narrowed(default, inner)
             fields.append((f.name, inner, group(inner, f.metadata["group"], default=default)))
-    if not fields:
-        return None
-    layout = {v.name for v in variables(declared)}
-    there = any(prefix + name in leave_out for name in layout)
-    return declared_class(declared.__name__, (), fields) if there else declared
+    return declared_class(declared.__name__, (), fields)
 
 
 def narrowed(instance: Any, to: type) -> Any:
@@ -448,8 +448,7 @@ class Layout:
         return _build(self._plan, values)
 
     def from_names(self, values: dict[str, Any], default: Any = None) -> Any:
-        """The instance with these `values` by name; the other values are those of `default`, or else the
-        start values.
+        """The instance with these `values` by name; the other values come from `default`, or are the start values.
 
         Raises
         ------
@@ -469,6 +468,8 @@ class Layout:
 
 
 def _plan(cls: type, i: int) -> tuple[tuple[type, list[tuple[str, Any]]], int]:
+    """The class of a declaration, and for each field the place of its value, from `i` on, or the plan of its group;
+    and the place after the last one."""
     steps: list[tuple[str, Any]] = []
     for field in dataclasses.fields(cls):
         if "quantity" in field.metadata:
@@ -481,6 +482,7 @@ def _plan(cls: type, i: int) -> tuple[tuple[type, list[tuple[str, Any]]], int]:
 
 
 def _build(plan: tuple[type, list[tuple[str, Any]]], values: Any) -> Any:
+    """The instance of a `_plan` with these values."""
     cls, steps = plan
     return cls(
         **{name: values[step] if isinstance(step, int) else _build(step, values) for name, step in steps}

@@ -25,9 +25,9 @@ def entries(group: str) -> dict[str, metadata.EntryPoint]:
     """
     points: dict[str, metadata.EntryPoint] = {}
     for entry in sorted(metadata.entry_points(group=group), key=lambda entry: entry.name):
-        other = points.setdefault(entry.name, entry)
-        if other.value != entry.value:
-            packages = " and ".join(e.dist.name if e.dist else e.value for e in (other, entry))
+        first = points.setdefault(entry.name, entry)
+        if first.value != entry.value:
+            packages = " and ".join(e.dist.name if e.dist else e.value for e in (first, entry))
             raise InputError(f"{entry.name} of {group}: is declared by {packages}; uninstall one of them")
     if not points:
         raise RunError(f"no installed package declares {group}: install chainunit anew")
@@ -40,27 +40,26 @@ class Register(MutableMapping[str, Thing]):
 
     def __init__(self, group: str) -> None:
         self._group = group
-        self._set: dict[str, Thing] = {}
-        self._loaded: dict[str, Thing] = {}
+        self._things: dict[str, Thing] = {}
+        """the objects that were taken or set"""
 
     def __getitem__(self, name: str) -> Thing:
-        if name in self._set:
-            return self._set[name]
-        if name not in self._loaded:
-            self._loaded[name] = entries(self._group)[name].load()
-        return self._loaded[name]
+        if name not in self._things:
+            entry = entries(self._group)[name]
+            self._things[name] = entry.load()
+        return self._things[name]
 
     def __setitem__(self, name: str, thing: Thing) -> None:
-        self._set[name] = thing
+        self._things[name] = thing
 
     def __delitem__(self, name: str) -> None:
-        del self._set[name]
+        del self._things[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._set or name in entries(self._group)
+        return name in self._things or name in entries(self._group)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys((*entries(self._group), *self._set)))
+        return iter(dict.fromkeys((*entries(self._group), *self._things)))
 
     def __len__(self) -> int:
-        return len({*entries(self._group), *self._set})
+        return len({*entries(self._group), *self._things})

@@ -18,8 +18,7 @@ class Trace:
     """A model in symbols.
 
     `symbols` are the casadi vectors (p, u, x, derived values); `p`, `u` and `x` the same as instances of their
-    declarations, `p` prepared with the derived values; `outputs` the outputs part by part in declared order, and
-    `derivatives` the derivatives of the states.
+    declarations, `p` prepared with the derived values; `derivatives` are the derivatives of the states.
     """
 
     model: Model
@@ -27,20 +26,19 @@ class Trace:
     p: Any
     u: Any
     x: Any
-    outputs: list[Any]
     derivatives: list[Any]
 
     @cached_property
-    def further_quantities(self) -> list[tuple[Variable, Any]]:
-        """The quantities beside the outputs, see `Model.further_quantities`."""
-        names = (v.name for v in outputs_of(self.model))
-        outputs = dict(zip(names, self.outputs, strict=True))
-        return self.model.further_quantities(casadi_(), self.p, self.u, self.x, outputs)
+    def outputs(self) -> list[Any]:
+        """The outputs part by part in declared order."""
+        return self.outputs_at(self.x)
 
     @cached_property
     def columns(self) -> dict[str, tuple[Variable, Any]]:
-        """By name, all outputs and further quantities, each with its declaration and its value."""
-        pairs = [*zip(outputs_of(self.model), self.outputs, strict=True), *self.further_quantities]
+        """By name, all outputs and `Model.further_quantities`, each with its declaration and its value."""
+        pairs = list(zip(outputs_of(self.model), self.outputs, strict=True))
+        outputs = {variable.name: value for variable, value in pairs}
+        pairs += self.model.further_quantities(casadi_(), self.p, self.u, self.x, outputs)
         return {variable.name: (variable, value) for variable, value in pairs}
 
     @cached_property
@@ -104,5 +102,4 @@ def trace(model: Model) -> Trace:
     u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
     x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
     derivatives = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
-    empty = Trace(model, symbols, p, u, x, [], derivatives)
-    return Trace(model, symbols, p, u, x, empty.outputs_at(x), derivatives)
+    return Trace(model, symbols, p, u, x, derivatives)

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
 
 from .integrators import MAX_STEPS
 from .model import Model, Requirement, Terminal
+from .ports import Solver
 from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
-from .solver import Solver
 
 _SOLVER = MAX_STEPS.partition(".")[0]
 RESERVED = (_SOLVER, "derived", "of_components")
@@ -26,7 +27,7 @@ Steps = Sequence[tuple[str, Sequence[str]]]
 
 @declaration
 class SystemSolver(Solver):
-    """Limits of the internal integrator of a system, in place of those of its components."""
+    """Limits of the internal integrator of a system, in place of the limits of its components."""
 
     tolerance: Value = quantity(
         "1",
@@ -49,9 +50,9 @@ SOLVER = tuple(f"{_SOLVER}.{name}" for name in Layout(SystemSolver).names)
 class Member:
     """A component: its model, and how its parameters and inputs follow from the parameters and inputs of the system.
 
-    `parameters` has for each parameter a function of the system's parameters; `free` for each input a function of the
-    system's inputs, or None, and `sources` then its source by full name, or None where it has its declared start
-    value.
+    `parameters` has for each parameter a function of the system's parameters. `free` has for each input a function of
+    the system's inputs, or None for an input that is connected or left out; `sources` has for each input the full
+    name of its source, or None. An input with neither has its declared start value.
     """
 
     name: str
@@ -60,7 +61,7 @@ class Member:
     free: Sequence[Any]
     sources: Sequence[str | None]
     sites: Mapping[str, tuple[int, Any]]
-    """by each output that the system takes: the number of its part, and the function that reads it there"""
+    """by output: the number of its part, and the function that reads it from the values of the part"""
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -69,12 +70,13 @@ class Member:
 
 
 class SystemDescription:
-    """What all values of a system share, from its description.
+    """The declarations, components and orders of evaluation of a system, from its description and its models by name.
 
-    The description has the `name` and `title` of the model, the `connections`, the inputs and outputs that are
-    `left_out`, the free `terminals` by full name, the `extra` outputs besides the variables of the first parts; the
-    outputs in the order of their dependencies, all (`steps`), the outputs for the derivatives (`rate_steps`) and for
-    the constraints (`closed_steps`); and the order of the `start`, in which no outputs stand for the states.
+    The `data` have the ``name`` and ``title`` of the model, the ``connections``, the inputs and outputs that are
+    ``left_out``, the free ``terminals`` by full name, the ``extra`` outputs besides the variables of the first parts;
+    the outputs in the order of their dependencies: all (``steps``), the outputs for the derivatives (``rate_steps``)
+    and for the constraints (``closed_steps``); and the order of the ``start``, in which None in place of outputs
+    stands for the states. `unknowns` has by component the places of its unknowns among all unknowns of the start.
     """
 
     def __init__(self, data: Mapping[str, Any], models: Mapping[str, Model]) -> None:
@@ -84,6 +86,9 @@ class SystemDescription:
         self.rate_steps: Steps = data["rate_steps"]
         self.closed_steps: Steps = data["closed_steps"]
         self.start: Sequence[tuple[str, Sequence[str] | None]] = data["start"]
+        begun = [name for name, outputs in self.start if outputs is None]
+        ends = accumulate((models[name].start_problem.unknowns for name in begun), initial=0)
+        self.unknowns = {name: slice(*pair) for name, pair in zip(begun, pairwise(ends), strict=True)}
         self.has_states = any(model.state_layout for model in self.models.values())
         left_out = {*data["left_out"]}
         common = {
@@ -136,6 +141,7 @@ class SystemDescription:
         return declared_class("FurtherOutputs", (), fields) if fields else None
 
     def _member(self, name: str, model: Model, inputs: Iterable[str], common: Mapping[str, str]) -> Member:
+        """A component, from the inputs that are connected or left out and the parameters that are `common`."""
         parameters = [f"{name}.{parameter}" for parameter in model.parameter_layout.names]
         taken = [f"{name}.{variable}" for variable in model.input_layout.names]
         return Member(
@@ -153,7 +159,7 @@ class SystemDescription:
 
     # -- attributes of the model
 
-    def words(self) -> str:
+    def text(self) -> str:
         """A text on the model for its users."""
         kinds = ", ".join(f"{name} is of the model {model.name}" for name, model in self.models.items())
         joined = ", ".join(f"{source} to {target}" for target, source in self.sources.items())
@@ -196,11 +202,11 @@ class SystemDescription:
         """The free inputs whose derivative is a free input, too."""
         free = set(Layout(self.Inputs).names)
         pairs = {
-            f"{name}.{one}": f"{name}.{other}"
+            f"{name}.{variable}": f"{name}.{rate}"
             for name, model in self.models.items()
-            for one, other in model.input_rates.items()
+            for variable, rate in model.input_rates.items()
         }
-        return {one: other for one, other in pairs.items() if {one, other} <= free}
+        return {variable: rate for variable, rate in pairs.items() if {variable, rate} <= free}
 
     def by_differences(self) -> frozenset[str]:
         """The outputs whose derivatives are central differences."""
@@ -225,7 +231,7 @@ class SystemDescription:
         return kept
 
 
-class _PartsAtPoint(NamedTuple):
+class _ComponentPoint(NamedTuple):
     """A component at one point: its inputs, what its parts share, and the outputs of the computed parts by number."""
 
     inputs: Any
@@ -243,35 +249,35 @@ class SystemPoint:
     def __init__(
         self, description: SystemDescription, xp: Any, p: Any, u: Any, states: Mapping[str, Any]
     ) -> None:
-        self._of, self._xp, self._u = description, xp, u
+        self._system, self._xp, self._u = description, xp, u
         self.p = description.parameters(p)
         self._states = dict(states)
-        self._known: dict[str, Any] = {}
-        self._final: dict[str, _PartsAtPoint] = {}
+        self._values: dict[str, Any] = {}
+        self._final: dict[str, _ComponentPoint] = {}
 
     def begin(self, name: str, states: Callable[[], Any]) -> None:
         """Give a component its states, which are computed when they are needed."""
         self._states[name] = states
 
     def states(self, name: str) -> Any:
-        """The states of a component; None where it has none."""
+        """The states of a component; None if it has none."""
         states = self._states.get(name)
         if callable(states):
             states = self._states[name] = states()
         return states
 
     def _source(self, full: str) -> Any:
-        """The value of an output or a state; None where it is not yet known."""
-        if full in self._known:
-            return self._known[full]
+        """The value of an output or a state; None if it is not yet known."""
+        if full in self._values:
+            return self._values[full]
         name, _, variable = full.partition(".")
-        if name in self._states and variable in self._of.members[name].states:
-            self._known[full] = attrgetter(variable)(self.states(name))
-        return self._known.get(full)
+        if name in self._states and variable in self._system.members[name].states:
+            self._values[full] = attrgetter(variable)(self.states(name))
+        return self._values.get(full)
 
     def inputs(self, name: str) -> tuple[Any, bool]:
         """The inputs of a component, and whether all of them are known."""
-        member, values, complete = self._of.members[name], [], True
+        member, values, complete = self._system.members[name], [], True
         layout = member.model.input_layout
         for variable, get, source in zip(layout.variables, member.free, member.sources, strict=True):
             value = get(self._u) if get else self._source(source) if source else variable.quantity.start
@@ -281,7 +287,8 @@ class SystemPoint:
         return layout.instance(values), complete
 
     def arguments(self, name: str) -> tuple[Any, Any, Any, Any]:
-        """What the equations of a component take: namespace, parameters, inputs as far as they are known, states."""
+        """The arguments of the equations of a component: namespace, parameters, inputs as far as they are known,
+        states."""
         return self._xp, self.p[name], self.inputs(name)[0], self.states(name)
 
     def advance(self, steps: Steps) -> None:
@@ -289,11 +296,11 @@ class SystemPoint:
         for name, outputs in steps:
             missing = [output for output in outputs if self._source(f"{name}.{output}") is None]
             for output, value in self.outputs(name, missing) if missing else ():
-                self._known[f"{name}.{output}"] = value
+                self._values[f"{name}.{output}"] = value
 
     def outputs(self, name: str, wanted: Iterable[str]) -> Iterator[tuple[str, Any]]:
         """These outputs of a component by name, with the inputs that are known so far."""
-        member, evaluation = self._of.members[name], self._evaluation(name)
+        member, evaluation = self._system.members[name], self._evaluation(name)
         u, shared, parts = evaluation.inputs, evaluation.shared, evaluation.parts
         for output in wanted:
             k, get = member.sites[output]
@@ -302,13 +309,13 @@ class SystemPoint:
                 parts[k] = equations(self._xp, self.p[name], u, self.states(name), shared)
             yield output, get(parts[k])
 
-    def _evaluation(self, name: str) -> _PartsAtPoint:
+    def _evaluation(self, name: str) -> _ComponentPoint:
         """The evaluation of a component with the inputs that are known; it is kept once all of them are."""
         if name in self._final:
             return self._final[name]
         u, complete = self.inputs(name)
-        shared = self._of.models[name].shared(self._xp, self.p[name], u, self.states(name))
-        evaluation = _PartsAtPoint(u, shared, {})
+        shared = self._system.models[name].shared(self._xp, self.p[name], u, self.states(name))
+        evaluation = _ComponentPoint(u, shared, {})
         if complete:
             self._final[name] = evaluation
         return evaluation

@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -41,13 +42,10 @@ class SystemModel(Model):
         )
         super().__post_init__()
 
-    def at(self, xp: Any, p: Any, u: Any, x: Any) -> SystemPoint:
-        """The system at one point."""
+    def point(self, xp: Any, p: Any, u: Any, x: Any) -> SystemPoint:
+        """The system with these parameters, inputs and states."""
         names = [name for name, member in self.system.members.items() if member.states]
         return SystemPoint(self.system, xp, p, u, {name: getattr(x, name) for name in names} if x else {})
-
-    def _components(self) -> Iterator[tuple[str, Model]]:
-        yield from self.system.models.items()
 
     def with_derived(self, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
         """See `Model.with_derived`; each component gets its own derived values."""
@@ -58,7 +56,7 @@ class SystemModel(Model):
         # the copy has the values of the original
         vars(ready).pop("of_components", None)
         parameters = self.system.parameters(ready)
-        for name, model in self._components():
+        for name, model in self.system.models.items():
             numbers = None if derived is None else derived[first : first + model.derived_count]
             parameters[name] = model.with_derived(xp, parameters[name], numbers)
             values += parameters[name].derived if model.derived_count else []
@@ -69,15 +67,15 @@ class SystemModel(Model):
     def _derived(self, xp: Any, p: Any) -> list[Any]:
         """The derived values of all components."""
         parameters = self.system.parameters(p)
-        return [v for name, model in self._components() for v in model.derive(xp, parameters[name])]
+        return [v for name, model in self.system.models.items() for v in model.derive(xp, parameters[name])]
 
     def check(self, p: Any) -> Any:
-        """See `Model.check`; where a model has more to say on its geometry, the refusal says it."""
+        """See `Model.check`; the refusal of a machine is the one of its own model, if it has an `obstacle`."""
         try:
             return super().check(p)
         except GeometryError as error:
             parameters = self.system.parameters(p)
-            for name, model in self._components():
+            for name, model in self.system.models.items():
                 if model.obstacle is not None:
                     with refusal_prefix(f"{name}: "):
                         model.check(parameters[name])
@@ -86,71 +84,57 @@ class SystemModel(Model):
     def _limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of all components."""
         parameters = self.system.parameters(p)
-        for name, model in self._components():
+        for name, model in self.system.models.items():
             yield from model.requirements(xp, parameters[name])
 
     # -- the start
 
     def _begin(
-        self, xp: Any, p: Any, u: Any, unknowns: Callable[[Model, Any, Any], list[Any]]
+        self, xp: Any, p: Any, u: Any, unknowns: Callable[[str, Any, Any], list[Any]]
     ) -> tuple[list[Any], SystemPoint]:
-        """The unknowns of the start of all components, and the system with the states that follow from them;
-        `unknowns` gives those of a component from its model, parameters and inputs."""
+        """The unknowns of the start of all components in the order of the start, and the system with the states that
+        follow from them; `unknowns` gives the unknowns of one component by its name, parameters and inputs."""
         point = SystemPoint(self.system, xp, p, u, {})
         z: list[Any] = []
         for name, outputs in self.system.start:
             if outputs is not None:
                 point.advance([(name, outputs)])
                 continue
-            model, parameters = self.system.models[name], point.p[name]
-            entries, _ = point.inputs(name)
-            mine = unknowns(model, parameters, entries) if model.start_problem.unknowns else []
-            z += mine
-
-            def states(
-                model: Model = model,
-                parameters: Any = parameters,
-                entries: Any = entries,
-                z: list[Any] = mine,
-            ) -> Any:
-                return model.start_states(xp, parameters, entries, z)
-
-            point.begin(name, states)
+            model, parameters, inputs = self.system.models[name], point.p[name], point.inputs(name)[0]
+            component_z = unknowns(name, parameters, inputs) if model.start_problem.unknowns else []
+            z += component_z
+            point.begin(name, partial(model.start_states, xp, parameters, inputs, component_z))
         return z, point
 
     def _start_guess(self, xp: Any, p: Any, u: Any) -> list[Any]:
-        """First guess of the unknowns of the start, of all components in order."""
-        return self._begin(
-            xp, p, u, lambda model, parameters, entries: model.start_guess(xp, parameters, entries)
-        )[0]
+        """First guess of the unknowns of the start."""
+
+        def guess(name: str, parameters: Any, inputs: Any) -> list[Any]:
+            return self.system.models[name].start_guess(xp, parameters, inputs)
+
+        return self._begin(xp, p, u, guess)[0]
 
     def _improved_start(self, xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
-        """The unknowns of the start after one more round, of all components in order."""
-        before = iter(z)
+        """The unknowns of the start after one more round."""
 
-        def improved(model: Model, parameters: Any, entries: Any) -> list[Any]:
-            mine = [next(before) for _ in range(model.start_problem.unknowns)]
-            return model.improve_start(xp, parameters, entries, mine)
+        def improved(name: str, parameters: Any, inputs: Any) -> list[Any]:
+            before = z[self.system.unknowns[name]]
+            return self.system.models[name].improve_start(xp, parameters, inputs, before)
 
         return self._begin(xp, p, u, improved)[0]
 
     def _start_states(self, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
         """States at the start with the inputs `u`, from the unknowns `z` of all components."""
-        before = iter(z)
-
-        def taken(model: Model, parameters: Any, entries: Any) -> list[Any]:
-            return [next(before) for _ in range(model.start_problem.unknowns)]
-
-        _, point = self._begin(xp, p, u, taken)
+        _, point = self._begin(xp, p, u, lambda name, parameters, inputs: z[self.system.unknowns[name]])
         return self.States(
             **{name: point.states(name) for name, m in self.system.members.items() if m.states}
         )
 
     def _start_limits(self, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of all components."""
-        point = self.at(xp, p, u, x)
+        point = self.point(xp, p, u, x)
         point.advance(self.system.steps)
-        for name, model in self._components():
+        for name, model in self.system.models.items():
             if model.start_problem.required:
                 yield from model.start_limits(*point.arguments(name))
 
@@ -158,41 +142,42 @@ class SystemModel(Model):
 
     def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, component by component."""
-        point = self.at(xp, p, u, x)
+        point = self.point(xp, p, u, x)
         point.advance(self.system.rate_steps)
         rates: list[Any] = []
-        for name, model in self._components():
+        for name, model in self.system.models.items():
             if model.state_layout:
                 rates += model.derivatives(*point.arguments(name))
         return rates
 
     def _advanced(self, xp: Any, p: Any, u: Any, x: Any) -> SystemPoint:
         """The system with all inputs of its components."""
-        point = self.at(xp, p, u, x)
+        point = self.point(xp, p, u, x)
         point.advance(self.system.steps)
         return point
 
     def _internal_step(self, xp: Any, p: Any) -> Any:
         """The least of the components' longest steps."""
         parameters = self.system.parameters(p)
-        models = [(name, model) for name, model in self._components() if model.state_layout]
+        models = [(name, model) for name, model in self.system.models.items() if model.state_layout]
         return _least(xp, (model.internal_step(xp, parameters[name]) for name, model in models))
 
     def _tolerance(self, xp: Any, p: Any) -> Any:
         """The parameter `solver.tolerance`, or the least tolerance of the components that control the error if it
         is less."""
         parameters = self.system.parameters(p)
-        models = [(name, model) for name, model in self._components() if model.controlled]
+        models = [(name, model) for name, model in self.system.models.items() if model.controlled]
         return _least(
             xp, [p.solver.tolerance, *(model.tolerance(xp, parameters[name]) for name, model in models)]
         )
 
     def _closed(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """The states near `x` that meet the constraints of each component; the others are those of `x`."""
-        point = self.at(xp, p, u, x)
+        """The states near `x` that meet the constraints of the components; a component without constraints keeps its
+        states."""
+        point = self.point(xp, p, u, x)
         point.advance(self.system.closed_steps)
         values: list[Any] = []
-        for name, model in self._components():
+        for name, model in self.system.models.items():
             if model.controlled:
                 values += model.constrained_states(*point.arguments(name))
             elif model.state_layout:
@@ -200,7 +185,7 @@ class SystemModel(Model):
         return values
 
 
-_MADE: dict[Any, SystemModel] = {}
+_MODELS: dict[Any, SystemModel] = {}
 
 
 def system_model(data: Mapping[str, Any], models: Mapping[str, Model]) -> SystemModel:
@@ -208,9 +193,9 @@ def system_model(data: Mapping[str, Any], models: Mapping[str, Model]) -> System
     model."""
     # a model that was defined anew, as in a notebook, makes a new system
     key = json.dumps(data, sort_keys=True), tuple(models.items())
-    if key not in _MADE:
-        _MADE[key] = _system_model(SystemDescription(data, models))
-    return _MADE[key]
+    if key not in _MODELS:
+        _MODELS[key] = _new_model(SystemDescription(data, models))
+    return _MODELS[key]
 
 
 def _outputs_of(declared: Any) -> Callable[..., Any]:
@@ -254,37 +239,35 @@ def _sizes(description: SystemDescription) -> dict[str, float]:
     return {name: x for name, x in sizes.items() if name in free}
 
 
-def _system_model(description: SystemDescription) -> SystemModel:
-    apart, about, models = (
-        description.by_differences(),
-        description.data["about"],
-        description.models.values(),
-    )
+def _new_model(description: SystemDescription) -> SystemModel:
+    """The model of a description: all it has by the names of its components."""
+    data, models = description.data, description.models.values()
+    by_differences = description.by_differences()
     return SystemModel(
-        name=description.data["name"],
-        text=description.words(),
-        description=description.data["title"],
+        name=data["name"],
+        text=description.text(),
+        description=data["title"],
         system=description,
         components=MappingProxyType(description.models),
-        made=(system_model, (description.data, description.models)),
+        made=(system_model, (data, description.models)),
         Parameters=description.Parameters,
         Inputs=description.Inputs,
         States=description.States if description.has_states else None,
         required=description.required(lambda model: model.required),
         start_problem=StartProblem(
             sum(model.start_problem.unknowns for model in models),
-            description.data["start_rounds"],
+            data["start_rounds"],
             description.required(lambda model: model.start_problem.required),
         ),
         fmu_data=FmuData(
-            about=None if about is None else About(**about),
-            experiment=MappingProxyType(_shortest(models) | description.data["experiment"]),
+            about=None if data["about"] is None else About(**data["about"]),
+            experiment=MappingProxyType(_shortest(models) | data["experiment"]),
             sizes=MappingProxyType(_sizes(description)),
         ),
         repeated={
-            f"{component}.{name}": f"{component}.{one}"
+            f"{component}.{name}": f"{component}.{original}"
             for component, model in description.models.items()
-            for name, one in model.repeated.items()
+            for name, original in model.repeated.items()
         },
         constant={
             f"{component}.{name}": value
@@ -296,7 +279,7 @@ def _system_model(description: SystemDescription) -> SystemModel:
         input_rates=description.input_rates(),
         controlled=description.has_states,
         parts=tuple(
-            Part(declared, _outputs_of(declared), by_differences=apart & {*Layout(declared).names})
+            Part(declared, _outputs_of(declared), by_differences=by_differences & {*Layout(declared).names})
             for declared in (description.Outputs, description.Extra)
             if declared
         ),

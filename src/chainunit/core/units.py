@@ -1,7 +1,7 @@
 """Numbers with units as engineers write them: ``4 kNm``, ``30 rev/min``, ``0.5 kg m²``, ``8 %``, ``40 °C``.
 
 A product is written with a point, a star or a blank, or, in a torque or an inertia, with nothing (``Nm``,
-``kgm2``). All factors behind a stroke are in the denominator, as in FMI. Every number and unit that the
+``kgm2``). All factors after a stroke are in the denominator, as in FMI. Every number and unit that the
 program prints can be read back.
 """
 
@@ -116,8 +116,7 @@ def has_unit(value: object) -> bool:
 
 
 def split(text: str) -> tuple[float, str] | None:
-    """The number with which a text begins, and the unit behind it; None where the text does not begin with a
-    number.
+    """The number with which a text begins, and the unit after it; None if the text does not begin with a number.
 
     Blanks and apostrophes between thousands are read (``10 500 N``), as is a power of ten (``2.3 × 10⁻⁷``).
     """
@@ -129,7 +128,7 @@ def split(text: str) -> tuple[float, str] | None:
 
 
 def with_point(text: str) -> str:
-    """The text with a point in place of a decimal comma; empty where it has no comma."""
+    """The text with a point in place of a decimal comma; empty if it has none."""
     match = _COMMA.fullmatch(_ascii(text))
     return f"{match[1]}.{match[2]}{match[3]}" if match else ""
 
@@ -157,7 +156,7 @@ def single_names() -> tuple[str, ...]:
         for time in ("", "s")
     ]
     names = dict.fromkeys([*sorted(NAMED), *PREFIXED, *glued])
-    return tuple(name for name in names if _is_name(name))
+    return tuple(name for name in names if is_unit(name))
 
 
 @cache
@@ -167,6 +166,7 @@ def dimension(unit_text: str) -> dict[str, int]:
 
 
 def _dimension(factors: Sequence[tuple[str, int]]) -> dict[str, int]:
+    """The exponents of the SI base units, without angles, of names of `UNITS` with their powers."""
     exponents = dict.fromkeys(SI, 0)
     for name, power in factors:
         for base, exponent in UNITS[name].base.items():
@@ -178,16 +178,17 @@ def _without_angle(exponents: Mapping[str, int]) -> dict[str, int]:
     return {base: exponent for base, exponent in exponents.items() if exponent and base != "rad"}
 
 
-def _is_name(name: str) -> bool:
+def is_unit(unit_text: str) -> bool:
+    """Whether the text is a unit that is read."""
     try:
-        _factors(name)
+        dimension(unit_text)
     except ValueError:
         return False
     return True
 
 
 def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
-    """The `number` in the unit that is `unit_text` behind it, in the declared `unit`.
+    """The `number`, which is in the unit `unit_text`, in the declared `unit`.
 
     Raises
     ------
@@ -199,9 +200,9 @@ def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
 
 
 def converts(unit_text: str, unit: str) -> bool:
-    """Whether a number in the unit `unit_text` is one in the declared `unit`, too."""
+    """Whether a number in the unit `unit_text` can be converted to the declared `unit`."""
     try:
-        convert(1.0, unit_text, unit)
+        scale(unit_text, unit)
     except ValueError:
         return False
     return True
@@ -209,13 +210,18 @@ def converts(unit_text: str, unit: str) -> bool:
 
 @cache
 def scale(unit_text: str, unit: str, kind: str = "") -> tuple[float, float]:
-    """Factor and offset from the unit `unit_text` to the declared `unit`; the errors are those of `convert`.
+    """Factor and offset from the unit `unit_text` to the declared `unit`.
 
     A temperature alone counts from the zero of its scale; a temperature in a product, or a difference, is a number of
     degrees.
+
+    Raises
+    ------
+    ValueError
+        for a unit of another kind, or an unknown unit.
     """
     base = base_units(unit)
-    factors = _of_angle(_factors(_ascii(unit_text)), base)
+    factors = _with_turn(_factors(_ascii(unit_text)), base)
     if "K" in base:
         factors = [("degC" if name == "C" else name, power) for name, power in factors]
     if _dimension(factors) != _without_angle(base):
@@ -226,8 +232,8 @@ def scale(unit_text: str, unit: str, kind: str = "") -> tuple[float, float]:
 
 
 def of_other_kind(unit_text: str, unit: str) -> str:
-    """What a unit measures that is none of the declared `unit`: ``kg is a mass``. Empty for an unknown unit, and for
-    one of the same dimension."""
+    """The remark that a unit measures something else than the declared `unit`: ``kg is a mass``. Empty for an unknown
+    unit, and for one of the same dimension."""
     try:
         text_dimension = dimension(unit_text)
     except ValueError:
@@ -245,74 +251,49 @@ def of_other_kind(unit_text: str, unit: str) -> str:
     return f"{unit_text} is {'a share' if is_share else kind}"
 
 
-def must_be(unit: str) -> str:
-    """Words on the kind of the declared `unit`, one of which `_KINDS` has the name: ``must be a speed, such as
-    [rad/s] or [rev/min]``."""
-    wanted = dict.fromkeys((unit.replace(".", " "), *fitting(unit)[:2]))
-    such = " or ".join(f"[{symbol}]" for symbol in list(wanted)[:2])
-    return f"must be {_KINDS[unit]}, such as {such}"
-
-
 def kind_of(unit: str) -> str:
-    """What a quantity of the declared `unit` is, as ``a length``."""
+    """The kind of a quantity of the declared `unit`, such as ``a length``."""
     return _KINDS.get(unit, "a number")
 
 
 def with_units(unit: str) -> str:
-    """A quantity of the declared `unit` as a person has to write it: ``a speed in rev/min, rad/s, deg/s or Hz``."""
-    *names, last = _OF_OPTIONS.get(unit, fitting(unit))
+    """The kind and the units of a quantity of the declared `unit`: ``a speed in rev/min, rad/s, Hz or rpm``."""
+    *names, last = fitting(unit)
     return f"{kind_of(unit)} in {', '.join(names)}{' or ' if names else ''}{last}"
 
 
-_OF_OPTIONS = {"rad/s": ("rev/min", "rad/s", "deg/s", "Hz")}
-"""By declared unit, the units that a refusal lists, where they are others than those in which people write it."""
-
-
-_DECIMAL_COMMA = re.compile(r"\d,\d")
 COMMA = "numbers have a decimal point"
 
 
-def has_comma(text: str) -> bool:
-    """Whether a comma stands between two digits."""
-    return bool(_DECIMAL_COMMA.search(text))
-
-
 def spelling(text: str, unit: str, kind: str = "") -> str:
-    """Words on how a refused text was probably meant, to follow its refusal; empty where nothing is near."""
-    probable = probable_text(text, unit, kind)
-    comma = f"; {COMMA}" * has_comma(text)
-    return comma + (f'; was "{probable}" meant?' if probable else "")
-
-
-def probable_text(text: str, unit: str, kind: str = "") -> str:
-    """The text that the user probably meant, for a quantity of this `unit` and `kind`: with a point in place
-    of a comma, or with the right case of letters. Empty where there is none; two texts where a comma may be
-    a decimal one or stand between thousands."""
-    if _THOUSANDS.search(text):
-        both = [text.replace(",", sign, 1) for sign in ("", ".")]
-        return (
-            '" or "'.join(reading.strip() for reading in both)
-            if all(_reads(reading, unit, kind) for reading in both)
-            else ""
-        )
-    text = with_point(text) or text
-    if parts := split(text):
-        text = f"{parts[0]:.15g} {_INCHES[parts[1]]}" if parts[1] in _INCHES else text
-    if _reads(text, unit, kind):
-        return text.strip()
-    parts = split(text)
-    if parts is None:
-        return ""
-    number, unit_text = parts
-    for usual in ("", *fitting(unit, kind), *_WRITTEN_TOO.get(unit, ()), *single_names()):
-        same = usual.lower().replace(" ", "") == unit_text.lower().replace(" ", "")
-        if same and _reads(f"{number:.15g} {usual}", unit, kind):
-            return f"{number:.15g} {usual}".strip()
-    return ""
+    """The advice on the spelling of a refused text, to follow its refusal; empty if nothing similar is allowed."""
+    comma = f"; {COMMA}" if re.search(r"\d,\d", text) else ""
+    probable = " or ".join(f'"{candidate}"' for candidate in _probable_texts(text, unit, kind))
+    return comma + (f"; was {probable} meant?" if probable else "")
 
 
 _INCHES = {'"': "in", "''": "in", "\u2033": "in", "'": "ft", "\u2032": "ft"}
 """Signs for inches and feet."""
+
+
+def _probable_texts(text: str, unit: str, kind: str) -> list[str]:
+    """The texts that the user may have meant, for a quantity of this `unit` and `kind`: with a point in place of a
+    comma, or with the right case of letters. A comma after which three digits stand may also part thousands."""
+    if _THOUSANDS.search(text):
+        candidates = [text.replace(",", sign, 1).strip() for sign in ("", ".")]
+        return candidates if all(_reads(candidate, unit, kind) for candidate in candidates) else []
+    text = with_point(text) or text
+    if (parts := split(text)) and parts[1] in _INCHES:
+        text = f"{parts[0]:.15g} {_INCHES[parts[1]]}"
+    if _reads(text, unit, kind):
+        return [text.strip()]
+    number, unit_text = split(text) or (math.nan, "")
+    for name in ("", *fitting(unit, kind), *_WRITTEN_TOO.get(unit, ()), *single_names()):
+        candidate = f"{number:.15g} {name}".strip()
+        same = name.lower().replace(" ", "") == unit_text.lower().replace(" ", "")
+        if same and _reads(candidate, unit, kind):
+            return [candidate]
+    return []
 
 
 def _reads(text: str, unit: str, kind: str) -> bool:
@@ -324,14 +305,14 @@ def _reads(text: str, unit: str, kind: str) -> bool:
         return False
 
 
-def _of_angle(factors: list[tuple[str, int]], base: dict[str, int]) -> list[tuple[str, int]]:
-    """The factors with the angle of the quantity added: 15 1/min or 0.25 Hz of a machine are turns.
+def _with_turn(factors: list[tuple[str, int]], base: dict[str, int]) -> list[tuple[str, int]]:
+    """The factors, with a turn added if a speed is given without an angle: 15 1/min or 0.25 Hz of a machine.
 
     Raises
     ------
     ValueError
-        where the unit names an angle and the quantity has none, or the reverse. The torque constant of a motor is
-        also a voltage per speed.
+        if the unit names an angle and the quantity has none, or the reverse. The torque constant of a motor is also a
+        voltage per speed.
     """
     angles = [power for name, power in factors if name in _ANGLES]
     power = base.get("rad", 0)
@@ -355,8 +336,8 @@ def _factors(unit_text: str) -> list[tuple[str, int]]:
         for a name that is no unit, and for unpaired brackets.
     """
     factors: list[tuple[str, int]] = []
-    outside: list[int] = []
-    # a stroke inverts all factors behind it, up to the end of its brackets
+    outer_signs: list[int] = []
+    # a stroke inverts all factors after it, up to the end of its brackets
     begin, sign, position = 1, 1, 0
     while position < len(unit_text):
         match = _TOKEN.match(unit_text, position)
@@ -366,20 +347,21 @@ def _factors(unit_text: str) -> list[tuple[str, int]]:
         if token == "/":
             sign = -begin
         elif token == "(":
-            outside.append(begin)
+            outer_signs.append(begin)
             begin = sign
         elif token == ")":
-            if not outside:
+            if not outer_signs:
                 raise ValueError(f"{unit_text}: brackets do not open")
-            sign, begin = begin, outside.pop()
+            sign, begin = begin, outer_signs.pop()
         elif token not in ("*", ".", "1"):
-            factors += _of_name(token, sign)
-    if outside:
+            factors += _named_factors(token, sign)
+    if outer_signs:
         raise ValueError(f"{unit_text}: brackets do not close")
     return factors
 
 
-def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
+def _named_factors(token: str, sign: int) -> list[tuple[str, int]]:
+    """The factors of a name with its power, such as ``kg``, ``m2`` and the product ``Nm``."""
     match = _FACTOR.fullmatch(token)
     assert match is not None  # a token of a name is a factor
     name, power = match[1], sign * int(match[2] or 1)
@@ -393,8 +375,8 @@ def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
 
 
 def shortest_text(value: float, unit: str, kind: str = "") -> str:
-    """The value of a quantity as TOML, in the unit in which its text is shortest and exact: 0.06 m -> ``"60
-    mm"``. A pure number has no unit; a share is in percent."""
+    """The value of a quantity as TOML, in the unit in which its text is shortest and exact: 0.06 m -> ``"60 mm"``. A
+    pure number has no unit; a share is in percent."""
     if value == 0.0 and unit != "1":
         # a temperature is not zero in every unit
         return f'"0 {fitting(unit, kind)[-1 if unit == "K" else 0]}"'

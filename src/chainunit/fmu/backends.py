@@ -1,13 +1,14 @@
-"""The choice of the backend for an FMU: native code where there is a C compiler, otherwise Python by pythonfmu."""
+"""The choice of the backend for an FMU: native code if there is a C compiler, otherwise Python by pythonfmu."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import Literal, get_args
 
-from ..core.errors import InputError, RunError, WriteError, one_of, shown
+from ..core.errors import InputError, RunError, WriteError, check_choice, shown
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from . import export as python
@@ -20,13 +21,13 @@ Backend = Literal["native", "python"]
 
 @dataclass(frozen=True)
 class Origin:
-    """The backend that made an FMU, and a text on how and why: `words`."""
+    """The backend that made an FMU, and a `text` on how and why."""
 
     backend: Backend
-    words: str
+    text: str
 
     def __str__(self) -> str:
-        return self.words
+        return self.text
 
 
 def export(
@@ -45,7 +46,7 @@ def export(
     Parameters
     ----------
     model, file, start, names : see `chainunit.fmu.export.export`
-    backend : "native" or "python"; by default native where a C compiler is found and works
+    backend : "native" or "python"; by default native if a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
     platforms, progress : see `chainunit.fmu.native.export.export`; platforms only by the native backend
 
@@ -54,48 +55,34 @@ def export(
     KeyError, InputError, RunError
         see `chainunit.fmu.export.export` and `chainunit.fmu.native.export.export`.
     """
-    if fmi not in (2, 3):
-        raise InputError(f"fmi = {fmi}: must be 2 or 3")
-    if backend not in (None, *get_args(Backend)):
-        raise InputError(f"backend = {shown(backend)}: must be {one_of(backend, get_args(Backend))}")
-    if names not in get_args(Names):
-        raise InputError(f"names = {shown(names)}: must be {one_of(names, get_args(Names))}")
-    if backend == "python":
-        return _by_python(model, file, start, names, fmi, platforms, "")
+    if not isinstance(fmi, Integral) or fmi not in (2, 3):
+        raise InputError(f"fmi = {shown(fmi)}: must be 2 or 3")
+    if backend is not None:
+        check_choice("backend", backend, get_args(Backend))
+    check_choice("names", names, get_args(Names))
+    reason = ""
     if backend is None and not platforms and not targets.compiles(fmi):
-        return _by_python(model, file, start, names, fmi, platforms, ", no C compiler for this machine found")
-    built, compiler = targets.choose(platforms, fmi)
-    try:
-        native.export(model, file, start, fmi=fmi, platforms=platforms, names=names, progress=progress)
-    except WriteError:
-        raise
-    except RunError:
-        if backend or fmi != 2 or platforms:
+        reason = ", no C compiler for this machine found"
+    elif backend != "python":
+        built, compiler = targets.choose(platforms, fmi)
+        text = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
+        if platforms:
+            text += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
+        elif backend is None:
+            text += ", the C compiler found here"
+        try:
+            native.export(model, file, start, fmi=fmi, platforms=platforms, names=names, progress=progress)
+            return Origin("native", text)
+        except WriteError:
             raise
-        return _by_python(
-            model, file, start, names, fmi, platforms, f", the C compiler {compiler.name} failed"
-        )
-    text = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
-    if platforms:
-        text += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
-    elif backend is None:
-        text += ", the C compiler found here"
-    return Origin("native", text)
-
-
-def _by_python(
-    model: Model,
-    file: Path,
-    start: dict[str, float] | None,
-    names: Names,
-    fmi: int,
-    platforms: Sequence[str],
-    why: str,
-) -> Origin:
+        except RunError:
+            if backend or fmi != 2 or platforms:
+                raise
+            reason = f", the C compiler {compiler.name} failed"
     if fmi != 2:
         raise InputError(f"fmi 3 needs the native backend, that is a C compiler ({COMPILERS})")
     if platforms:
         raise InputError("platforms: need the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start, names=names)
-    text = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
+    text = f"FMI 2.0 Co-Simulation, by pythonfmu{reason}; needs Python 3.11 in the importing process"
     return Origin("python", text)

@@ -46,7 +46,7 @@ class Interface:
         Parameters
         ----------
         start : start values in place of the declared ones
-        script : values in place of those of the model; by default none
+        script : values in place of the model's; by default none
 
         Raises
         ------
@@ -164,7 +164,7 @@ class Interface:
         Raises
         ------
         ValueError
-            where one depends on a parameter that may change in a run.
+            if one depends on a parameter that may change in a run.
         """
         import casadi
 
@@ -258,8 +258,8 @@ def model_description(
     variables = SubElement(root, "ModelVariables")
     for attributes, kind, typed, state in _variables(interface, exchange):
         # an output that repeats another one has its value reference, but a place of its own
-        if (one := interface.repeated.get(attributes["name"])) is not None:
-            attributes["valueReference"] = str(one.reference)
+        if (original := interface.repeated.get(attributes["name"])) is not None:
+            attributes["valueReference"] = str(original.reference)
         # FMI 2.0 counts variables from 1
         derivative = {} if state is None else {"derivative": str(state + 1)}
         SubElement(SubElement(variables, "ScalarVariable", attributes), kind, {**typed, **derivative})
@@ -269,9 +269,9 @@ def model_description(
     for kind, reference, influences in _structure(interface, exchange):
         # in an FMU for Co-Simulation only, the knowns include no states
         places = [i for i in influences if exchange or kind == "InitialUnknown" or i < first_state]
-        where = {"Output": "Outputs", "InitialUnknown": "InitialUnknowns"}.get(kind, "Derivatives")
+        title = {"Output": "Outputs", "InitialUnknown": "InitialUnknowns"}.get(kind, "Derivatives")
         unknown = {"index": str(reference + 1), **_dependencies([i + 1 for i in places])}
-        SubElement(lists[where], "Unknown", unknown)
+        SubElement(lists[title], "Unknown", unknown)
     structure.extend(element for name, element in lists.items() if len(element) or name != "Derivatives")
     return root
 
@@ -279,7 +279,7 @@ def model_description(
 def model_description_3(
     interface: Interface, token: str, kinds: Mapping[str, Mapping[str, str]], version: str
 ) -> Element:
-    """The XML tree of an FMI 3.0 FMU; the value references are those of FMI 2.0, followed by the time."""
+    """The XML tree of an FMI 3.0 FMU; the value references are the same as in FMI 2.0, followed by the time."""
     root = _root(interface, version, {"fmiVersion": "3.0", "instantiationToken": token})
     for kind, options in kinds.items():
         SubElement(root, kind, {"modelIdentifier": interface.model.name, **options})
@@ -299,9 +299,9 @@ def model_description_3(
         tag = TYPES_3[kind]
         elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **typed, **derivative})
     for signal in interface.signals_of("output"):
-        if (one := interface.repeated.get(signal.name)) is not None:
+        if (original := interface.repeated.get(signal.name)) is not None:
             description = interface.text(signal.variable.description)
-            SubElement(elements[one.name], "Alias", name=signal.name, description=description)
+            SubElement(elements[original.name], "Alias", name=signal.name, description=description)
     time = {
         "name": "time",
         "valueReference": str(last + 1),
@@ -367,8 +367,8 @@ def _dependencies(references: Iterable[int]) -> dict[str, str]:
 
 
 def _root(interface: Interface, version: str, identity: Mapping[str, str]) -> Element:
-    """The root element, with the attributes that are common to both versions of FMI. `version` is that of this
-    package."""
+    """The root element, with the attributes that are common to both versions of FMI; `version` is the version of
+    this package."""
     model = interface.model
     fmi, identifier = identity.items()
     about = model.fmu_data.about or About(
@@ -411,7 +411,7 @@ def generation_time() -> str:
     Raises
     ------
     InputError
-        where SOURCE_DATE_EPOCH is no number of seconds.
+        if SOURCE_DATE_EPOCH is no number of seconds.
     """
     setting = os.environ.get("SOURCE_DATE_EPOCH", "")
     if not setting:
@@ -467,6 +467,7 @@ def _unit(unit: str) -> dict[str, str]:
 
 
 def _attributes(signal: Signal, description: str) -> dict[str, str]:
+    """The attributes of a variable that do not depend on its type."""
     q = signal.variable.quantity
     if signal.causality == "parameter":
         variability = "tunable" if q.tunable else "fixed"

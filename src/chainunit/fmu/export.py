@@ -49,7 +49,7 @@ def export(
 
     Parameters
     ----------
-    model : the model's class
+    model : the model
     file : path of the FMU; an existing file is replaced, in one step
     start : start values of parameters and inputs, by their names in the model, in place of the declared ones
     names : "structured" for the names of the model, "flat" for underscores in place of their dots
@@ -59,7 +59,7 @@ def export(
     KeyError
         for a name in `start` that the model does not have.
     InputError
-        where the start values are out of bounds or make no machine, or two flat names are the same.
+        if the start values are out of bounds or make no machine, or two flat names are the same.
     """
     interface = interface_of(model, start, script_with_names(names))
     file = Path(file)

@@ -1,4 +1,4 @@
-"""Libraries of FMUs and callbacks of their instances, on fmpy, which is imported only where it is used."""
+"""Libraries of FMUs and callbacks of their instances, on fmpy, which is imported only when it is used."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def loading() -> Iterator[None]:
     """Keep the working directory of the process while fmpy loads a library: it changes to the folder of the library,
     and stays there after an error."""
     with _working_directory:
-        here = Path.cwd()
+        before = Path.cwd()
         try:
             yield
         finally:
-            os.chdir(here)
+            os.chdir(before)
 
 
 def fmi2_callbacks(logger: Callable[..., None]) -> Any:

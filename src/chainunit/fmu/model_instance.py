@@ -2,7 +2,7 @@
 this file, and the model as the module that `chainunit.fmu.printed_model` prints.
 
 It never raises: a reason is logged, outputs become NaN, and a step is refused. Outputs are evaluated when they are
-read, once per state: those that were read at this state or an earlier one, and no others.
+read, once per state, together with the outputs that were read at an earlier state.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Settable(NamedTuple):
         return bool(bounds.admits(x, self.low, self.high, self.slack, self.open_low, whole))
 
     def within_bounds(self, x: float) -> float:
-        """The allowed value, set to the bound where it is beyond it by rounding."""
+        """The allowed value; the bound in place of a value that is beyond it by rounding."""
         return bounds.within(x, self.low, self.high)
 
     def complaint(self, x: float) -> str:
@@ -82,14 +82,15 @@ class ModelInstance:
         self._now = [v.start for v in self.settable] + [NAN] * (count - self.first_state)
         ends = self.first_state, self.first_output, count
         self._settable, self._states, self._all = (frozenset(range(end)) for end in ends)
-        self._known = self._settable
+        self._current = self._settable
+        """the variables whose values in `_now` are up to date"""
         self._read, self._growths = self._states, 0
         """the outputs that were read, with all other variables, and how often outputs were added"""
         self._p: list[float] | None = None
         self._derived: Sequence[float] | None = None
         """from the fixed parameters, which do not change after the initialization"""
-        self._more: tuple[Sequence[float], ...] = ()
-        """the last argument of the model's functions, if they take it"""
+        self._derived_argument: tuple[Sequence[float], ...] = ()
+        """the derived values as the last argument of the model's functions; empty if the model has none"""
         self._x: Sequence[float] = ()  # empty before the start of the states
         self._pace = 0.0  # next substep of an integrator that controls its error
         self._closed = False
@@ -126,7 +127,7 @@ class ModelInstance:
         self._initialized = True
 
     def step(self, time: float, size: float) -> bool:
-        """One communication step; False where the model, its inputs or the step are not usable."""
+        """One communication step; False if the model, its inputs or the step are not usable."""
         try:
             bad = self.prepare() or self._bad_step(time, size) or self._bad_input()
             if bad:
@@ -147,6 +148,7 @@ class ModelInstance:
         return False
 
     def _bad_step(self, time: float, size: float) -> str:
+        """Why a step cannot be taken from the present time; else an empty text."""
         if not (math.isfinite(time) and 0.0 <= size < math.inf and time + size < math.inf):
             return messages.STEP_SIZE.format(size=size, time=time)
         if abs(time - self._time) > SAME_TIME * size + ROUNDED * abs(self._time):
@@ -156,7 +158,7 @@ class ModelInstance:
         return ""
 
     def _advance(self, time: float, step: float) -> bool:
-        """Take states and inputs to the end of a step; False where a state runs away."""
+        """Take states and inputs to the end of a step; False if a state runs away."""
         run = self._running()
         if self.model.NOMINAL:
             x = self._integrate(run, step)
@@ -175,7 +177,8 @@ class ModelInstance:
         return True
 
     def _integrate(self, run: list[tuple[int, float, float]], step: float) -> list[float]:
-        p, more, model = self._p, self._more, self.model
+        """The states after a step [s]; `run` are the inputs that move in it, see `_running`."""
+        p, derived, model = self._p, self._derived_argument, self.model
         still = self._inputs()
 
         def inputs(since: float) -> list[float]:
@@ -188,11 +191,11 @@ class ModelInstance:
             return values
 
         def rates(since: float, x: Sequence[float]) -> Sequence[float]:
-            derivatives: Sequence[float] = model.derivatives(p, inputs(since), x, *more)
+            derivatives: Sequence[float] = model.derivatives(p, inputs(since), x, *derived)
             return derivatives
 
         def close(since: float, x: Sequence[float]) -> Sequence[float]:
-            states: Sequence[float] = model.closed(p, inputs(since), x, *more)
+            states: Sequence[float] = model.closed(p, inputs(since), x, *derived)
             return states
 
         (longest,), most = model.internal_step(p), self._now[model.MAX_STEPS]
@@ -231,6 +234,7 @@ class ModelInstance:
             self._take(reference, value)
 
     def _take(self, reference: int, value: float) -> None:
+        """Set a parameter: all that follows from it is computed anew."""
         self._now[reference] = value
         self._p = None
         self._start_anew()
@@ -243,16 +247,17 @@ class ModelInstance:
 
     def values(self, references: Sequence[int]) -> list[float]:
         """The values of these variables; outputs are evaluated at most once per state."""
-        if not self._known.issuperset(references):
+        if not self._current.issuperset(references):
             self._evaluate(references)
         now = self._now
         return [now[i] for i in references]
 
     def _evaluate(self, references: Sequence[int]) -> None:
+        """Evaluate these variables and the outputs that were read before; all are NaN if the model has a fault."""
         bad = self.prepare()
         count = self.first_output - self.first_state
         self._now[self.first_state : self.first_output] = [NAN] * count if bad else self._x
-        self._known = self._states
+        self._current = self._states
         if self._states.issuperset(references):
             return
         bad = bad or self._bad_input()
@@ -266,13 +271,13 @@ class ModelInstance:
         if bad:
             self.tell(bad)
             self._now[self.first_output :] = [NAN] * len(self.model.OUTPUTS)
-            self._known = self._all
+            self._current = self._all
 
     def _fault(self, references: frozenset[int]) -> str:
         """Evaluate the outputs among these variables; why they have no values, or an empty text."""
         try:
-            self._known, outputs, function = _evaluation(self.model, references)
-            values = function(self._p, self._inputs(), self._x, *self._more)
+            self._current, outputs, function = _evaluation(self.model, references)
+            values = function(self._p, self._inputs(), self._x, *self._derived_argument)
             # the sum of finite numbers is finite, except of the largest, and takes a third of the time
             if not (math.isfinite(sum(values)) or all(map(math.isfinite, values))):
                 raise ArithmeticError
@@ -287,7 +292,7 @@ class ModelInstance:
     def _touch(self) -> None:
         """Mark all outputs for a new evaluation."""
         self._closed = False
-        self._known = self._settable
+        self._current = self._settable
 
     def prepare(self) -> str:
         """Check the parameters and start the states, after a change of either. Returns why they make no model, or an
@@ -316,9 +321,9 @@ class ModelInstance:
             p[:] = [v.within_bounds(x) for v, x in zip(self.settable, p, strict=False)]
             if model.DERIVED:
                 derived = model.derive(p) if derived is None else derived
-                self._more = (derived,)
+                self._derived_argument = (derived,)
             if model.REQUIRED:
-                self._check(model.REQUIRED, model.requirements(p, *self._more))
+                self._check(model.REQUIRED, model.requirements(p, *self._derived_argument))
             self._derived = derived
         except BaseException as reason:
             return str(reason) or repr(reason)
@@ -345,7 +350,7 @@ class ModelInstance:
                     z = model.improved(p, u, z)
             x = model.initial(p, u, z)
             if model.START_REQUIRED:
-                self._check(model.START_REQUIRED, model.start_limits(p, u, x, *self._more))
+                self._check(model.START_REQUIRED, model.start_limits(p, u, x, *self._derived_argument))
             if not all(map(math.isfinite, x)):
                 raise _RefusedError(messages.NO_OUTPUT.format(model=model.NAME, time=self._time))
             self._x, self._pace = x, 0.0
@@ -354,6 +359,7 @@ class ModelInstance:
             self.tell(self._unstarted)
 
     def _bad_experiment(self) -> str:
+        """Why the start and the stop time are not allowed; else an empty text."""
         if not math.isfinite(self._time):
             return messages.TIME.format(which="start time", time=self._time)
         if not self._time <= self._stop:
@@ -373,6 +379,7 @@ class ModelInstance:
         return [row for row in rows if row[1] or row[2]]
 
     def _bad_input(self) -> str:
+        """The refusal of the first input that is not allowed; else an empty text."""
         for reference in sorted(self._doubtful):
             if not self.settable[reference].admits(self._now[reference]):
                 return f"input {self.settable[reference].complaint(self._now[reference])}"
@@ -398,7 +405,7 @@ class ModelInstance:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Take a saved state; where it is none of this model, nothing works until another one is restored."""
+        """Take a saved state; if it is none of this model, nothing works until another one is restored."""
         try:
             why = self._bad_state(state)
         except (KeyError, TypeError, ValueError, AttributeError):
@@ -412,13 +419,13 @@ class ModelInstance:
         self._time, self._stop, self._pace = state["time"], state["stop"], state["pace"]
         self._initialized = state["initialized"]
         self._doubtful = set(range(self.first_input, self.first_state))
-        # the state may be that of another geometry
+        # the state may belong to another geometry
         self._p = self._derived = None
         self._unstarted = ""
         self._closed = state["closed"]
 
     def _bad_state(self, state: dict[str, Any]) -> str:
-        """Why the state cannot be restored, or an empty text; an error where it is no state of this model."""
+        """Why the state cannot be restored, or an empty text; raises an error if it is no state of this model."""
         if "damaged" in state:
             return str(state["damaged"])
         if state["of"] != _IDENTITY:

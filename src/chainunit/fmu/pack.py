@@ -30,18 +30,19 @@ def interface_of(
     KeyError
         for a name in `start` that the model does not have.
     InputError
-        where the start values are out of bounds or make no machine, or two flat names are the same.
+        if the start values are out of bounds or make no machine, or two flat names are the same.
     """
     interface = Interface(model, {name: float(value) for name, value in (start or {}).items()}, script)
     _refuse_same_names(interface)
     for signal in interface.signals_of("input"):
         if not signal.variable.quantity.admits(signal.start or 0.0):
             raise InputError(complaint(signal.variable, signal.start))
-    _ = interface.start_parameters  # refuses those that make no machine
+    _ = interface.start_parameters  # refuses start values that make no machine
     return interface
 
 
 def _refuse_same_names(interface: Interface) -> None:
+    """Refuse variables with one name in the FMU."""
     by_name: dict[str, list[str]] = {}
     for signal in interface.signals:
         by_name.setdefault(signal.name, []).append(signal.variable.name)

@@ -130,7 +130,7 @@ def _placed(sketch: Sketch, width: float, height: float, margin: float) -> dict[
 
 
 def _strokes(sketch: Sketch, positions: Mapping[str, Place]) -> Iterator[tuple[str, list[Place]]]:
-    """Each link with two pins or more, by name, as a line through its pins, closed where there are more than two."""
+    """Each link with two pins or more, by name, as a line through its pins, closed if there are more than two."""
     for name, pins in sketch.links.items():
         if len(pins) > 1:
             yield name, [positions[pin] for pin in (*pins, *pins[: len(pins) > 2])]

@@ -44,6 +44,7 @@ def _tables(interface: Interface) -> dict[str, Any]:
     inputs, parameters = model.input_layout.names, model.parameter_layout.names
 
     def follows(name: str) -> int:
+        """The place of the input that is the rate of an input; -1 without one."""
         return inputs.index(model.input_rates[name]) if name in model.input_rates else -1
 
     def required(requirements: tuple[Requirement, ...]) -> list[Any]:
@@ -61,7 +62,7 @@ def _tables(interface: Interface) -> dict[str, Any]:
         "NOMINAL": tuple(v.quantity.nominal or 1.0 for v in interface.states),
         "TYPES": types,
         "RATES": [
-            (inputs.index(one), follows(one), follows(other)) for one, other in model.input_rates.items()
+            (inputs.index(name), follows(name), follows(rate)) for name, rate in model.input_rates.items()
         ],
         "DERIVED": bool(model.derived_count),
         "REQUIRED": required(model.required),

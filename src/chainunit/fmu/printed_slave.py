@@ -27,7 +27,7 @@ from ..core import messages
 from .model_instance import NAN, ModelInstance
 
 _NOTHING: dict[str, Any] = {"Real": NAN, "Integer": 0, "Boolean": False, "String": ""}
-"""By type of FMI, what stands for a value that cannot be told."""
+"""By type of FMI, the value of a variable that has none."""
 _Slave = TypeVar("_Slave", bound="PrintedSlave")
 _LIBRARIES: set[Path] = set()
 
@@ -102,7 +102,7 @@ class PrintedSlave(Fmi2Slave):  # type: ignore[misc]
         self._instance.end_initialization()
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """One communication step; False (discard) where the model, its inputs or the step are not usable."""
+        """One communication step; False (discard) if the model, its inputs or the step are not usable."""
         return self._instance.step(current_time, step_size)
 
     # -- values; pythonfmu would raise for a value reference of another type, which is fatal for the host
@@ -123,7 +123,7 @@ class PrintedSlave(Fmi2Slave):  # type: ignore[misc]
     set_string = partialmethod(_assign, "String")
 
     def _is_of(self, kind: str, vr: int) -> bool:
-        """Whether there is a variable of that type with that reference; a line in the log where there is none."""
+        """Whether there is a variable of that type with that reference; a line in the log if there is none."""
         if vr in self._of_type[kind]:
             return True
         line = (
@@ -135,7 +135,7 @@ class PrintedSlave(Fmi2Slave):  # type: ignore[misc]
         return False
 
     def _read(self, kind: str, vrs: list[int]) -> list[Any]:
-        """Values of that type by reference. A value that cannot be told is NaN, or 0, false or an empty text."""
+        """Values of that type by reference. A variable without a value is NaN, 0, false or an empty text."""
         nothing = _NOTHING[kind]
         try:
             if self._of_type[kind].issuperset(vrs):

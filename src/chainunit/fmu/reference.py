@@ -23,7 +23,7 @@ from ..core.engines import MATH
 from ..core.inputs import xml_of
 from ..core.ports import FLANGE, LOAD
 from ..core.quantities import Quantity, Type, written
-from .description import Interface, xml_bytes
+from .description import Interface, Signal, xml_bytes
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 REFERENCE = f"extra/{STANDARD}"
@@ -72,12 +72,12 @@ def experiments_file(name: str, description: str, experiments: Iterable[Referenc
 
 
 def reference_results(interface: Interface) -> dict[str, bytes]:
-    """The files of reference results. Where, with the start values, the states run away or are too fast for the
+    """The files of reference results. If, with the start values, the states run away or are too fast for the
     integrator, there are no files, and a warning is logged."""
     name = interface.model.name
     try:
         tables = reference_tables(interface)
-    except (ArithmeticError, ValueError) as reason:  # ValueError: of `math`, where a linkage does not close
+    except (ArithmeticError, ValueError) as reason:  # ValueError: of `math`, if a linkage does not close
         log.warning(
             "The FMU %s: no reference results inside: %s; no run of this package needs them, an importer is checked "
             "by them",
@@ -167,17 +167,16 @@ def reference_tables(
 
 
 def related_files(content: bytes | None = None) -> Element:
-    """The root of the manifest of FMI-LS-REF: of that in a file with this content, or of a new one, which names no
-    file yet."""
+    """The root of the manifest of FMI-LS-REF with this content, or of a new one, which names no file yet."""
     register_namespace("fmi-ls", _NAMESPACE)
     if content is not None:
         return xml_of(content, RELATED)
-    said = {
+    texts = {
         "name": STANDARD,
         "version": "1.0.0-beta.1",
         "description": "Layered Standard providing information on related files included in an FMU.",
     }
-    return Element("fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in said.items()})
+    return Element("fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in texts.items()})
 
 
 _Outputs: TypeAlias = Callable[[Sequence[float], Sequence[float]], list[float]]
@@ -253,14 +252,14 @@ def _march(interface: Interface, p: Any) -> Any:
             ) from error
         states = [float(v) for v in later.full().ravel()]
         if not np.isfinite(states).all():
-            raise ArithmeticError(f"the states run away behind t = {t:g} s")
+            raise ArithmeticError(f"the states run away after t = {t:g} s")
         return states
 
     return march
 
 
 def csv_bytes(head: Sequence[str], rows: Iterable[Sequence[float]], types: Mapping[str, Type]) -> bytes:
-    """A table in CSV with the exact numbers; a column without a type, as that of the time, has real ones."""
+    """A table in CSV with the exact numbers; a column without a type, such as the time, has real ones."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
@@ -281,39 +280,32 @@ _RUN = 4.0
 
 def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
     """The inputs by name as functions of time [s], for the reference results: all change smoothly, within their
-    bounds. The names are those of the FMU.
+    bounds. The names are the names in the FMU.
 
     A shaft runs from rest, unevenly, or swings within its bounds. A load or a torque has a size that suits the
-    inertia of its shaft. Every other input swings about its start value, or about its usual size where the start
+    inertia of its shaft. Every other input swings about its start value, or about its usual size if the start
     value is 0.
     """
     model = interface.model
-    sizes = interface.sizes
-    courses: dict[str, Callable[[float], float]] = {}
+    sizes = dict(interface.sizes)
+    inputs = {s.variable.name: s for s in interface.signals_of("input")}
+    shafts: dict[str, Callable[[float], float]] = {}
+    """the courses of inputs that belong to a shaft, by their names in the FMU"""
     for terminal in model.terminals:
-        if terminal.kind == LOAD and terminal.members["tau_bias"] in model.input_layout.names:
-            inertia = _inertia(interface, terminal.members["tau_bias"])
-            moving = _load(sizes.get(terminal.members["tau_bias"], _PUSH * inertia), inertia)
+        if terminal.kind == LOAD and (torque := terminal.members["tau_bias"]) in inputs:
+            inertia = _inertia(interface, torque)
+            courses = _load(sizes.get(torque, _PUSH * inertia), inertia)
         elif terminal.kind == FLANGE:
-            moving = _shaft(interface, terminal.members.get("phi", ""))
-            torque = terminal.members.get("tau", "")
-            turning = [s for s in interface.signals_of("input") if s.variable.name == torque]
-            if turning and model.state_layout:
+            courses = _shaft(interface, terminal.members.get("phi", ""))
+            if (torque := terminal.members.get("tau", "")) in inputs and model.state_layout:
                 # with a usual torque the states of a light shaft would run away
-                tau, most = turning[0], _PUSH * _inertia(interface, torque)
-                usual = _size(tau.variable.quantity, tau.start, sizes.get(torque))
-                sizes = {**sizes, torque: min(usual, most)}
+                sizes[torque] = min(_size(inputs[torque], sizes), _PUSH * _inertia(interface, torque))
         else:
             continue
-        courses |= {interface.name(terminal.members[member]): course for member, course in moving.items()}
-    others = {
-        s.name: _swing(
-            s.variable.quantity, _size(s.variable.quantity, s.start, sizes.get(s.variable.name)), k
-        )
-        for k, s in enumerate(interface.signals_of("input"))
-    }
-    courses = others | {name: course for name, course in courses.items() if name in others}
-    return lambda t: {name: course(t) for name, course in courses.items()}
+        shafts |= {interface.name(terminal.members[member]): course for member, course in courses.items()}
+    swings = {s.name: _swing(s.variable.quantity, _size(s, sizes), k) for k, s in enumerate(inputs.values())}
+    all_courses = swings | {name: course for name, course in shafts.items() if name in swings}
+    return lambda t: {name: course(t) for name, course in all_courses.items()}
 
 
 _SHAFT: dict[str, Callable[[float], float]] = {
@@ -324,7 +316,7 @@ _SHAFT: dict[str, Callable[[float], float]] = {
 
 
 def _shaft(interface: Interface, phi: str) -> dict[str, Callable[[float], float]]:
-    """The motion of a shaft: it runs from rest, or swings where the input `phi` has bounds."""
+    """The motion of a shaft: it runs from rest, or swings if the input `phi` has bounds."""
     bounds = [v.quantity for v in interface.inputs if v.name == phi]
     if not bounds or not math.isfinite(bounds[0].high - bounds[0].low):
         return _SHAFT
@@ -338,7 +330,7 @@ def _shaft(interface: Interface, phi: str) -> dict[str, Callable[[float], float]
 
 def _load(tau: float, inertia: float) -> dict[str, Callable[[float], float]]:
     """A load of about this torque [N m] and inertia [kg m2]. The slopes are so small that, for a shaft up to 150 rad
-    before or behind the point of the load, the inertia stays positive and the torque within twice its size."""
+    from the point of the load, the inertia stays positive and the torque within twice its size."""
     return {
         "tau_bias": lambda t: tau * (1.0 + 0.4 * math.sin(10.0 * t)),
         "tau_bias_dphi": lambda t: 0.01 * tau * math.cos(4.0 * t),
@@ -369,8 +361,10 @@ def _inertia(interface: Interface, torque: str) -> float:
     return float(1.0 / (abs(slopes).max() or 1.0))
 
 
-def _size(q: Quantity, start: float | None, stated: float | None) -> float:
-    return stated or start or q.nominal or _SIZES.get(q.unit, 1.0)
+def _size(signal: Signal, sizes: Mapping[str, float]) -> float:
+    """The size of an input: the stated one, its start value, its nominal size, or the one of its unit."""
+    q = signal.variable.quantity
+    return sizes.get(signal.variable.name) or signal.start or q.nominal or _SIZES.get(q.unit, 1.0)
 
 
 def _swing(q: Quantity, size: float, k: int) -> Callable[[float], float]:

@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 from ..core.model import Model
 
 Names = Literal["structured", "flat"]
-"""The names of an FMU's variables: those of the model, as ``left.material_mass``, or with an underscore in place of
-each dot, as ``left_material_mass``."""
+"""The names of an FMU's variables: the model's names, ``left.material_mass``, or with underscores in place of dots,
+``left_material_mass``."""
 
 
 def name_in_fmu(name: str, names: Names) -> str:
@@ -25,7 +25,7 @@ class Script:
     experiment: ClassVar[dict[str, float]] = {}
     """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, in place of the usual ones."""
     names: ClassVar[Names] = "structured"
-    """The names of the variables in the FMU; all others here are those of the model."""
+    """The names of the variables in the FMU; all other names here are the model's."""
     sizes: ClassVar[dict[str, float]] = {}
     """Sizes of inputs in the reference results, by name, in place of the usual ones."""
 

@@ -210,7 +210,7 @@ class Block(NamedTuple):
 
 class PinLosses(NamedTuple):
     """Losses in all pins: Coulomb friction in proportion to the reaction, smoothed near rest, and viscous damping
-    [N m s/rad] of each pin.
+    [N m s/rad] of each pin. Pins that differ have laws of their own, with damping, by joint.
 
     A pin with the relative speed Dw and the reaction R dissipates friction * diameter/2 * |R| * Dw^2/sqrt(Dw^2 +
     w_smooth^2) + damping * Dw^2. The reactions do not include the friction: it is small, and with it the torque would
@@ -219,13 +219,14 @@ class PinLosses(NamedTuple):
 
     pin: Any
     damping: Any
+    laws: Mapping[Joint, Any] = MappingProxyType({})
     by_reactions: bool = True
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
         """The torque of friction and damping in all pins along the coordinate."""
-        per_newton, smooth2, w2, loss = *self._law(), w * w, 0.0
-        damping = self.damping
+        w2, loss, constants = w * w, 0.0, self._constants()
         for joint, turn in m.turns.items():
+            per_newton, smooth2, damping = constants.get(joint) or constants[None]
             k2, _, ratio = _friction_terms(xp, reactions[joint].squared(), turn, w2, smooth2)
             loss = loss + k2 * (per_newton * ratio + damping)
         return Effect(dissipative=loss * w)
@@ -241,22 +242,30 @@ class PinLosses(NamedTuple):
     ) -> Any:
         """The slope of the dissipative torque in the direction in which the reactions change by `growing` and the
         relative rotations by `turning`; where `turning` is None, the slope by the speed."""
-        per_newton, smooth2, w2, rest, slope = *self._law(), w * w, 0.0, 0.0
+        w2, rest, slope, constants = w * w, 0.0, 0.0, self._constants()
         for joint, k in m.turns.items():
+            per_newton, smooth2, damping = constants.get(joint) or constants[None]
             force = reactions[joint]
             k2, minus_per, ratio = _friction_terms(xp, force.squared(), k, w2, smooth2)
             # of ratio^2 = |R|^2/(k^2 w^2 + smooth^2)
             wider = k2 * w if turning is None else k * turning[joint] * w2
             grows = (ratio * ratio * wider - force.dot(growing[joint])) * (minus_per / ratio)
             slope = slope + k2 * (per_newton * grows)
-            per_speed = per_newton * ratio + self.damping
+            per_speed = per_newton * ratio + damping
             rest = rest + (k2 * per_speed if turning is None else 2.0 * (k * turning[joint]) * per_speed)
         return slope * w + (rest if turning is None else rest * w)
 
-    def _law(self) -> tuple[Any, Any]:
-        """The friction moment per reaction [m], and the square of the smoothing speed [rad2/s2]."""
-        pin = self.pin
-        return 0.5 * pin.friction * pin.diameter, pin.w_smooth * pin.w_smooth
+    def _constants(self) -> dict[Joint | None, tuple[Any, Any, Any]]:
+        """By joint, and by None for all others, the friction moment per reaction [m], the square of the smoothing
+        speed [rad2/s2], and the damping."""
+        laws = [
+            (None, self.pin, self.damping),
+            *((joint, law, law.damping) for joint, law in self.laws.items()),
+        ]
+        return {
+            joint: (0.5 * law.friction * law.diameter, law.w_smooth * law.w_smooth, damping)
+            for joint, law, damping in laws
+        }
 
 
 class GuideLosses(NamedTuple):
@@ -266,22 +275,23 @@ class GuideLosses(NamedTuple):
     The block of a guide of the length L bears at its two ends: on these press N/2 + M/L and N/2 - M/L, M the moment
     about its middle. Each dissipates friction |press| Dv^2/sqrt(Dv^2 + v_smooth^2) at the relative speed Dv.
     `lengths` has the lengths of guides by joint [m]; one that is not named has a point for a block, and M does not
-    matter. As with pins, friction is left out of the reactions.
+    matter. As with pins, friction is left out of the reactions. Guides that differ have `laws` of their own by joint.
     """
 
     guide: Any
     damping: Any
     lengths: Mapping[Joint, Any] = MappingProxyType({})
+    laws: Mapping[Joint, Any] = MappingProxyType({})
     by_reactions: bool = True
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
         """The effort of friction and damping in all guides along the coordinate."""
-        smooth2, w2, loss = self.guide.v_smooth * self.guide.v_smooth, w * w, 0.0
+        w2, loss, constants = w * w, 0.0, self._constants()
         for joint, slide in m.slides.items():
-            per = self.damping
+            friction, smooth2, per = constants.get(joint) or constants[None]
             for press in self._presses(m, joint, reactions[joint]):
                 _, _, ratio = _friction_terms(xp, press * press, slide.s1, w2, smooth2)
-                per = per + self.guide.friction * ratio
+                per = per + friction * ratio
             loss = loss + slide.s1 * slide.s1 * per
         return Effect(dissipative=loss * w)
 
@@ -295,10 +305,9 @@ class GuideLosses(NamedTuple):
         turning: Mapping[Joint, Any] | None,
     ) -> Any:
         """See `PinLosses.slope`; where the direction is that of q, `turning` is given."""
-        smooth2, w2, rest, slope = self.guide.v_smooth * self.guide.v_smooth, w * w, 0.0, 0.0
-        friction, by_speed = self.guide.friction, turning is None
+        w2, rest, slope, constants, by_speed = w * w, 0.0, 0.0, self._constants(), turning is None
         for joint, slide in m.slides.items():
-            k, loss = slide.s1, self.damping
+            k, (friction, smooth2, loss) = slide.s1, constants.get(joint) or constants[None]
             presses = self._presses(m, joint, reactions[joint])
             slopes = self._press_slopes(m, joint, reactions[joint], growing[joint], by_speed)
             for press, press_slope in zip(presses, slopes, strict=True):
@@ -309,6 +318,15 @@ class GuideLosses(NamedTuple):
                 loss = loss + friction * ratio
             rest = rest + (k * k * loss if by_speed else 2.0 * (k * slide.s2) * loss)
         return slope * w + (rest if by_speed else rest * w)
+
+    def _constants(self) -> dict[Joint | None, tuple[Any, Any, Any]]:
+        """By joint, and by None for all others, the friction, the square of the smoothing speed [m2/s2], and the
+        damping."""
+        laws = [
+            (None, self.guide, self.damping),
+            *((joint, law, law.damping) for joint, law in self.laws.items()),
+        ]
+        return {joint: (law.friction, law.v_smooth * law.v_smooth, damping) for joint, law, damping in laws}
 
     def _presses(self, m: Moving, joint: Joint, reaction: Vec2) -> tuple[Any, ...]:
         """The forces with which a block bears [N]: at its two ends, or the one of a point."""

@@ -1,4 +1,4 @@
-"""The range of one parameter in which a machine works, with all others as they are: the remedy where a length is
+"""The range of one parameter in which a machine works, with all others as they are: the remedy if a length is
 refused that another one spoils."""
 
 from __future__ import annotations
@@ -81,17 +81,16 @@ def causes(
         span, unit = holding_range(admitted, values, name, usual), units[name]
         if span is None:
             continue
-        low, high = (_inward(x, sense) for x, sense in zip(span, (1.0, -1.0), strict=True))
+        low, high = (f"{rounded_inward(x, sense):.4g}" for x, sense in zip(span, (1.0, -1.0), strict=True))
         limits = [f">= {low}{unit}"] if span[0] not in (0.0, -math.inf) else []
         limits += [f"<= {high}{unit}"] if math.isfinite(span[1]) else []
         reasons[name] = f"{name} = {values[name]:g}{unit} must be {' and '.join(limits)}"
     return reasons
 
 
-def _inward(x: float, sense: float) -> str:
-    """A limit in four digits, rounded upward where `sense` is +1."""
+def rounded_inward(x: float, sense: float) -> float:
+    """A limit in four digits, rounded upward if `sense` is +1, downward if it is -1."""
     if not math.isfinite(x) or x == 0.0:
-        return f"{x:g}"
+        return x
     unit = 10.0 ** (math.floor(math.log10(abs(x))) - 3)
-    rounded = (math.ceil if sense > 0.0 else math.floor)(x / unit) * unit
-    return f"{rounded:.4g}"
+    return (math.ceil if sense > 0.0 else math.floor)(x / unit) * unit

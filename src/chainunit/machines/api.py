@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.declared_numbers import in_declared_unit, number_in, one_number
 from ..core.engines import MATH, numpy_
-from ..core.errors import GeometryError, InputError, check_kind, one_of, shown
+from ..core.errors import GeometryError, check_choice, check_kind
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, Quantity, Variable
 from ..mechanism.models import InverseMachine
@@ -168,7 +168,7 @@ class ChainUnitMachine(Machine):
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of one kilogram of material on the `side` ("left" or "right") [J/kg]: dE/dm,
         the factor of the feed in an energy balance (the energy is linear in the mass)."""
-        _check_side(side)
+        check_choice("side", side, SIDES)
         kilogram = SideLoads(material_mass=1.0, processing_force=0.0)
 
         def energy(**loads: Any) -> Any:
@@ -191,7 +191,7 @@ class ChainUnitMachine(Machine):
         """Loads of the organs at a rocker angle `psi` [rad], with speed `w` and acceleration `a` of the rocker,
         independent of the drive: for the papers' statics at +-12 degrees, beyond this drive's swing.
 
-        For an array of angles, the loads of a side and of the rocker are NaN where that side cannot be assembled: the
+        For an array of angles, the loads of a side and of the rocker are NaN if that side cannot be assembled: the
         array may pass the limit.
 
         Raises
@@ -228,14 +228,12 @@ class ChainUnitMachine(Machine):
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
-        _check_side(side)
-        p, organ = self.p, getattr(self.p, side)
+        check_choice("side", side, SIDES)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
-        on_web = p.web_share * loads.material_mass
-        masses = organ.wall_mass + loads.material_mass - on_web, organ.web_mass + on_web
-        counts = split((p.l1, p.l2), number)
-        lengths, shares = ([x / n for x, n in zip(xs, counts, strict=True)] for xs in ((p.l1, p.l2), masses))
-        return np.repeat(lengths, counts), np.repeat(shares, counts)
+        lengths, masses = (self.p.l1, self.p.l2), chain_unit.organ_masses(self.p, side, loads)
+        counts = split(lengths, number)
+        length, mass = (np.repeat(np.divide(parts, counts), counts) for parts in (lengths, masses))
+        return length, mass
 
     def hanging(self, side: str, psi: float, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> Hanging:
         """An organ at rest as a chain of `number` rods, at the rocker angle `psi` [rad]. The right organ is returned
@@ -244,7 +242,7 @@ class ChainUnitMachine(Machine):
         Raises
         ------
         GeometryError
-            where the organ does not hang.
+            if the organ does not hang.
         """
         lengths, masses = self.organ_rods(side, loads, number)
         return rods(lengths, masses * self.p.g, self._reach(side, one_number(_ROCKER["psi"], psi)))
@@ -305,7 +303,7 @@ class ChainUnitMachine(Machine):
         self, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
     ) -> Any:
         """The least pull at an end of the webs [N] over `points` angles of a crank turn at constant motor speed `w`,
-        for each speed in `w`; infinite where no side is loaded."""
+        for each speed in `w`; infinite if no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
         w = np.asarray(in_declared_unit(_SPEED, w))
         out = self.forces(phi, w[..., None], 0.0, left, right)
@@ -345,11 +343,6 @@ class ChainUnitMachine(Machine):
         return _first_loss(lambda w: self.least_web_pull(w * self.p.ratio, left, right), highest)
 
 
-def _check_side(side: Any) -> None:
-    if side not in SIDES:
-        raise InputError(f"side = {shown(side)}: must be {one_of(side, SIDES)}")
-
-
 def _first_loss(pull: Callable[[Any], Any], highest: Any) -> float:
     """The lowest crank speed [rad/s] at which a least pull [N] falls to zero, see `ChainUnitMachine.slack_speed`."""
     from scipy.optimize import brentq
@@ -380,9 +373,11 @@ class ChainedUnit(Machine):
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """See `Machine`; the angles in A2, B and A1 of each side come from the angles of the rods."""
         assert isinstance(self.model, ChainedModel)
-        angles, rods = super().pin_turns(run), self.model.organs.at_pins
+        angles, organs = super().pin_turns(run), self.model.organs
+        # the rods at A1, at B in wall and web, and at A2
+        at_pins = (1, organs.walls, organs.walls + 1, organs.number)
         for side in SIDES:
-            first, last, web, end = (run[f"{side}.theta_{k}"] for k in rods)
+            first, last, web, end = (run[f"{side}.theta_{k}"] for k in at_pins)
             angles[f"{side}.rocker_joint"] = end - run["rocker.psi"]
             angles[f"{side}.hinge"] = web - last
             angles[f"{side}.support"] = first

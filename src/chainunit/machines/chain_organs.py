@@ -13,8 +13,8 @@ from itertools import pairwise
 from typing import Any
 
 from ..core.planar import ZERO, Vec2
+from ..core.ports import Solver
 from ..core.quantities import Layout, Value, declaration, declared_class, group, quantity
-from ..core.solver import Solver
 from ..groups import hanging_chain
 from ..groups.chain import Rods
 from ..groups.hanging_chain import HangingChain, HeldChain, State
@@ -32,6 +32,7 @@ from .chain_unit import (
     coupler_force,
     on_drive,
     on_side,
+    organ_masses,
     rocker_load,
     rocker_motion,
     rod_motions,
@@ -192,11 +193,6 @@ class Organs:
         self.RodsStart = declared_class("RodsStart", (StartChoice,), both(rod_start, rod_start()))
         self._start_layout = Layout(rod_start)
 
-    @property
-    def at_pins(self) -> tuple[int, int, int, int]:
-        """Numbers of the rods at A1, at B in wall and web, and at A2."""
-        return 1, self.walls, self.walls + 1, self.number
-
     def split(self, x: Any) -> list[State]:
         """Angles and speeds of the rods, left and right."""
         N, sides = self.number, (self._layout.values(x.left), self._layout.values(x.right))
@@ -209,15 +205,11 @@ class Organs:
         lengths = [p.l1 / walls] * walls + [p.l2 / webs] * webs
         inner = [2.0 * p.organ.eta / (one + other) for one, other in pairwise(lengths)]
         damping = [p.organ.end_damping, *inner, p.organ.end_damping]
-        sides = []
-        for masses, loads in ((p.left, u.left), (p.right, u.right)):
-            on_web = p.web_share * loads.material_mass
-            rod_masses = [(masses.wall_mass + (loads.material_mass - on_web)) / walls] * walls
-            rod_masses += [(masses.web_mass + on_web) / webs] * webs
-            law = p.organ
-            sides.append(
-                Rods(lengths, rod_masses, damping, p.rod_inertia, law.fold_limit, law.fold_stiffness)
-            )
+        sides, law = [], p.organ
+        for side in SIDES:
+            on_wall, on_web = organ_masses(p, side, getattr(u, side))
+            masses = [on_wall / walls] * walls + [on_web / webs] * webs
+            sides.append(Rods(lengths, masses, damping, p.rod_inertia, law.fold_limit, law.fold_stiffness))
         return sides
 
     def linkage(self, p: Any, u: Any, states: Sequence[State]) -> Linkage:

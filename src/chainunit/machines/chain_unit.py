@@ -259,13 +259,18 @@ NAMES: dict[SideName, OrganNames] = {
 }
 
 
+def organ_masses(p: Any, side: str, loads: Any) -> tuple[Any, Any]:
+    """The masses of wall and web of an organ with the material of these loads on them [kg]."""
+    masses, on_web = getattr(p, side), p.web_share * loads.material_mass
+    return masses.wall_mass + (loads.material_mass - on_web), masses.web_mass + on_web
+
+
 def organ(p: Any, u: Any, side: SideName) -> Dyad:
     """A working organ as two bars: wall (A1-B) and web (A2-B) with the material on it."""
-    masses, loads, names = getattr(p, side), getattr(u, side), NAMES[side]
-    on_web = p.web_share * loads.material_mass
-    wall = _rod(p, masses.wall_mass + (loads.material_mass - on_web), p.l1)
-    web = _rod(p, masses.web_mass + on_web, p.l2)
-    return Dyad(names.b, Bar(names.wall, names.a1, p.l1, wall), Bar(names.web, "A2", p.l2, web), -names.hand)
+    names, (on_wall, on_web) = NAMES[side], organ_masses(p, side, getattr(u, side))
+    wall = Bar(names.wall, names.a1, p.l1, _rod(p, on_wall, p.l1))
+    web = Bar(names.web, "A2", p.l2, _rod(p, on_web, p.l2))
+    return Dyad(names.b, wall, web, -names.hand)
 
 
 def _rod(p: Any, mass: Any, length: Any) -> Mass:
@@ -371,7 +376,7 @@ def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chambe
 
 def organ_pulls(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Pulls:
     """Axial pull in each rod just inside its pins [N], with the arguments of `chamber`: by side, rod ("web", "wall")
-    and pin. Web: A2 and B; wall: A1 and B. Negative where the rod is pushed. The mean of both ends is the mean pull
+    and pin. Web: A2 and B; wall: A1 and B. Negative if the rod is pushed. The mean of both ends is the mean pull
     of the rod: below zero a chain is slack."""
     s = _organs_on_rocker(xp, p, u, psi, psi_w)
     return _pulls(s, s.reactions(-psi_a))
@@ -387,38 +392,26 @@ def _organs_on_rocker(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any) -> MachineS
     return MachineState(xp, Mechanism(xp, linkage, math.pi - psi), -psi_w)
 
 
-ON_DRIVE = {
-    "crank_bearing": ("O1", "crank"),
-    "crank_pin": ("A", "coupler"),
-    "coupler_pin": ("Bd", "coupler"),
-    "pivot": ("C", "rocker"),
-}
-ON_SIDE = {
-    f"{side}.{output}": joint
-    for side, names in NAMES.items()
-    for output, joint in (
-        ("rocker_joint", ("A2", names.web)),
-        ("hinge", (names.b, names.wall)),
-        ("support", (names.a1, names.wall)),
+_ON_DRIVE = (
+    ("O1 crank bearing", "crank_bearing", "O1", "crank"),
+    ("A crank pin", "crank_pin", "A", "coupler"),
+    ("Bd coupler pin", "coupler_pin", "Bd", "coupler"),
+    ("C rocker pivot", "pivot", "C", "rocker"),
+)
+_ON_SIDE = tuple(
+    row
+    for side, (a1, b, wall, web, *_) in NAMES.items()
+    for row in (
+        (f"A2 {side} web at rocker", f"{side}.rocker_joint", "A2", web),
+        (f"B {side} hinge", f"{side}.hinge", b, wall),
+        (f"A1 {side} support", f"{side}.support", a1, wall),
     )
-}
+)
+"""Title, output, pin and link of each bearing."""
+ON_DRIVE, ON_SIDE = ({output: (pin, link) for _, output, pin, link in rows} for rows in (_ON_DRIVE, _ON_SIDE))
 JOINTS = {**ON_DRIVE, **ON_SIDE}
 """The joint of each reaction, by output."""
-PINS = {
-    "O1 crank bearing": "crank_bearing",
-    "A crank pin": "crank_pin",
-    "Bd coupler pin": "coupler_pin",
-    "C rocker pivot": "pivot",
-    **{
-        title: f"{side}.{output}"
-        for side in SIDES
-        for title, output in (
-            (f"A2 {side} web at rocker", "rocker_joint"),
-            (f"B {side} hinge", "hinge"),
-            (f"A1 {side} support", "support"),
-        )
-    },
-}
+PINS = {title: output for title, output, _, _ in (*_ON_DRIVE, *_ON_SIDE)}
 """The output of each bearing, by title."""
 
 

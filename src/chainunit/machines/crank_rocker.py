@@ -89,7 +89,7 @@ _FAR = 1e300  # larger than any length; the sign of a length times this number s
 
 def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any, z: Any = math.inf) -> tuple[Any, Any]:
     """Least and largest half width [m] at which both organs close for every rocker angle within +-`swing` [rad]. Both
-    ends are singular, except 0. The range is empty where the least half width is not below the largest.
+    ends are singular, except 0. The range is empty if the least half width is not below the largest.
 
     The distance of A2 from A1 must stay above |l1 - l2| and below l1 + l2; over the swing its square is within
     (z -+ e sin(swing))^2 + (e cos(swing))^2. If |l1 - l2| > e cos(swing), half widths about e sin(swing) are
@@ -119,7 +119,7 @@ class CrankRocker:
     Raises
     ------
     GeometryError
-        where the crank cannot turn, with the allowed range.
+        if the crank cannot turn, with the allowed range.
     """
 
     r: float
@@ -129,7 +129,8 @@ class CrankRocker:
 
     def __post_init__(self) -> None:
         for name in ("r", "l", "h", "b"):
-            value = getattr(self, name)
+            value = number_in("m", name, getattr(self, name), "a length of the crank-rocker")
+            object.__setattr__(self, name, value)
             if not (math.isfinite(value) and value > 0.0):
                 raise GeometryError(f"{name} = {value:g} m: must be finite, > 0 m")
         longest = longest_crank(MATH, self.l, self.h, self.b)
@@ -182,10 +183,3 @@ class CrankRocker:
                 f"< {1.0 / math.sin(0.5 * eta):g}"
             )
         return cls(r, l, h, parallel_frame(MATH, r, l, h))
-
-
-def longest_rocker(eta: float, admissible: float) -> float:
-    """The largest lam = h/l at which a crank-rocker with K = 1 and the swing `eta` [rad] keeps its pressure angle
-    within `admissible` [rad]; 0 if there is none (the pressure angle is never below half the swing)."""
-    s, c = math.sin(0.5 * eta), math.cos(0.5 * eta)
-    return math.sqrt(max((math.sin(admissible) / s) ** 2 - 1.0, 0.0)) / c

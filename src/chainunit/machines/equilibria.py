@@ -11,9 +11,8 @@ its inertia alone, without friction and damping, which are zero at rest.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -93,7 +92,7 @@ class Holding:
 class Rest(NamedTuple):
     """A machine at rest at places of its driver, arrays of shape (n,) in units of a driver that turns: the place `q`
     [rad], the `holding` torque and that which `friction` of pins and guides holds [N m], the `inertia` [kg m2], and
-    the `potential` above its least one [J], None where it does not close in a turn."""
+    the `potential` above its least one [J], None if it does not close in a turn."""
 
     q: Any
     holding: Any
@@ -127,33 +126,18 @@ class Equilibria:
         return len(self.places) == 1 and self.places[0].kind == INDIFFERENT and not self.summary.peak
 
 
-class Resting(Protocol):
-    """A machine as its equilibria need it, see `chainunit.machines.machine.Machine`."""
-
-    model: InverseMachine
-
-    @property
-    def ratio(self) -> float:
-        """Motor turns per turn of the driver."""
-
-    def inputs(self, values: Mapping[str, Any]) -> Any:
-        """Inputs from values by name."""
-
-    def state(self, u: Any) -> MachineState:
-        """The linkage with the inputs."""
-
-
 class _AtRest:
     """A machine at rest at places of its driver."""
 
-    def __init__(self, machine: Resting, feed: Any) -> None:
+    def __init__(self, machine: Any, feed: Any) -> None:
         self.machine = machine
         self.feed = machine.model.feed_layout.by_name(machine.model.Feed() if feed is None else feed)
 
     def state(self, q: Any) -> MachineState:
         """The linkage at the places `q` [rad, m]."""
         machine = self.machine
-        return machine.state(machine.inputs({"phi": q * machine.ratio, "w": 0.0, **self.feed}))
+        state: MachineState = machine.state(machine.inputs({"phi": q * machine.ratio, "w": 0.0, **self.feed}))
+        return state
 
     def torque(self, q: Any) -> tuple[Any, Any]:
         """The holding torque [N m] and its slope [N m/rad], each of the shape of `q`."""
@@ -161,17 +145,8 @@ class _AtRest:
         slope, _ = state.slopes()
         return np.broadcast_to(state.bias, q.shape), np.broadcast_to(slope, q.shape)
 
-    def driven(self, q: Any) -> Any:
-        """The part of the holding torque without a potential [N m]."""
-        return np.broadcast_to(self.state(q).lost_torque, q.shape)
 
-    def loads_without_potential(self, q: Any, nothing: float) -> tuple[str, ...]:
-        """The names of the loads that have such a part at any of the places, of a size above `nothing`."""
-        effects = self.state(q).effects
-        return tuple(name for name, effect in effects.items() if np.max(np.abs(effect.dissipative)) > nothing)
-
-
-def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
+def equilibria(machine: Any, feed: Any = None) -> Equilibria:
     """All equilibria of a machine under its weight, its springs and its loads at rest, over the way of its driver: a
     whole turn, or its range.
 
@@ -182,7 +157,7 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
 
     Parameters
     ----------
-    machine : a machine whose outputs do not depend on states
+    machine : a `chainunit.machines.machine.Machine` whose outputs do not depend on states
     feed : its loads, an instance of `machine.model.Feed`; by default those of normal running
 
     Raises
@@ -192,7 +167,8 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     TypeError
         for a machine whose outputs depend on states.
     """
-    resting, model = _AtRest(machine, feed), machine.model
+    resting = _AtRest(machine, feed)
+    model: InverseMachine = machine.model
     q = np.linspace(*model.span, 361)
     state = resting.state(q)
     size = _size(state, q)
@@ -200,9 +176,13 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     (low, high), repeats = _way(resting, q, np.broadcast_to(state.bias, q.shape), nothing)
     around = model.turns and repeats
     curve = sampled(resting.torque, low, high)
-    # a driver on its stop is pushed back by it
-    crossings = _zeros(resting, curve, nothing, None if model.turns else (-1.0, 1.0))
-    driven = resting.loads_without_potential(curve.x, nothing)
+    # a driver on its stop is pushed back by it; without any torque the whole way is one zero
+    beyond = None if model.turns else (-1.0, 1.0)
+    everywhere = [Zero(float(curve.x[0]), float(curve.x[-1]), 0.0, 0.0)]
+    is_idle = np.all(np.abs(curve.values) <= nothing)
+    crossings = everywhere if is_idle else zeros(resting.torque, curve, nothing, beyond)
+    effects = resting.state(curve.x).effects
+    driven = tuple(name for name, load in effects.items() if np.max(np.abs(load.dissipative)) > nothing)
     places = np.array([x for zero in crossings for x in (zero.begin, zero.end)])
     rest, work = _rest(resting, curve, places, not driven, around)
     closes = abs(work) <= _CLOSES * size * (high - low)
@@ -257,15 +237,6 @@ def _size(state: MachineState, q: Any) -> float:
     return max((float(np.max(np.broadcast_to(size, q.shape))) for size in sizes), default=0.0)
 
 
-def _zeros(
-    resting: _AtRest, curve: SampledCurve, nothing: float, beyond: tuple[float, float] | None
-) -> list[Zero]:
-    """The zeros of the holding torque; one over the whole way where no load has a torque."""
-    if np.all(np.abs(curve.values) <= nothing):
-        return [Zero(float(curve.x[0]), float(curve.x[-1]), 0.0, 0.0)]
-    return zeros(resting.torque, curve, nothing, beyond)
-
-
 def friction_torque(state: MachineState) -> Any:
     """The torque that friction of pins and guides holds at the driver [N m], of the shape of the state: each slips
     with its reaction at rest, which is without friction."""
@@ -296,7 +267,8 @@ def _rest(
     if not conservative:
         half = 0.5 * np.diff(x)
         nodes = 0.5 * (x[1:] + x[:-1])[:, None] + half[:, None] * _NODES
-        parts = (resting.driven(nodes.ravel()).reshape(nodes.shape) @ _WEIGHTS) * half
+        lost = np.broadcast_to(resting.state(nodes.ravel()).lost_torque, nodes.size)
+        parts = (lost.reshape(nodes.shape) @ _WEIGHTS) * half
         potential = energy + np.concatenate([[0.0], np.cumsum(parts)])
     elif around:
         potential[-1] = potential[0]

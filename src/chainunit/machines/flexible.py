@@ -26,7 +26,6 @@ from ..core.model import FmuData, Requirement, StartProblem
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
-from ..mechanism.linkage import Linkage
 from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration
 from .chain_organs import LEAST, MOST, Organs, Parameters, both
 from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
@@ -69,16 +68,18 @@ class ChainedModel(LinkageModel):
     never_repeats: str = "chains do not repeat a turn"
 
     def __post_init__(self) -> None:
-        unknowns = self.organs.unknowns
+        organs, unknowns = self.organs, self.organs.unknowns
         self.follow(
             controlled=True,
             start_problem=StartProblem(unknowns, 100 if unknowns else 0, _HANGS),
-            linkage=_drive_alone,
-            internal_step=_internal_step,
-            tolerance=_tolerance,
-            start_limits=self._start_limits,
-            start_guess=self._start_guess,
-            improve_start=self._improved_start,
+            # the drive alone: the places of the chains follow from their states
+            linkage=lambda xp, p, u: drive(p, u, (), {}),
+            # 20 ms, a quarter of a radian of the crank at 12 rad/s
+            internal_step=lambda xp, p: 0.02,
+            tolerance=lambda xp, p: p.tolerance,
+            start_limits=lambda xp, p, u, x: organs.start_limits(xp, p, u, x, self.at_crank(p, u, x)[0]),
+            start_guess=lambda xp, p, u: organs.guess(xp, p, u, self.at_crank(p, u)[0]),
+            improve_start=lambda xp, p, u, z: organs.improved(xp, p, u, self.at_crank(p, u)[0], z),
             start_states=self._start_states,
             constrained_states=self._closed,
             shared=self._with_chains,
@@ -89,16 +90,6 @@ class ChainedModel(LinkageModel):
     def at_crank(self, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank; without states `x`, those at the start."""
         raise NotImplementedError
-
-    def _start_limits(self, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The limits at the start: closed chains, and rods off their stops."""
-        return self.organs.start_limits(xp, p, u, x, self.at_crank(p, u, x)[0])
-
-    def _start_guess(self, xp: Any, p: Any, u: Any) -> list[Any]:
-        return self.organs.guess(xp, p, u, self.at_crank(p, u)[0])
-
-    def _improved_start(self, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
-        return self.organs.improved(xp, p, u, self.at_crank(p, u)[0], z)
 
     def _start_states(self, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
         """States of both organs at the start."""
@@ -116,21 +107,6 @@ class ChainedModel(LinkageModel):
     def _rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
         raise NotImplementedError
-
-
-def _drive_alone(xp: Any, p: Any, u: Any) -> Linkage:
-    """The drive without the chains: their places follow from their states."""
-    return drive(p, u, (), {})
-
-
-def _internal_step(xp: Any, p: Any) -> Any:
-    """Longest internal step: 20 ms, a quarter of a radian of the crank at 12 rad/s."""
-    return 0.02
-
-
-def _tolerance(xp: Any, p: Any) -> Any:
-    """The parameter `tolerance`."""
-    return p.tolerance
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -186,6 +162,7 @@ class TurningChains(ChainedModel, DirectMachine):
         return [x.w, a, *(v for h in s.chains.values() for v in h.rates(a / p.ratio, CLOSING))]
 
 
+@functools.cache
 def flexible(walls: int, webs: int) -> InverseMachine:
     """The machine with `walls` + `webs` rods an organ; its direct model is `flexible(walls, webs).direct()`.
 
@@ -199,28 +176,6 @@ def flexible(walls: int, webs: int) -> InverseMachine:
             f"{walls + webs} rods an organ, {walls} in the wall and {webs} in the web: must be at least one in each "
             f"and at most {MOST} in all; more need an implicit integrator"
         )
-    return _flexible(walls, webs)
-
-
-def with_rods(number: int, start: Mapping[str, float]) -> InverseMachine:
-    """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
-    are nearest to equal length, by the lengths among the `start` values.
-
-    Raises
-    ------
-    InputError
-        for a number of rods that the model cannot have.
-    """
-    from .hanging import split  # it takes numpy, which the Python of a simulator that runs the FMU may lack
-
-    if not LEAST <= number <= MOST:
-        raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
-    lengths = ChamberForces.Parameters()
-    return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
-
-
-@functools.cache
-def _flexible(walls: int, webs: int) -> InverseMachine:
     organs = Organs(walls, webs)
     return DrivenChains(
         name="ChainUnitFlexible",
@@ -253,6 +208,23 @@ def _flexible(walls: int, webs: int) -> InverseMachine:
         required=(*ChamberForces.required, *_MASSES),
         requirements=_limits,
     )
+
+
+def with_rods(number: int, start: Mapping[str, float]) -> InverseMachine:
+    """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
+    are nearest to equal length, by the lengths among the `start` values.
+
+    Raises
+    ------
+    InputError
+        for a number of rods that the model cannot have.
+    """
+    from .hanging import split  # it takes numpy, which the Python of a simulator that runs the FMU may lack
+
+    if not LEAST <= number <= MOST:
+        raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
+    lengths = ChamberForces.Parameters()
+    return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
 
 
 def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -7,7 +7,7 @@ is minus the gradient of a convex function of p,
 
     d/dp sum of l |m(p)| = -(A2 - A1).
 
-With the term p . (A2 - A1) added, the function has a unique minimum where the chain is longer than the distance of
+With the term p . (A2 - A1) added, the function has a unique minimum if the chain is longer than the distance of
 the pins: the hanging, stable position. A uniform piece has the integral of |p - (0, w s)| along it in place of l |m|:
 the catenary, piece by piece, in closed form.
 
@@ -46,14 +46,18 @@ def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
     Raises
     ------
     GeometryError
-        where the chain is not longer than the distance of the pins, or the pins are so near that it folds up.
+        if the chain is not longer than the distance of the pins, or the pins are so near that it folds up.
     """
     l, W = np.asarray(lengths, float), np.asarray(weights, float)
     before = np.concatenate([[0.0], np.cumsum(W)[:-1]]) + 0.5 * W
 
-    def parts(p: Any) -> tuple[float, Any, Any]:
+    def means(p: Any) -> tuple[Any, Any]:
+        """The means of the forces at the ends of the rods, and their sizes."""
         m = np.stack([np.full_like(before, p[0]), p[1] - before])
-        size = np.hypot(*m)
+        return m, np.hypot(*m)
+
+    def parts(p: Any) -> tuple[float, Any, Any]:
+        m, size = means(p)
         unit = m / size
         hessian = np.einsum("k,ik,jk->ij", -l / size, unit, unit) + np.eye(2) * np.sum(l / size)
         return float(l @ size), unit @ l, hessian
@@ -68,8 +72,7 @@ def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
                 "lie across between two parts that hang straight, without force; must be larger, or the rods shorter"
             )
     p = _least(parts, reach, float(np.sum(l)), float(np.sum(W)))
-    m = np.stack([np.full_like(before, p[0]), p[1] - before])
-    size = np.hypot(*m)
+    m, size = means(p)
     total = float(np.sum(W))
     return Hanging(p, np.array([-p[0], total - p[1]]), np.arctan2(-m[0], m[1]), size)
 
@@ -179,7 +182,7 @@ def modes(lengths: Any, weights: Any, rest: Hanging, g: float) -> Modes:
 
     l, m = np.asarray(lengths, float), np.asarray(weights, float) / g
     N = len(l)
-    after = np.concatenate([np.cumsum(m[::-1])[::-1][1:], [0.0]])  # mass behind each rod
+    after = np.concatenate([np.cumsum(m[::-1])[::-1][1:], [0.0]])  # mass after each rod
     outer = np.maximum.outer(np.arange(N), np.arange(N))  # the rod farther from A1 of each two rods
     inertia = np.outer(l, l) * np.cos(np.subtract.outer(rest.theta, rest.theta)) * (0.5 * m + after)[outer]
     inertia[np.diag_indices(N)] = l * l * (m / 3.0 + after)

@@ -179,31 +179,22 @@ def _vector(point: Any) -> Vec2:
     return Vec2(point.x, point.y)
 
 
-JOINTS = {
-    "crank_bearing": ("O1", "crank"),
-    "crank_pin": ("A", "coupler"),
-    "coupler_pin": ("B", "coupler"),
-    "leg_pin": ("B", "leg_b"),
-    "rocker_bearing": ("O2", "rocker"),
-    "c_pin": ("C", "leg_b"),
-    "d_pin": ("D", "leg_3"),
-    "e_pin": ("E", "leg_4"),
-    "o3_bearing": ("O3", "leg_3"),
-    "o4_bearing": ("O4", "leg_4"),
-}
+_BEARINGS = (
+    ("O1 crank bearing", "crank_bearing", "O1", "crank"),
+    ("A crank pin", "crank_pin", "A", "coupler"),
+    ("B coupler AB", "coupler_pin", "B", "coupler"),
+    ("B leg BC", "leg_pin", "B", "leg_b"),
+    ("O2 rocker bearing", "rocker_bearing", "O2", "rocker"),
+    ("C", "c_pin", "C", "leg_b"),
+    ("D", "d_pin", "D", "leg_3"),
+    ("E", "e_pin", "E", "leg_4"),
+    ("O3 bearing", "o3_bearing", "O3", "leg_3"),
+    ("O4 bearing", "o4_bearing", "O4", "leg_4"),
+)
+"""Title, output, pin and link of each bearing."""
+JOINTS = {output: (pin, link) for _, output, pin, link in _BEARINGS}
 """The joint of each reaction, by output."""
-PINS = {
-    "O1 crank bearing": "crank_bearing",
-    "A crank pin": "crank_pin",
-    "B coupler AB": "coupler_pin",
-    "B leg BC": "leg_pin",
-    "O2 rocker bearing": "rocker_bearing",
-    "C": "c_pin",
-    "D": "d_pin",
-    "E": "e_pin",
-    "O3 bearing": "o3_bearing",
-    "O4 bearing": "o4_bearing",
-}
+PINS = {title: output for title, output, _, _ in _BEARINGS}
 """The output of each bearing, by title."""
 
 

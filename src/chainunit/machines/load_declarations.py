@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..core.ports import Solver
 from ..core.quantities import Value, declaration, declared_class, group, quantity
-from ..core.solver import Solver
 from ..drives.motor import GearOfMotor, Rotor
 from . import chain_unit
 from .load_filter import TRIANGLE, UNKNOWNS

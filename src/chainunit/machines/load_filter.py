@@ -97,7 +97,7 @@ _BEYOND = (
 
 def level(xp: Any, memory: Any, rate: Any) -> Any:
     """The level, in standard deviations, that the size of a stationary Gaussian quantity exceeds `rate` times in some
-    time, where it forgets its value in the time `memory`, in the same unit.
+    time, if it forgets its value in the time `memory`, in the same unit.
 
     From far below, a quantity that forgets like exp(-t/memory) rises above z, or falls below -z,
     2 z exp(-z^2/2)/(sqrt(2 pi) memory) times. With the diffusion D of a quantity of the variance S^2 its memory is
@@ -135,5 +135,5 @@ def normal_probability(xp: Any, z: Any) -> Any:
 
 
 def step(xp: Any, x: Any, threshold: Any) -> Any:
-    """0 where `x` is below `threshold`, 1 where it is above: a steep ramp, which every engine has."""
+    """0 if `x` is below `threshold`, 1 if it is above: a steep ramp, which every engine has."""
     return xp.minimum(xp.maximum(1e9 * (x - threshold), 0.0), 1.0)

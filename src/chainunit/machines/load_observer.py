@@ -250,7 +250,7 @@ def _lever(p: Any, share: float = 1.0) -> Any:
 
 def _plausible(p: Any, deviation: Any) -> Any:
     """The share of a deviation of the speed [rad/s] from which loads are learned: less and less beyond the speed that
-    a jam takes within `ONSET`. A larger one is no load: the measured speed has jumped, as where the observer starts
+    a jam takes within `ONSET`. A larger one is no load: the measured speed has jumped, as if the observer starts
     with another speed."""
     most = GATE * p.noise.w + 2.0 * _lever(p) * p.force.spread / p.rotor.J * ONSET
     square = (deviation / most) * (deviation / most)

@@ -13,7 +13,7 @@ from ..core.engines import numpy_
 from ..core.errors import InputError, check_kind, shown
 from ..core.quantities import Variable, complaint
 from ..mechanism.machine import MachineState, Mechanism
-from ..mechanism.models import InverseMachine
+from ..mechanism.models import InverseMachine, MachineModel
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,9 +54,10 @@ class Machine:
     """
 
     in_place: ClassVar[str] = ""
-    """Words on what the results without a run are of, where the runs have another model; else empty."""
+    """Words on what the results without a run are of, if the runs have another model; else empty."""
 
     def __init__(self, model: InverseMachine, parameters: Any = None, /, **values: Any) -> None:
+        check_kind("model", model, MachineModel, "a machine, such as KnifeDrive")
         self.model = model
         if isinstance(parameters, model.Parameters):
             parameters = model.parameter_layout.by_name(parameters)

@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 class Entry(Faults):
     """A table of a file, with the faults in it. `place` is its full key, empty for a whole file; in a refusal `title`
-    stands before the names of its keys, where it is not empty, and `more` behind the words."""
+    stands before the names of its keys, unless it is empty, and `more` at the end."""
 
     def __init__(self, place: str, table: Any, title: str = "") -> None:
         super().__init__()
@@ -35,7 +35,7 @@ class Entry(Faults):
         Raises
         ------
         InputError
-            where it is no table.
+            if it is no table.
         """
         if not isinstance(self.raw, Mapping):
             self.wrong("", self.raw, "must be a table")
@@ -43,12 +43,12 @@ class Entry(Faults):
         return self.raw
 
     def key(self, name: str) -> str:
-        """The full key of a name in the table; of an empty one, that of the table itself."""
+        """The full key of a name in the table; for an empty name, the key of the table itself."""
         return ".".join(filter(None, (self.place, name)))
 
     @contextmanager
     def at(self, name: str, sign: str = ": ") -> Iterator[None]:
-        """Collect the faults of a key; `sign` stands behind the key."""
+        """Collect the faults of a key; `sign` stands after the key."""
         begin = ": ".join(filter(None, (self.title, name))) if self.title else self.key(name)
         with self.collected(), refusal_prefix(begin + sign, self.key(name)):
             yield
@@ -67,11 +67,13 @@ class Entry(Faults):
         """Collect the faults of the unknown keys of a `table` in it, or, with an empty name, of the table itself."""
         for key in table:
             if key not in allowed:
-                where = ".".join(filter(None, (name, str(key))))
-                self.fault(where, f"unknown key{meant(str(key), allowed)} known here: {', '.join(allowed)}")
+                full_name = ".".join(filter(None, (name, str(key))))
+                self.fault(
+                    full_name, f"unknown key{meant(str(key), allowed)} known here: {', '.join(allowed)}"
+                )
 
     def choice(self, name: str, allowed: Mapping[str, T]) -> T | None:
-        """The one of the `allowed` values that the table names; None, with a fault, where it names none."""
+        """The one of the `allowed` values that the table names; None, with a fault, if it names none."""
         value = self.given.get(name)
         if isinstance(value, str) and value in allowed:
             return allowed[value]
@@ -82,7 +84,7 @@ class Entry(Faults):
         return None
 
     def quantity(self, name: str, variable: Variable, value: Any) -> float:
-        """The `value` of a key in the unit of the `variable`; not a number, with a fault, where it is wrong. An angle
+        """The `value` of a key in the unit of the `variable`; not a number, with a fault, if it is wrong. An angle
         of more than a turn without a unit is one in degrees."""
         key = self.key(name)
         with self.collected():
@@ -119,7 +121,7 @@ def read_entries(
 ) -> list[T]:
     """The results of `read` for the entries without a fault; the faults of the others go to `faults`. `tables` has
     pairs of the name of an entry, or its number, and its table; the full key of an entry begins with `place`, and its
-    `title`, where it is not empty, with these words."""
+    `title`, unless it is empty, with these words."""
     results = []
     for name, table in tables:
         entry = Entry(f"{place}.{name}", table, title and f"{title} {name}")
@@ -175,24 +177,23 @@ class TableList:
         tables: Iterable[Any],
         faults: Faults,
         read: Callable[[Entry, str], T],
-        known: Collection[str] | None = None,
+        names: Collection[str] | None = None,
         fixed: Mapping[str, str] | None = None,
         usual: str = "",
     ) -> dict[str, T]:
         """The results of `read` by the names of the entries, for those without a fault; the faults of the others go
-        to `faults`. The names are `known` ones, or any; `fixed` has the reasons against further names. An entry
-        without a name has the name `usual`, which its number follows."""
-        names: set[str] = set()
+        to `faults`. The allowed `names` are these, or any; `fixed` has the reasons against further names. An entry
+        without a name has the name `usual` with its number."""
+        present: set[str] = set()
 
         def named_result(entry: Entry, number: int) -> tuple[str, T]:
-            prefix = f"{entry.place}."
-            entry.raw = given_values(read_table(self.form(prefix), entry.given, prefix))
+            self._read_form(entry)
             name = entry.given.get(self.named_by, usual and f"{usual}{number}")
-            self._check(entry, name, known, fixed or {})
+            self._check(entry, name, names, fixed or {})
             entry.refuse()
-            if name in names:
+            if name in present:
                 entry.wrong(self.named_by, name, self.is_twice)
-            names.add(name)
+            present.add(name)
             return name, read(entry, name)
 
         return dict(read_entries(enumerate(tables, 1), self.name, faults, named_result))
@@ -204,10 +205,15 @@ class TableList:
         others go to `faults`."""
 
         def named_result(entry: Entry, name: str) -> tuple[str, T]:
-            entry.raw = given_values(read_table(self.form(f"{entry.place}."), entry.given, f"{entry.place}."))
+            self._read_form(entry)
             return name, read(entry, name)
 
         return dict(read_entries(tables.items(), self.name, faults, named_result))
+
+    def _read_form(self, entry: Entry) -> None:
+        """Put the checked values of an entry, by key, in place of its table."""
+        prefix = f"{entry.place}."
+        entry.raw = given_values(read_table(self.form(prefix), entry.given, prefix))
 
     def _check(
         self, entry: Entry, name: str, names: Collection[str] | None, fixed: Mapping[str, str]

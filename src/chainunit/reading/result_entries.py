@@ -7,7 +7,7 @@ from typing import Any
 
 
 def as_mapping(node: Any) -> Mapping[str, Any]:
-    """A node of a result, where it is a mapping; else an empty one."""
+    """A node of a result that is a mapping; else an empty one."""
     return node if isinstance(node, Mapping) else {}
 
 

@@ -1,7 +1,7 @@
 """Results, declared once: their data for a file, and their documentation, follow from the declaration.
 
-A result is a dataclass. Its field is in the data where it is declared: a number, or an array of numbers, by
-`quantity` with its unit, anything else by `part`. A property is in the data where it is `derived`. All other fields
+A result is a dataclass. Its field is in the data if it is declared: a number, or an array of numbers, by
+`quantity` with its unit, anything else by `part`. A property is in the data if it is `derived`. All other fields
 and properties are means of the computation. A mapping, a sequence or a nested result has data by the same rules.
 """
 
@@ -67,7 +67,7 @@ class ResultPart(NamedTuple):
     titled: bool = False
     """whether its numbers have their descriptions in the data"""
     optional: bool = False
-    """whether it is left out where it is None"""
+    """whether it is left out if it is None"""
 
 
 def part(
@@ -82,8 +82,8 @@ def part(
     default: Any = dataclasses.MISSING,
     default_factory: Any = dataclasses.MISSING,
 ) -> Any:
-    """A field that is in the data of a result, see `ResultPart`; its name there is that of the field unless `name`
-    gives another."""
+    """A field that is in the data of a result, see `ResultPart`; its `name` there is by default the name of the
+    field."""
     declared_part = ResultPart("", name, description, unit, kind, inline, titled, optional)
     if default_factory is not dataclasses.MISSING:
         return dataclasses.field(default_factory=default_factory, metadata={"part": declared_part})
@@ -130,7 +130,7 @@ def derived(
 
 @cache
 def parts(result_type: Any) -> tuple[ResultPart, ...]:
-    """The declared parts of a result: its fields, then its properties. Those of a group have its name before
+    """The declared parts of a result: its fields, then its properties. The parts of a group have its name before
     theirs."""
     listed = []
     for field in dataclasses.fields(result_type):
@@ -214,6 +214,7 @@ def _data(x: Any, unit: str, kind: str, form: _Form) -> Any:
 
 
 def _table(x: Any, form: _Form) -> dict[str, Any]:
+    """The data of a result: its parts by name."""
     data: dict[str, Any] = {}
     result_type: Any = type(x)
     for member in parts(result_type):
@@ -235,6 +236,7 @@ def _table(x: Any, form: _Form) -> dict[str, Any]:
 
 
 def _number(x: Any, unit: str, kind: str) -> dict[str, Any]:
+    """The entry of a number or an array."""
     is_array = isinstance(x, list | tuple) or bool(getattr(x, "ndim", 0))
     if is_array:
         return array_entry(x, unit, kind)
@@ -256,7 +258,7 @@ def documented(result_type: type, prefix: str = "") -> Iterator[tuple[str, str, 
 
 
 def _annotated(result_type: type, attribute: str) -> Any:
-    """The type of a part; None for that of a group, which is a number."""
+    """The type of a part; None for a part of a group, which is a number."""
     for base in result_type.__mro__:
         member: Any = vars(base).get(attribute)
         if isinstance(member, _Derived):
@@ -271,7 +273,7 @@ def _annotated(result_type: type, attribute: str) -> Any:
 
 
 def results_in(hint: Any) -> tuple[str, Any]:
-    """The steps from a value of this type to the results in it, and their class; None where it has none."""
+    """The steps from a value of this type to the results in it, and their class; None if it has none."""
     if hasattr(hint, "__dataclass_fields__"):
         return "", hint if parts(hint) else None
     candidates = [results_in(argument) for argument in typing.get_args(hint)]

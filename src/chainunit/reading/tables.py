@@ -87,8 +87,7 @@ def option_value(name: str, text: str, unit: str, description: str, most: float 
     """
     parts = units.split(text)
     if parts is not None and parts[0] and not parts[1]:
-        others = {"rad/s": ("rev/min", "rad/s"), "m/s": ("m/s", "mm/s")}.get(unit, (unit.replace(".", " "),))
-        examples = " or ".join(f'"{parts[0]:g} {other}"' for other in others)
+        examples = " or ".join(f'"{parts[0]:g} {symbol}"' for symbol in units.fitting(unit)[:2])
         raise InputError(f"{name} {printable(text)}: has no unit; give it as {examples}")
     quantity = Quantity(unit, description, low=0.0, open_low=True, high=most)
     if parts is not None and parts[1] and not units.converts(parts[1], unit):
@@ -116,7 +115,7 @@ class UnusualValue:
     meant: str | None = part("the probable value, in the form of a study file")
 
     @classmethod
-    def of(cls, variable: Variable, entry: Any, value: float) -> UnusualValue | None:
+    def of_entry(cls, variable: Variable, entry: Any, value: float) -> UnusualValue | None:
         """The unusual `value` of a variable, which a file has as `entry`; None for a usual one."""
         if variable.quantity.is_usual(value):
             return None
@@ -190,12 +189,14 @@ def unusual_values(
                 if entry is None and not quantity.is_usual(start):
                     template = f"{variable.template}; not in the file"
                     yield UnusualValue(dataclasses.replace(variable, template=template), start, "", None)
-            if entry is not None and (value := UnusualValue.of(variable, entry, to_number(variable, entry))):
+            if entry is not None and (
+                value := UnusualValue.of_entry(variable, entry, to_number(variable, entry))
+            ):
                 yield value
 
 
 def _meant(variable: Variable, entry: Any) -> str | None:
-    """The given number with the unit in which it is allowed and usual; None where there is no such unit."""
+    """The number of an entry with the unit in which it is allowed and usual; None if there is no such unit."""
     parts = units.split(str(entry))
     if parts is None or not math.isfinite(parts[0]):
         return None
@@ -279,23 +280,24 @@ def _path(error: ErrorDetails) -> list[str]:
 
 
 def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
+    """The refusal of a value by pydantic in one line of our words."""
     path = error["loc"]
-    where = prefix + printable(".".join(_path(error)), 80)
+    full_name = prefix + printable(".".join(_path(error)), 80)
     if error["type"] == "extra_forbidden":
         table: Any = file
         for part in path[:-1]:
             table = table.model_fields[part].annotation
         keys = f"known here: {', '.join(table.model_fields)}"
         hint = near_name(str(path[-1]), table.model_fields) or _elsewhere(str(path[-1]), file)
-        return f"{where}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{keys}"
+        return f"{full_name}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{keys}"
     if error["type"] == "model_type":
-        array = f", below [{where}]" if isinstance(error["input"], list) else ""
-        named = _holders(where, file) if isinstance(error["input"], str) else []
+        array = f", below [{full_name}]" if isinstance(error["input"], list) else ""
+        named = _holders(full_name, file) if isinstance(error["input"], str) else []
         hint = f"; its name stands in {' or '.join(named)}" if named else ""
-        return f"{where} = {shown(error['input'])}: must be a table{array}{hint}"
+        return f"{full_name} = {shown(error['input'])}: must be a table{array}{hint}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
-    return f"{where} = {shown(error['input'])}: {_allowed(error, where.removeprefix(prefix))}"
+    return f"{full_name} = {shown(error['input'])}: {_allowed(error, full_name.removeprefix(prefix))}"
 
 
 def _elsewhere(key: str, file: type[BaseModel]) -> str:
@@ -340,7 +342,7 @@ def _allowed(error: ErrorDetails, key: str) -> str:
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """The table `over`, completed by `base`: a value that `over` does not have is that of `base`."""
+    """The table `over`, completed by the values of `base` that it does not have."""
     result = dict(base)
     for name, value in over.items():
         below = result.get(name)
@@ -364,7 +366,7 @@ def packaged(name: str) -> str:
 
 
 MOST_KEYS = 5000
-"""Most keys of a file, those of its tables among them."""
+"""Most keys of a file, with the keys of its tables."""
 
 
 def toml(text: str, most: int = MOST_KEYS) -> dict[str, Any]:
@@ -373,7 +375,7 @@ def toml(text: str, most: int = MOST_KEYS) -> dict[str, Any]:
     Raises
     ------
     InputError
-        where the text is no TOML, each fault with its line, has more than so many keys, and for `text_faults`.
+        if the text is no TOML, each fault with its line, has more than so many keys, and for `text_faults`.
     """
     try:
         data = tomllib.loads(text)
@@ -400,12 +402,12 @@ Unicode assigns to nothing. XML, and with it an FMU, an SVG and a page, has no p
 
 
 def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """The table of that name in a file, empty where there is none.
+    """The table of that name in a file, empty if there is none.
 
     Raises
     ------
     InputError
-        where it is no table.
+        if it is no table.
     """
     table = data.get(name, {})
     if not isinstance(table, Mapping):
@@ -419,6 +421,7 @@ def text_faults(data: Any) -> list[InputError]:
 
 
 def _wrong_texts(data: Any, key: str) -> Iterator[InputError]:
+    """See `text_faults`; `key` is the full name of the data."""
     if isinstance(data, Mapping):
         for name, value in data.items():
             inner = f"{key}.{name}" if key else str(name)
@@ -499,7 +502,7 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
 
 
 def _line_of(key: str, lines: Mapping[str, int]) -> int:
-    """The line of a key, or else of the innermost table that contains it; 0 where the file has neither."""
+    """The line of a key, or else of the innermost table that contains it; 0 if the file has neither."""
     while key and key not in lines:
         key = key.rpartition(".")[0]
     return lines.get(key, 0)

@@ -95,7 +95,7 @@ CHOICES = {
 
 
 def chosen_units(choices: Mapping[str, Any]) -> Units:
-    """The units in which numbers are shown, where the user chooses those of some kinds: ``{"speed":
+    """The units in which numbers are shown, with the units that the user chooses for some kinds: ``{"speed":
     "rev/min"}``.
 
     Raises
@@ -185,6 +185,7 @@ def digits_text(value: float, digits: int = 3, *, full: bool = True) -> str:
 
 
 def _share(value: float, kind: str, digits: int, full: bool) -> tuple[str, str]:
+    """A share as the number, or words in its place, and the sign that follows it."""
     if kind == "dip" and value >= 0.995:
         return "stands" if value < 1.005 else "turns back", ""
     if abs(value) < _NOTHING:
@@ -221,7 +222,7 @@ def forms(
 
 
 def entry(value: float | None, unit: str, kind: str = "") -> dict[str, Any]:
-    """A number as a result holds it: with its unit, and its kind if it has one; None where it is not
+    """A number as a result holds it: with its unit, and its kind if it has one; None if it is not
     finite."""
     return {"value": finite(value), "unit": unit} | ({"kind": kind} if kind else {})
 
@@ -236,11 +237,11 @@ def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
     return {"value": value, "unit": unit} | ({"kind": kind} if kind else {})
 
 
-def entries(instance: Any, *, with_titles: bool = False) -> dict[str, Any]:
-    """The declared values of an instance as ``{name: entry}``; with `with_titles`, each with its description."""
+def entries(instance: Any) -> dict[str, Any]:
+    """The declared values of an instance as ``{name: entry}``."""
     layout = Layout(type(instance))
     return {
-        v.name: entry(value, v.unit, v.kind) | ({"title": v.description} if with_titles else {})
+        v.name: entry(value, v.unit, v.kind)
         for v, value in zip(layout.variables, layout.values(instance), strict=True)
     }
 
@@ -257,7 +258,7 @@ def number(
     beside: bool = True,
 ) -> str:
     """The text of `forms` in one piece and in plain letters, for a terminal or a message. With `beside`, the
-    second unit follows in brackets. `none` is the text for a missing number. The units are those of
+    second unit follows in brackets. `none` is the text for a missing number. The units are the ones of
     `shown_in`, unless `units` gives others."""
     if value is None or math.isnan(value):
         return none

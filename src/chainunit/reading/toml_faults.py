@@ -48,7 +48,7 @@ def syntax_faults(text: str, error: Exception) -> list[InputError]:
 
 
 def _line(lines: list[str], error: Exception) -> int:
-    """The line of the fault, from 1; 0 where it is not known."""
+    """The line of the fault, from 1; 0 if it is not known."""
     place = _PLACE.search(str(error))
     if place is not None:
         return int(place[1]) if place[1] else len(lines)
@@ -56,7 +56,7 @@ def _line(lines: list[str], error: Exception) -> int:
 
 
 def _value_fault(line: str) -> str:
-    """Words on the fault of the value in a line and on its right form; empty where these are not clear."""
+    """The fault of the value in a line and its right form; empty if these are not clear."""
     match = _BARE.fullmatch(line) if len(line) <= _LONGEST else None
     if match is None or _is_value(match[2]):
         return ""

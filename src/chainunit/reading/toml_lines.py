@@ -52,7 +52,7 @@ def statements(text: str) -> Iterator[Statement]:
 
 
 def _blocks(text: str) -> Iterator[tuple[int, int]]:
-    """The first line of each statement, counted from 0, and the line behind it."""
+    """The first line of each statement, counted from 0, and the line after it."""
     depth = first = line = 0
     for sign in (match[0] for match in _SIGNS.finditer(text)):
         line += sign.count("\n")
@@ -69,7 +69,7 @@ def lines_of(text: str) -> dict[str, int]:
     line_by_key: dict[str, int] = {}
     for statement in statements(text):
         for name in statement.keys or (statement.table,):
-            # the line of a table is that of its first key
+            # the line of a table is the line of its first key
             parts = name.split(".")
             for k in range(1, len(parts) + 1):
                 line_by_key.setdefault(".".join(parts[:k]), statement.line)
@@ -77,7 +77,7 @@ def lines_of(text: str) -> dict[str, int]:
 
 
 def _loaded(statement: str) -> dict[str, Any]:
-    """The data in a statement; none where it is no TOML."""
+    """The data in a statement; none if it is no TOML."""
     try:
         return tomllib.loads(statement)
     except ValueError:
@@ -101,6 +101,7 @@ def _heading(data: Mapping[str, Any], numbers: dict[str, int]) -> str:
 
 
 def _names(data: Mapping[str, Any], prefix: str) -> Iterator[str]:
+    """The full names of all keys in a table, also of inner ones; entries of lists count from 1."""
     for key, value in data.items():
         yield prefix + key
         if isinstance(value, Mapping):

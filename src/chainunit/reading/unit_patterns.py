@@ -31,7 +31,7 @@ def pattern(quantity: Quantity, *, whole: bool, share: bool) -> str:
     signed = rf"[+−-]?{digits}"
     if quantity.unit != "K" and quantity.low >= 0.0:
         signed = rf"(?:\+?{digits}|[−-]{_ZERO})"
-    names = [name for name in _names(quantity.unit, quantity.kind) if share or not set(name) & set("%‰")]
+    names = [name for name in _names(quantity.unit) if share or not set(name) & set("%‰")]
     unit = "|".join([*map(re.escape, names), _COMPOUND])
     return rf"^(?:\s*{signed}\s*(?:{unit})?\s*|.*[^\x00-\x7F\s{_SIGNS}].*)$".replace("\\%", "%")
 
@@ -42,18 +42,8 @@ def zero() -> str:
 
 
 @cache
-def _names(unit: str, kind: str) -> tuple[str, ...]:
-    """The units of one name that fit a quantity, in each of their spellings."""
-    fitting = [name for name in units.single_names() if _fits(name, unit, kind)]
-    other = [name.replace(plain, sign) for plain, sign in _SPELLINGS for name in fitting if plain in name]
-    return tuple(dict.fromkeys([*fitting, *other]))
-
-
-def _fits(name: str, unit: str, kind: str) -> bool:
-    if unit != "K" and units.dimension(name) != units.dimension(unit):
-        return False
-    try:
-        units.convert(1.0, name, unit, kind)
-    except ValueError:
-        return False
-    return True
+def _names(unit: str) -> tuple[str, ...]:
+    """The units of one name that fit a quantity of the declared `unit`, in all spellings."""
+    fitting = [name for name in units.single_names() if units.converts(name, unit)]
+    spellings = [name.replace(plain, sign) for plain, sign in _SPELLINGS for name in fitting if plain in name]
+    return tuple(dict.fromkeys([*fitting, *spellings]))

@@ -34,8 +34,8 @@ STUCK = 0.2
 """Longest time for which a column with noise may keep its value [s]."""
 CLIPPED = 2e-3
 """Largest share of rows at the same extreme value, in parts of all rows."""
-JUMP = 1e4
-"""Fall of the count of an encoder from which it began anew."""
+JUMP, FASTER = 100.0, 1.5
+"""Fall of the count of an encoder from which it began anew, if it falls faster by this factor than it ever rises."""
 STANDS = 0.05
 """Mean speed, in parts of the expected one, below which the machine stands."""
 SAME = 1.2
@@ -57,6 +57,9 @@ CLOCK = 5e-4
 ALIKE, AROUND = 0.6, 1.5
 """Correlation of a column with itself one turn later from which it tells the turn; and the factor around the stated
 time of a turn within which the turn is sought."""
+_MOST_TURNS, _LESS_ALIKE = 12, 0.02
+"""Largest number of turns that a time after which a column repeats may have, and how much less alike it may be after
+one of them."""
 GAINS = 3.0
 """Standard deviations by which the gain of a sensor of speed may be wrong."""
 _ROWS_STUCK = 20
@@ -253,9 +256,24 @@ def _turning_speed(
         if like > ALIKE
     ]
     if turns:
-        _, name, turn = max(turns)
+        like, name, turn = max(turns)
+        if abs(2.0 * math.pi / turn / crank_speed - 1.0) > 2.0 * clock:
+            turn /= _turns_in(recording, name, turn, like, next(iter(speeds.values()), None))
         return name, 2.0 * math.pi / turn, 2.0 * clock
     return next(((name, speed, clock + GAINS * gain) for name, speed in speeds.items()), None)
+
+
+def _turns_in(recording: Recording, name: str, span: float, like: float, measured: float | None) -> int:
+    """The number of turns of the crank in a time after which a column repeats, with this correlation: by the measured
+    speed of the crank, else the largest number of parts after each of which the column repeats as well."""
+    if measured is not None:
+        return max(1, round(span * measured / (2.0 * math.pi)))
+    parts = [1]
+    for count in range(2, _MOST_TURNS + 1):
+        like_of_part, part = _turn(recording, name, span / count)
+        if like_of_part > like - _LESS_ALIKE and abs(count * part / span - 1.0) < 0.01:
+            parts.append(count)
+    return parts[-1]
 
 
 def _turn(recording: Recording, name: str, stated: float) -> tuple[float, float]:
@@ -412,7 +430,7 @@ def _of_column(
         yield _fault(recording, name, f"{kept}: the sensor or the logger is stuck; {remedy_text}")
         return
     if expected is not None and not expected.admits(size):
-        yield _fault(recording, name, _scale_words(name, size, expected))
+        yield _fault(recording, name, _scale_words(name, recording.heads[name], size, expected))
         return
     if expected is not None and expected.is_reversed(mean, size):
         yield _fault(
@@ -450,7 +468,7 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         yield _fault(
             recording, "time",
             f"{1.0 / step:.3g} rows a second are {turn / step:.2g} in a turn of the crank; record >= "
-            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, correct crank_speed, or write the unit of the times "
+            f"{math.ceil(LEAST_ROWS / turn)} rows a second, correct crank_speed, or write the unit of the times "
             "into their head",
         )  # fmt: skip
     if recording.missing > MISSING:
@@ -508,10 +526,11 @@ def _counted(recording: Recording) -> Iterator[InputError]:
     if count is None:
         return
     steps = np.diff(count)
-    place = int(np.argmin(steps))
+    rates = steps / np.diff(recording.time)
+    place = int(np.argmin(rates))
     if count[-1] < count[0] and np.median(steps) < 0.0:
         yield _fault(recording, "motor.count", "counts down, while the motor turns forward: change its sign")
-    elif steps[place] < -JUMP:
+    elif steps[place] < -JUMP and rates[place] < -FASTER * np.max(rates):
         instant = recording.time[place + 1]
         yield _fault(
             recording, "motor.count",
@@ -593,12 +612,16 @@ def _exchanged(recording: Recording, first: str, second: str, sizes: Mapping[str
     )  # fmt: skip
 
 
-def _scale_words(name: str, size: float, expected: Expectation) -> str:
+def _scale_words(name: str, head: str, size: float, expected: Expectation) -> str:
     finding = f"RMS of {_size(name, size)}"
     limit = f"must be from {_size(name, expected.low)} to {_size(name, expected.high)} ({expected.words})"
     unit = MEASURANDS[name].unit
-    for factor, prefix in ((1e-3, "m"), (1e3, "k")):
-        if expected.admits(size * factor):
+    try:
+        stated = scale(name_and_unit(head)[1], unit)[0]
+    except ValueError:
+        stated = 1.0
+    for factor, prefix in ((1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M")):
+        if stated != factor and expected.admits(size * factor / stated):
             return f"{finding}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
     more = ", crank_speed and machine.ratio" if name in OF_SPEED else ""
     return f"{finding}; {limit}: check the sensor, the unit in its head{more}"

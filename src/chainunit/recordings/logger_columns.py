@@ -11,47 +11,70 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.errors import InputError, printable
-from ..core.units import scale
-from .logger_table import MARKS, MISSING, WITH_UNIT, LoggerTable, date_and_clock, is_time, name_and_unit
+from ..core.units import dimension, scale
+from .logger_table import (
+    MARKS,
+    MISSING,
+    NAMES_IN_ROWS,
+    WITH_UNIT,
+    LoggerTable,
+    bare_unit,
+    date_and_clock,
+    is_data,
+    is_time,
+    name_and_unit,
+)
 
 LOST = 0.2
 """Largest share of the rows without a number in a column."""
 SOME, COARSE = 0.02, 0.2
 """Shares of rows with the time of the row before: from which on a clock may be coarse, and from which on it is."""
-WRAPS = tuple(2.0**bits for bits in range(10, 33))
+WRAPS = tuple(sorted([2.0**bits for bits in range(10, 33)] + [10.0**digits for digits in range(3, 10)]))
 """Sizes of counters that begin anew."""
-LEAST_OF_CLOCKS = 2.0**16
-"""Least size of the counter of a clock."""
+LEAST_OF_CLOCKS, PERIODS = 2.0**16, (60.0, 3600.0, 86400.0, 604800.0)
+"""Least size of the counter of a clock, and the times after which seconds of a minute, an hour, a day or a week begin
+anew [s]."""
 LEFT_OUT = 0.01
 """Largest share of numbers without a decimal sign from which it was left out."""
 _OVERLOAD = 9.8e37
 """A meter in overload, by IEEE 488.2, gives 9.9e37."""
 _BOOLEANS = {
     word: float(k)
-    for k, column in enumerate(("false off no low falsch aus nein", "true on yes high wahr ein ja"))
+    for k, column in enumerate(
+        ("false f off no n low falsch aus nein faux inactive", "true t on yes y high wahr ein ja vrai active")
+    )
     for word in column.split()
 }
 _FRACTIONS = {"ms": 1e-3, "msec": 1e-3, "millis": 1e-3, "us": 1e-6, "usec": 1e-6, "µs": 1e-6, "ns": 1e-9} | {
     f"{prefix}{word}": factor
     for prefix, factor in (("milli", 1e-3), ("micro", 1e-6), ("nano", 1e-9))
-    for word in ("second", "seconds", "sekunden")
-}
+    for word in ("second", "seconds", "sekunden", "tm", "s", "")
+} | dict.fromkeys(("fraction", "fractional", "subsecond", "subseconds", "subsec"), 1.0)  # fmt: skip
 _DAY = 86400.0
 _EPOCHS = (("s", 1e9, 3e9), ("ms", 1e12, 3e12), ("µs", 1e15, 3e15), ("ns", 1e18, 3e18))
 """By unit, the numbers of the years 2001 to 2065 since 1970."""
 _SIGN = re.compile(r"^([+-]) +(?=\d)", re.MULTILINE)
-_OF_FORTRAN = re.compile(r"(?<=[\d.,])D(?=[+-]\d)")
+_OF_FORTRAN = re.compile(r"(?<=[\d.,])[dD](?=[+-]\d)")
+_OF_ACCOUNTS = re.compile(r"^(?:\(([\d.,' ]+)\)|([\d.,' ]+)-)$", re.MULTILINE)
+"""Negative numbers in parentheses, or with their sign behind."""
+_ABSENT = re.compile(
+    r"^[+-]?(?:9{4,}(?:\.[09]*)?|[67]999(?:\.0*)?|32768|1(?:\.0*)?e\+?3\d)$", re.MULTILINE | re.IGNORECASE
+)
+"""Numbers in place of a missing measurement, if all others are far smaller."""
+_HALF = re.compile(r"[AaPp]\.?[Mm]\.?")
+"""The half of a day of a clock of 12 hours."""
+_NAN = "nan"
 _BLANKS = " '’\u00a0\u2009\u202f"
 _GROUP = re.compile(rf"(?<=\d)[{_BLANKS}](?=\d{{3}}(?!\d))")
 
 
-def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: bool = False) -> Any:
+def numbers(table: LoggerTable, place: int, others: frozenset[str], quantity: str = "") -> Any:
     """The numbers of a column, NaN where a cell has none.
 
     Parameters
     ----------
     others : the decimal signs that other columns show
-    boolean : whether words such as "on" are numbers
+    quantity : its quantity; a mark may be a word, such as "on"
 
     Raises
     ------
@@ -62,25 +85,53 @@ def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: boo
     try:
         values = list(map(float, cells))
     except ValueError:
-        values = [_number(cell, boolean) for cell in cells]
+        values = [_number(cell, quantity == "mark") for cell in cells]
     x = np.array(values)
+    if quantity == "mark" and set(x[~np.isnan(x)]) == {1.0}:
+        # passes alone are written
+        x[[not cell for cell in cells]] = 0.0
     for k in map(int, np.flatnonzero(~(np.abs(x) < _OVERLOAD))):
-        cell = table.rows[k][place]
-        if not (MISSING.fullmatch(cell) or math.isfinite(x[k])):
-            refusal = "is no number; delete this row, or write nan for a missing measurement"
-            if with_unit := WITH_UNIT.fullmatch(cell):
-                unit_texts = dict.fromkeys(
-                    match[2] for x in table.column(place) if (match := WITH_UNIT.fullmatch(x))
-                )
-                refusal = "is no number alone, "
-                if len(unit_texts) > 1:
-                    units = ", ".join(unit_texts)
-                    refusal += f"and the units differ ({units}); write all in one, which stands in the head"
-                else:
-                    refusal += f"write [{with_unit[2]}] into the head, and take it out of all cells"
-            raise InputError(f"{table.place_of(k, place)}: {printable(cell, 40)} {refusal}")
+        if not (cells[k] == _NAN or MISSING.fullmatch(table.rows[k][place]) or math.isfinite(x[k])):
+            raise _no_number(table, k, place, quantity, np.isnan(x))
         x[k] = np.nan
     return x
+
+
+def _no_number(table: LoggerTable, row: int, place: int, quantity: str, without: Any) -> InputError:
+    """The refusal of a cell that is no number, with the remedy for its column; some rows are `without` a number."""
+    cells, unit = table.column(place), table.units[place]
+    texts = [cells[k] for k in np.flatnonzero(without) if not MISSING.fullmatch(cells[k])]
+    remedy = "delete this row, or write nan for a missing measurement"
+    if quantity == "mark":
+        remedy = "write 0 and 1, off and on, or false and true"
+    elif without[row] and WITH_UNIT.fullmatch(cells[row]):
+        cell_units = list(dict.fromkeys(match[2] for text in texts if (match := WITH_UNIT.fullmatch(text))))
+        if any(not _fits(text, unit) for text in cell_units):
+            wanted = f"in the unit of the head, {unit}" if unit else "in one unit, which stands in the head"
+            remedy = f"write all numbers of this column in full, {wanted}"
+        elif len(cell_units) > 1:
+            remedy = (
+                f"and the units differ ({', '.join(cell_units)}); write all in one, which stands in the head"
+            )
+        else:
+            remedy = f"write [{cell_units[0]}] into the head, and take it out of all cells"
+        remedy = f"alone, {remedy}"
+    elif len(texts) > LOST * len(cells) and quantity == "time":
+        remedy = "and no time that can be read; write it as 2023-06-19 23:59:40.024, or in seconds"
+    elif len(texts) > LOST * len(cells):
+        remedy = "as in most rows; write numbers, or give the column another head, so that it is left out"
+    joint = " " if remedy.startswith(("alone", "and", "as")) else "; "
+    return InputError(
+        f"{table.place_of(row, place)}: {printable(cells[row], 40)} is no number{joint}{remedy}"
+    )
+
+
+def _fits(text: str, unit: str) -> bool:
+    """Whether the unit in a cell can be that of a column, whose head may have a `unit`."""
+    try:
+        return dimension(bare_unit(text)) == dimension(unit or bare_unit(text))
+    except ValueError:
+        return False
 
 
 def _number(cell: str, boolean: bool) -> float:
@@ -108,8 +159,9 @@ def decimal_signs(cells: Sequence[str]) -> frozenset[str]:
     """The signs that cells certainly have as decimal ones, also behind the seconds of a clock."""
     text = "\n".join(cells)
     signs = {sign for sign, (decimal, _, _) in _SHAPES.items() if sign in text and decimal.search(text)}
-    if clock := re.search(r":\d\d([.,])\d+(?: ?[AaPp]\.?[Mm]\.?)?$", text, re.MULTILINE):
-        signs.add(clock[1])
+    # a clock may have a point also where numbers have decimal commas
+    if re.search(r":\d\d,\d+(?: ?[AaPp]\.?[Mm]\.?)?$", text, re.MULTILINE):
+        signs.add(",")
     return frozenset(signs)
 
 
@@ -119,8 +171,10 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     text = "\n".join(table.column(place)).replace("_", "?")
     if " " in text:
         text = _SIGN.sub(r"\1", text)
-    if "D" in text:
+    if "D" in text or "d" in text:
         text = _OF_FORTRAN.sub("e", text)
+    if len(_OF_ACCOUNTS.findall(text)) > max(1.0, LEFT_OUT * len(table.rows)):
+        text = _OF_ACCOUNTS.sub(r"-\1\2", text)
     if (
         any(sign in text for sign in _BLANKS)
         and _GROUP.search(text)
@@ -146,10 +200,19 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     decimal = next(iter(decimals), "")
     if grouped:
         text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
-    plain = (text.replace(",", ".") if decimal == "," else text).split("\n")
+    text = text.replace(",", ".") if decimal == "," else text
+    plain = _without_absent(text.split("\n")) if _ABSENT.search(text) else text.split("\n")
     _refuse_left_out(table, place, plain)
     _refuse_added(table, place, plain)
     return plain
+
+
+def _without_absent(cells: list[str]) -> list[str]:
+    """The cells with nan in place of the numbers of a missing measurement."""
+    absent = {k: abs(_number(cell, False)) for k, cell in enumerate(cells) if _ABSENT.match(cell)}
+    others = (abs(_number(cell, False)) for k, cell in enumerate(cells) if k not in absent)
+    largest = max((x for x in others if x < _OVERLOAD), default=math.inf)
+    return [_NAN if absent.get(k, 0.0) > 2.0 * largest else cell for k, cell in enumerate(cells)]
 
 
 def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> None:
@@ -234,6 +297,7 @@ def time_places(table: LoggerTable, place: int | None) -> list[int]:
     if place is None and len(kinds) != 1 + len(more):
         return []
     places = [first, *more[:1]]
+    places += [k for k in range(len(table.heads)) if _is_half(table, k)][:1]
     cells = (date_and_clock(table.rows[0][k]) for k in places)
     if any(cell and cell[1] and cell[1]["s"] and not cell[1]["f"] for cell in cells):
         places += [k for k in range(len(table.heads)) if _fraction(table, k)][:1]
@@ -256,11 +320,18 @@ def _kind(table: LoggerTable, place: int) -> str:
     return "clock" if not first[0] else "both" if first[1] else "date"
 
 
+def _is_half(table: LoggerTable, place: int) -> bool:
+    """Whether a column has the halves of a day of a clock of 12 hours."""
+    return all(_HALF.fullmatch(row[place]) for row in table.rows[:20])
+
+
 def _fraction(table: LoggerTable, place: int) -> float:
     """The unit of a column with parts of a second beside a clock [s]; 0 for another column."""
-    factor = _FRACTIONS.get(name_and_unit(table.heads[place])[0].lower(), 0.0)
+    words = re.split(r"[\s_\[\]()]+", table.heads[place].lower().replace("sub-", "sub"))
+    factor = next((_FRACTIONS[word] for word in words if word in _FRACTIONS), 0.0)
     cells = table.column(place) if factor else []
-    return factor if cells and all(cell.isdigit() and int(cell) * factor < 1.0 for cell in cells) else 0.0
+    part = re.compile(r"0?\.\d+|0" if factor == 1.0 else r"\d+")
+    return factor if cells and all(part.fullmatch(x) and factor * float(x) < 1.0 for x in cells) else 0.0
 
 
 _PARTS = ("hour", "minute", "second", "day", "month", "year")
@@ -288,9 +359,10 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
     elif len(places) > 1:
         time, source = _of_parts(table, places, others)
     else:
-        x = numbers(table, places[0], others)
+        x = numbers(table, places[0], others, "time")
         factor, source = _unit_of_time(table, head, table.units[places[0]], x)
-        x, wraps = unwrapped(x, LEAST_OF_CLOCKS)
+        sizes = [size for size in WRAPS if size >= LEAST_OF_CLOCKS]
+        x, wraps = unwrapped(x, sorted([*sizes, *(period / factor for period in PERIODS)]))
         time = x * factor
         if wraps:
             source += f" (the counter begins anew {wraps} {'time' if wraps == 1 else 'times'})"
@@ -332,21 +404,24 @@ def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str])
 def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     """The times from the first row on, by dates and times of the day."""
     seconds, days = np.full(len(table.rows), np.nan), list[str]()
-    short, has_fraction, hours, zones = False, False, set[int](), set[str]()
+    short, has_fraction, hours, zones, widths = False, False, set[int](), set[str](), set[int]()
+    half = next((place for place in places if _is_half(table, place)), -1)
     beside = {place: factor for place in places if (factor := _fraction(table, place))}
-    places = [place for place in places if place not in beside]
+    places = [place for place in places if place not in beside and place != half]
     shape = (False, False, False)
     for k, row in enumerate(table.rows):
-        parts = [date_and_clock(row[place]) for place in places]
-        day = "".join(part[0] for part in parts if part)
+        # a date may stand only where it changes
+        parts = [date_and_clock(row[place]) for place in places if row[place] or not any(days)]
+        day = "".join(part[0] for part in parts if part) or (days[-1] if len(parts) < len(places) else "")
         clock = next((part[1] for part in parts if part and part[1]), None)
         row_shape = bool(day), clock is not None, clock is not None and clock["s"] is None
         shape = row_shape if k == 0 else shape
         days.append(day or (days[-1] if days else ""))
-        if None in parts and all(MISSING.fullmatch(row[place]) for place in places):
+        if (None in parts or not parts) and all(MISSING.fullmatch(row[place]) for place in places):
             continue
         if (
             None in parts
+            or (half >= 0 and not _HALF.fullmatch(row[half]))
             or row_shape != shape
             or (clock and (int(clock["m"]) > 59 or int(clock["s"] or 0) > 60))
         ):
@@ -364,8 +439,14 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
                     f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and does not resolve the rows; write "
                     "hh:mm:ss.fff"
                 )
-        if clock["half"]:
-            h = h % 12 + 12 * (clock["half"] in "pP")
+        if clock["f"] and len(clock["f"]) < 3 and clock[0][clock.start("f") - clock.start() - 1] == ":":
+            raise InputError(
+                f"{table.place_of(k, places[0])}: {printable(clock[0], 40)} may end with hundredths, with frames or "
+                "with ms; write hh:mm:ss.fff"
+            )
+        if letter := clock["half"] or (row[half][0] if half >= 0 else ""):
+            h = h % 12 + 12 * (letter in "pP")
+        widths.add(len(clock["f"] or ""))
         hours.add(h)
         zones.add((clock["zone"] or "").strip())
         passed = int(clock["days"] or clock["span"] or 0)
@@ -380,7 +461,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
         zone = next(iter(zones), "")
-        count = len(places) + len(beside)
+        count = len(places) + len(beside) + (half >= 0)
         source = f"time from {count} columns" if count > 1 else "time from dates and clock"
         source += f", from {days[0]} on, as 0 s" + (f" ({zone})" if zone else "")
     else:
@@ -393,7 +474,14 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         source = "time from a clock, the first row as 0 s"
         if not np.array_equal(before, seconds, equal_nan=True):
             source += f", over {'the full hour' if short else 'midnight'}"
-    return seconds - seconds[np.flatnonzero(np.isfinite(seconds))[0]], source
+    has_time = np.isfinite(seconds)
+    steps = np.diff(seconds[has_time])
+    if len(widths) > 1 and np.any(steps < 0.0) and np.any(steps > 0.0):
+        raise InputError(
+            f"{table.file}, column {table.heads[places[0]]}: has parts of a second of {min(widths)} to {max(widths)} "
+            "digits, and the times run backwards; write ms with zeros before them, such as .024, or sort the rows"
+        )
+    return seconds - seconds[np.flatnonzero(has_time)[0]], source
 
 
 def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:
@@ -405,9 +493,10 @@ def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:
 
 
 def _over_midnight(seconds: Any, period: float) -> Any:
-    """Times of a clock that begins anew after a `period` [s]: it falls by most of it."""
-    falls = np.diff(seconds, prepend=seconds[:1]) < -0.9 * period
-    return seconds + period * np.cumsum(falls)
+    """Times of a clock that begins anew after a `period` [s]: it falls by most of it; if it rises by most of it, rows
+    are swapped."""
+    steps = np.diff(seconds, prepend=seconds[:1]) / period
+    return seconds + period * np.cumsum((steps < -0.9).astype(int) - (steps > 0.9))
 
 
 def _day_numbers(table: LoggerTable, days: Sequence[str], place: int) -> list[float]:
@@ -453,7 +542,7 @@ def _ordinal(day: str, order: str) -> int:
     return date(y if y > 99 else 2000 + y, m, d).toordinal()
 
 
-def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
+def unwrapped(x: Any, sizes: Sequence[float] = WRAPS) -> tuple[Any, int]:
     """A counter without the falls at which it begins anew, and their number: it falls by nearly the size of a
     counter, and goes on as before."""
     steps = np.diff(x)
@@ -462,8 +551,8 @@ def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
     if not len(falls) or len(falls) > 0.2 * len(steps) or not len(rising):
         return x, 0
     largest = 5.0 * float(np.median(rising))
-    for size in (wrap for wrap in WRAPS if wrap >= least):
-        inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
+    for size in sizes:
+        inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size and np.nanmax(steps) < 0.5 * size
         if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= largest)):
             return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
     return x, 0
@@ -484,8 +573,11 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
         t = t - t[0]
     steps = np.diff(t)
     back = np.flatnonzero(steps < 0.0)
+    _refuse_names(table, has_time, np.flatnonzero(steps <= 0.0))
     if len(back):
         remedy = "delete the rows before this line, or those from it on"
+        if len(back) > SOME * len(steps):
+            remedy = f"the times run backwards at {len(back)} rows: sort the rows by time"
         raise _not_later(table, int(has_time[back[0] + 1]), t[back[0] : back[0] + 2], remedy)
     still = np.flatnonzero(steps == 0.0)
     rows = [table.rows[k] for k in has_time] if len(still) else []
@@ -505,6 +597,19 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
         remarks.append(f"{len(still)} doubled rows left out")
         has_time, t = has_time[keep], t[keep]
     return Times(t, has_time, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
+
+
+def _refuse_names(table: LoggerTable, rows: Any, places: Any) -> None:
+    """Refuse a table in which another name stands in each row whose time does not go on."""
+    for k, cell in enumerate(table.rows[rows[0]] if len(places) else []):
+        if is_data(cell) or MISSING.fullmatch(cell):
+            continue
+        names = [(table.rows[rows[i]][k], table.rows[rows[i + 1]][k]) for i in places]
+        if all(first != second for first, second in names):
+            raise InputError(
+                f"{table.file}, column {table.heads[k]}: changes from {printable(names[0][0], 40)} to "
+                f"{printable(names[0][1], 40)} at one time; {NAMES_IN_ROWS}"
+            )
 
 
 def _not_later(table: LoggerTable, row: int, pair: Any, remedy: str) -> InputError:
@@ -528,7 +633,7 @@ def _even(t: Any) -> Any:
         return None
     even = np.polynomial.Polynomial.fit(ticks, t[ticks], 1)(np.arange(len(t)))
     step, tick = float(even[1] - even[0]), float(np.median(np.diff(t[ticks])))
-    is_near = step > 0.0 and np.max(np.abs(even[ticks] - t[ticks])) <= max(tick, step)
+    is_near = step > 0.0 and np.max(np.abs(even[ticks] - t[ticks])) <= max(step, min(tick, 3.0 * step))
     # the clock goes on up to one row before, by half a row on average
     return even + 0.5 * step if is_near else None
 

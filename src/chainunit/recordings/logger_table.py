@@ -20,13 +20,16 @@ MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", "  ": "bla
 the first counts."""
 MISSING = re.compile(
     r"|[+-]?(?:nan|1\.#\w+)|n/?a|none|null|[+-]?(?:ol|0l|over(?:load|flow|range|flw)?|inf(?:inity)?)|-+|\*+|\?+|#+"
-    r"|#(?:n/a|value!|div/0!|num!|ref!|null!|wert!|nv)|err(?:or)?|invalid|nodata|bad|---?\.-*",
+    r"|#(?:n/a|value!|div/0!|num!|ref!|null!|wert!|nv)|err(?:or)?|invalid|bad|---?\.-*|\++|n\.a\.|[<(]null[>)]|o\.l\.?"
+    r"|ovld|ovfl|under(?:load|flow|range)?|burn-?out|open|undefined|fault|time-?out|no[ _-]?(?:data|signal|value)"
+    r"|(?:out[ _]of|over)[ _]range|bad[ _](?:input|value|data)|comm?[ _](?:fail|err)(?:ure|or)?",
     re.IGNORECASE,
 )
 """Cells without a measurement, and of a meter whose range is exceeded."""
 CLOCK = re.compile(
-    r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?(?P<h>\d{1,3}):(?P<m>\d{2})(?::(?P<s>\d{2}))?"
-    r"(?:[.,:](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
+    r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?"
+    r"(?P<h>\d{1,3}):(?P<m>\d{2}|\d(?=:))(?::(?P<s>\d{1,2}))?(?:[.,:](?P<f>\d+))?"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
 )
 """A time of the day, or one that has passed, such as 23:59:40.024, 11:59:40 PM, 59:40.0 and 0 days 00:00:00.024."""
 DATE = re.compile(
@@ -34,21 +37,29 @@ DATE = re.compile(
     r"|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
 )
 _COMPACT = re.compile(r"(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)(?=\D|$)")
-_NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eED][+-]?\d+)?")
+_NUMBER = re.compile(
+    r"[+-]?\s*(?:\d+(?:[.,' \u00a0\u2009\u202f’]\d{3})*(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?"
+)
 WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
 _REMARK = re.compile(r"\s#(?!N/A|NV|VALUE|DIV|NUM|REF|NULL|WERT).*$", re.IGNORECASE)
-_SAMPLE, _FOOTER, _ABOVE, _LONGEST = 400, 50, 12, 50_000
-"""Lines by which mark and head are found, most lines of a footer, most lines above the rows that may be heads, and
-most characters of a line."""
+_SAMPLE, _FOOTER, _ABOVE, _PREAMBLE, _LONGEST = 400, 50, 12, 5000, 50_000
+"""Lines by which mark and head are found, most lines of a footer, most lines above the rows that may be heads, most
+lines above the head, and most characters of a line."""
 _WORDS = {
     "volts": "V", "amps": "A", "amperes": "A", "watts": "W", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "µs", "microseconds": "µs", "sek": "s", "secs": "s", "sekunden": "s", "newton meter": "N m",
     "newton-meter": "N m", "n-m": "N m", "lb-ft": "lbf ft", "lbf-ft": "lbf ft", "ft-lb": "lbf ft", "ft-lbf": "lbf ft",
-    "lb ft": "lbf ft", "ft lb": "lbf ft", "rev per min": "rev/min", "rpm": "rpm",
+    "lb ft": "lbf ft", "ft lb": "lbf ft", "ft lbs": "lbf ft", "ft-lbs": "lbf ft", "in lb": "lbf in",
+    "in-lb": "lbf in", "in lbs": "lbf in", "in-lbs": "lbf in", "in-lbf": "lbf in", "lb in": "lbf in",
+    "lb-in": "lbf in", "lbf-in": "lbf in",
+    "newtonmeter": "N m", "newton-metre": "N m", "rev per min": "rev/min", "rpm": "rpm", "upm": "rev/min",
+    "tr/min": "rev/min", "umdr./min": "rev/min", "rps": "rev/s", "dps": "deg/s", "sek.": "s",
 }  # fmt: skip
 """Units as loggers write them, and as `chainunit.core.units` reads them."""
+NAMES_IN_ROWS = "a table with the name of the quantity in each row needs a column for each quantity instead"
+"""The remedy for a table that has the quantities below one another."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +78,11 @@ class LoggerTable:
     def column(self, place: int) -> list[str]:
         """The cells of a column."""
         return [cells[place] for cells in self.rows]
+
+    def has_numbers(self, place: int) -> bool:
+        """Whether the first row of a column has a number, and no time."""
+        cell = self.rows[0][place]
+        return is_data(cell) and not is_time(cell)
 
     def place_of(self, row: int, place: int) -> str:
         """The file, line, column and head of a cell, in words."""
@@ -89,34 +105,41 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
     stated = re.fullmatch(r'"?sep=(.)"?', lines[0][1].strip("\r\n"))
     lines = lines[1:] if stated else lines
-    sample = [numbered for numbered in lines[: 2 * _SAMPLE] if numbered[1].strip()]
+    names = list(names)
+    likely = _likely_head(lines[:_PREAMBLE], names)
+    sample = [numbered for numbered in lines[likely : likely + 2 * _SAMPLE] if numbered[1].strip()]
     longest = max((len(line) for _, line in sample), default=1)
     sample = sample[: max(20, min(_SAMPLE, _SAMPLE * 1000 // longest))]
     mark = stated[1] if stated and stated[1] in MARKS else _mark_of([line for _, line in sample])
-    begin = _first_row(sample, mark)
+    begin, filled = _first_row(sample, mark)
     if begin < 0:
         raise InputError(
             f"{file}: is no table: its first line must be the heads of the columns, such as time [s],motor.i [A], "
-            "and the next ones must have a number for each of them"
+            "and the next ones must have a number for each of them, with commas, semicolons, tabs, bars or blanks "
+            "between them"
         )
-    names = list(names)
     first = cells_of_line(sample[begin][1], mark)
     head, heads = _head_of(file, sample[:begin], first, mark, names)
     while not heads[-1]:
         heads.pop()
+    # no tab stands in a head, and some writers have a head for remarks of which no row has a cell
+    unfilled = heads[len(first) :] if mark == "\t" else []
+    heads = heads[: len(heads) - len(unfilled)]
     if len(first) < len(heads):
         raise InputError(
             f"{file}, line {sample[head][0]}: the head has {len(heads)} cells, and the rows {len(first)}: put a head "
             f"with {MARKS[mark]} in it into quotation marks, or add the cells that are missing"
         )
-    rows_of_units = [cells_of_line(line, mark) for _, line in sample[head + 1 : begin]]
-    units = next((row for row in rows_of_units if _is_of_units(row, len(heads))), [])
+    below = [cells_of_line(line, mark) for _, line in sample[head + 1 : begin]]
+    units = next((row for row in below if _is_of_units(row, len(heads))), [])
     named = [name_and_unit(head_cell, names) for head_cell in heads]
     units = [unit or bare_unit(units[k]) if k < len(units) else unit for k, (_, unit) in enumerate(named)]
     start = next(k for k, (number, _) in enumerate(lines) if number == sample[begin][0])
-    rows, numbers, left_out = _body(file, lines[start:], mark, heads, first)
-    if head > 0:
-        left_out.insert(0, f"{head} {'line' if head == 1 else 'lines'} before the head")
+    rows, numbers, left_out = _body(file, lines[start:], mark, [heads, *below], filled, first)
+    if unfilled:
+        left_out.append(f"the head {printable(', '.join(unfilled))} without cells")
+    if (above := head + likely) > 0:
+        left_out.insert(0, f"{above} {'line' if above == 1 else 'lines'} before the head")
     if len(rows) < FEWEST:
         raise InputError(f"{file}: has {len(rows)} rows behind its head; must have >= {FEWEST}")
     return LoggerTable(file, mark, heads, units, rows, numbers, left_out)
@@ -175,7 +198,7 @@ def _unit_behind(rest: str) -> str:
 
 def bare_unit(text: str) -> str:
     """A unit without brackets, as `chainunit.core.units` reads it."""
-    text = text.strip().strip("[](){}<>").strip()
+    text = re.sub("[·∙•⋅*]", " ", text.strip().strip("[](){}<>").strip())
     return _WORDS.get(text.lower(), text)
 
 
@@ -214,37 +237,51 @@ def cells_of_line(line: str, mark: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])]
 
 
-def _is_data(cell: str) -> bool:
+def is_data(cell: str) -> bool:
+    """Whether a cell has a number, with a unit or without one, or a time."""
     return bool(_NUMBER.fullmatch(cell) or WITH_UNIT.fullmatch(cell)) or is_time(cell)
 
 
 def _is_row(cells: Sequence[str]) -> bool:
     """Whether cells are those of a row of measurements: at least half of those that are not empty."""
     filled = [cell for cell in cells if not MISSING.fullmatch(cell)]
-    return len(cells) > 1 and 2 * sum(map(_is_data, filled)) >= max(1, len(filled))
+    return len(cells) > 1 and 2 * sum(map(is_data, filled)) >= max(1, len(filled))
+
+
+def _likely_head(lines: Sequence[tuple[int, str]], names: Iterable[str]) -> int:
+    """The place of the first line with two of the `names`, and at least half as many as another line; 0 without one.
+    Tables of channels and settings stand above it."""
+    lower = [name.lower() for name in names]
+    counts = [sum(name in text for name in lower) for text in (line.lower() for _, line in lines)]
+    return next((k for k, count in enumerate(counts) if count >= max(2.0, 0.5 * max(counts))), 0)
 
 
 def _mark_of(lines: Sequence[str]) -> str:
-    """The mark with which most lines are rows of one length."""
+    """The mark with which most lines of the latter half are rows of one length: above the head, and below the rows,
+    marks may stand within cells."""
 
     def fitting(mark: str) -> int:
-        counts = Counter(len(row) for line in lines if _is_row(row := cells_of_line(line, mark)))
+        counts = Counter(
+            len(row) for line in lines[len(lines) // 2 :] if _is_row(row := cells_of_line(line, mark))
+        )
         return max(counts.values(), default=0)
 
-    return max(MARKS, key=fitting)
+    counts = {mark: fitting(mark) for mark in MARKS}
+    return next(mark for mark in MARKS if counts[mark] >= 0.95 * max(counts.values()))
 
 
-def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> int:
-    """The place of the first row of measurements, which has data where most rows have them; -1 without one."""
+def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> tuple[int, tuple[bool, ...]]:
+    """The place of the first row of measurements, which has data where most rows have them, and where these are; -1
+    without one."""
     rows = [cells_of_line(line, mark) for _, line in sample]
     shapes = [
-        tuple(map(_is_data, row)) if _is_row(row) and not row[0].startswith(_COMMENTS) else () for row in rows
+        tuple(map(is_data, row)) if _is_row(row) and not row[0].startswith(_COMMENTS) else () for row in rows
     ]
     usual = Counter(shape for shape in shapes if shape).most_common(1)
     if not usual:
-        return -1
+        return -1, ()
     wanted = usual[0][0]
-    return next(
+    place = next(
         k
         for k, (row, shape) in enumerate(zip(rows, shapes, strict=True))
         if len(shape) == len(wanted)
@@ -253,6 +290,7 @@ def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> int:
             for cell, has, needs in zip(row, shape, wanted, strict=True)
         )
     )
+    return place, wanted
 
 
 def _head_of(
@@ -276,10 +314,8 @@ def _head_of(
             best, place, heads = matching, k, cells
     if not heads:
         more = ""
-        if any(not _is_data(cell) for cell in first) and any(map(is_time, first)):
-            more = (
-                "; a table with the name of the quantity in each row needs a column for each quantity instead"
-            )
+        if any(not is_data(cell) for cell in first) and any(map(is_time, first)):
+            more = f"; {NAMES_IN_ROWS}"
         raise InputError(
             f"{file}: has no head: its first row has values; write the heads of the columns into a line above it, "
             f"such as time [s],motor.i [A]{more}"
@@ -302,11 +338,18 @@ def _is_of_units(cells: Sequence[str], count: int) -> bool:
 
 
 def _body(
-    file: Path, lines: Sequence[tuple[int, str]], mark: str, heads: Sequence[str], first: Sequence[str]
+    file: Path,
+    lines: Sequence[tuple[int, str]],
+    mark: str,
+    above: Sequence[Sequence[str]],
+    filled: Sequence[bool],
+    first: Sequence[str],
 ) -> tuple[list[list[str]], list[int], list[str]]:
-    """The rows of measurements, the numbers of their lines, and what was left out, in words."""
+    """The rows of measurements, the numbers of their lines, and what was left out, in words. The lines `above` the
+    `first` row, from the head on, may be repeated on each page; most rows have data where they are `filled`."""
+    heads, pages = above[0], {tuple(map(str.lower, cells)) for cells in above}
     width = len(heads)
-    key = next((k for k, cell in enumerate(first[:width]) if _is_data(cell)), -1)
+    key = next((k for k, is_filled in enumerate(filled[:width]) if is_filled), -1)
     if key < 0:
         raise InputError(f"{file}: no column with numbers has a head; write a head for each column")
     # a date and a clock between blanks are one cell under one head
@@ -327,10 +370,14 @@ def _body(
                 cells, remarks = cut, remarks + 1
             if len(cells) > width and not any(cells[width:]):
                 cells = cells[:width]
-            if [cell.lower() for cell in cells] == [cell.lower() for cell in heads]:
+            if tuple(map(str.lower, cells)) in pages:
                 repeated += 1
+                # the title of the page
+                while strange and (not rows or strange[-1][0] > numbers[-1]):
+                    strange.pop()
+                    repeated += 1
                 continue
-            if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
+            if len(cells) != width or not (is_data(cells[key]) or MISSING.fullmatch(cells[key])):
                 strange.append((number, cells))
                 continue
         elif "#" in cells[-1] and (last := _REMARK.sub("", f" {cells[-1]}").strip()) != cells[-1]:
@@ -345,8 +392,8 @@ def _body(
     if strange and (wrong or len(strange) > _FOOTER or not rows):
         number, cells = (wrong or strange)[0]
         raise InputError(f"{file}, line {number}: {_words(cells, heads, mark)}")
-    counts = ((repeated, "repeated head"), (remarks, "comment"))
-    left_out = [f"{count} {noun}{'s' if count > 1 else ''}" for count, noun in counts if count]
+    counts = ((repeated, "line", " of repeated heads"), (remarks, "comment", ""))
+    left_out = [f"{count} {noun}{'s' if count > 1 else ''}{more}" for count, noun, more in counts if count]
     if strange:
         noun, verb = ("line", "is no row") if len(strange) == 1 else ("lines", "are no rows")
         left_out.append(f"{len(strange)} {noun} at the end that {verb}")
@@ -356,7 +403,7 @@ def _body(
 def _may_end(cells: Sequence[str], key: int, width: int, is_last: bool) -> bool:
     """Whether a line that is no row may stand below all rows: a footer, without a number in the column `key`, or the
     last row, which is cut."""
-    has_number = key < len(cells) and _is_data(cells[key])
+    has_number = key < len(cells) and is_data(cells[key])
     return not has_number or (is_last and len(cells) < width)
 
 
@@ -386,8 +433,9 @@ def _words(cells: Sequence[str], heads: Sequence[str], mark: str) -> str:
     if len(cells) > len(heads):
         if mark == ",":
             return (
-                f"{count}: a comma stands within a number or a text; put semicolons between the columns, write "
-                "decimal points, or put the cell in quotation marks"
+                f"{count}: a comma stands within a number or a text, or a head is missing; put semicolons between "
+                "the columns, write decimal points, put the cell in quotation marks, or, if no number has a comma, "
+                "write a head for each column"
             )
         return (
             f"{count}: {MARKS[mark]} stand within a cell, or a head is missing; put the cell in quotation marks, or "

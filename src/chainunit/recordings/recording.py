@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,10 @@ import numpy as np
 from ..core.brief import briefly_shown
 from ..core.errors import Faults, InputError, meant, near_name, printable
 from ..core.inputs import decoded_by_marks, file_bytes, unzipped
-from ..core.units import must_be, of_other_kind, scale
+from ..core.units import of_other_kind, scale, with_units
+from ..drives.dc_motor import DcMotor
+from ..drives.induction_motor import InductionMotor
+from ..drives.motor import Motor
 from .logger_columns import (
     decimal_signs,
     decimal_words,
@@ -103,18 +107,21 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     def others(place: int) -> frozenset[str]:
         return frozenset[str]().union(*(shown for other, shown in signs.items() if other != place))
 
-    if not time_from:
+    if not time_from and not any(_is_named(head, names.get("time", "time")) for head in table.heads):
         text = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
-        faults.add(
-            [InputError(f"{file}: has no column time [s]{text}{remedy('time', table.heads)}, or add it")]
-        )
+        may_be = [k for k, unit in enumerate(table.units) if not (unit and of_other_kind(unit, "s"))]
+        may_be = [k for k in {*may_be} - {*places.values()} if table.has_numbers(k) or has_times(table, k)]
+        may_be.sort(key=lambda k: (not has_times(table, k), "time" not in table.heads[k].lower()))
+        text += f"{remedy('time', [table.heads[k] for k in may_be])}{', or' if may_be else ';'} add it"
+        faults.add([InputError(f"{file}: has no column time [s]{text}")])
     if not places:
         text = ", ".join(
             f"{measurand.name} [{measurand.unit}]"
             for measurand in MEASURANDS.values()
             if measurand.name != "time"
         )
-        text += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
+        likely = [head for k, head in enumerate(table.heads) if k not in time_from and table.has_numbers(k)]
+        text += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', (likely or table.heads)[::-1])}"
         faults.add([InputError(f"{file}: has no column of a known quantity, such as {text}")])
     with faults.collected():
         if len(time_from) == 1 and table.units[time_from[0]] and not has_times(table, time_from[0]):
@@ -122,17 +129,22 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         times = times_of(table, time_from, others(time_from[0])) if time_from else None
     faults.refuse()
     assert times is not None
-    raw = {place: numbers(table, place, others(place), name == "mark") for name, place in places.items()}
+    raw = {place: numbers(table, place, others(place), name) for name, place in places.items()}
     whole, lost = lost_rows(table, {time_from[0]: times.missing, **raw})
     kept = whole[times.kept]
     rows = times.kept[kept]
-    columns, remarks = _quantities(
-        {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in places.items()}
-    )
+    if "mark" in places:
+        raw[places["mark"]] = _in_next_row(raw[places["mark"]], whole, rows)
+    scaled = {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in places.items()}
+    _refuse_phases(table, places, scaled)
+    columns, remarks = _quantities(scaled)
     used = {*time_from, *places.values()}
     rate = f"{len(rows):,} rows, {1.0 / float(np.median(np.diff(times.time[kept]))):.4g} Hz"
     parts = [times.source, decimal_words(table, others(-1), places.values()), rate, *times.remarks, *remarks]
+    unused = [head for place, head in enumerate(table.heads) if head and place not in used]
     left_out = [*table.left_out, *lost]
+    if unused:
+        left_out.append(f"the column{'s' * (len(unused) > 1)} {printable(', '.join(unused), 80)}")
     heads = {name: table.heads[place] for name, place in places.items()} | {"time": table.heads[time_from[0]]}
     if "motor.i" in columns and "motor.i" not in heads:
         heads["motor.i"] = ", ".join(heads[name] for name in PHASES if name in heads)
@@ -141,7 +153,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         times.time[kept],
         columns,
         heads,
-        [head for place, head in enumerate(table.heads) if head and place not in used],
+        unused,
         ", ".join(parts) + (f"; left out: {', '.join(left_out)}" if left_out else ""),
     )
 
@@ -251,6 +263,16 @@ def _is_named(head: str, name: str) -> bool:
     return name_and_unit(head, [name])[0].lower() == name.lower()
 
 
+def _in_next_row(mark: Any, whole: Any, rows: Any) -> Any:
+    """The marks, of which those in rows without a number stand in the next one of the `rows` in time."""
+    order = -1 if rows[0] > rows[-1] else 1
+    lost = np.flatnonzero((mark > 0.5) & ~whole)
+    after = np.searchsorted(order * rows, order * lost)
+    mark = mark.copy()
+    mark[rows[after[after < len(rows)]]] = 1.0
+    return mark
+
+
 _OF_COUNTS = ("", "1", "-", "0/1", "bool", "boolean", "count", "counts", "pulses", "imp", "inc")
 
 
@@ -267,7 +289,7 @@ def _scale(table: LoggerTable, place: int, quantity: Measurand) -> tuple[float, 
         )
     other = of_other_kind(unit, quantity.unit)
     if other:
-        raise InputError(f"{file}, column {head}: {other}; {must_be(quantity.unit)}")
+        raise InputError(f"{file}, column {head}: {other}; must be {with_units(quantity.unit)}")
     try:
         return scale(unit, quantity.unit)
     except ValueError as error:
@@ -281,10 +303,15 @@ def _quantities(columns: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     remarks = list[str]()
     phases = [name for name in PHASES if name in columns]
     quantities = {name: x for name, x in columns.items() if name not in PHASES}
-    if phases and "motor.i" not in columns:
+    if phases and "motor.i" in columns:
+        remarks.append(f"{', '.join(phases)} left out beside motor.i")
+    elif phases:
         currents = [columns[name] for name in phases]
         quantities = {"motor.i": rms_of_phases(currents) if len(phases) > 1 else currents[0], **quantities}
         remarks.append(f"motor.i is {'the RMS of ' if len(phases) > 1 else ''}{', '.join(phases)}")
+    if "mark" in quantities and set(np.unique(quantities["mark"])) == {-1.0, 0.0}:
+        # true in Basic
+        quantities["mark"] = np.abs(quantities["mark"])
     if "motor.count" in quantities:
         quantities["motor.count"], wraps = unwrapped(quantities["motor.count"])
         if wraps:
@@ -293,30 +320,67 @@ def _quantities(columns: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
 
 
 def rms_of_phases(currents: Sequence[Any]) -> Any:
-    """The RMS of a phase by the instantaneous currents of two or three phases, whose sum is zero."""
+    """The RMS of a phase by the instantaneous currents of two or three phases, whose sum is zero, or by RMS values,
+    which are positive."""
+    if len(currents) == 2 and min(map(np.min, currents)) >= 0.0:
+        return np.sqrt(sum(i**2 for i in currents) / 2.0)
     if len(currents) == 2:
         currents = [*currents, -currents[0] - currents[1]]
     return np.sqrt(sum(i**2 for i in currents) / 3.0)
 
 
+def _refuse_phases(table: LoggerTable, places: Mapping[str, int], columns: Mapping[str, Any]) -> None:
+    """Refuse instantaneous currents of two phases that are not a third of a period apart: the sum of the currents is
+    zero."""
+    for first, second in pairwise(name for name in PHASES if name in columns):
+        x, y = (columns[name] - np.mean(columns[name]) for name in (first, second))
+        size = math.sqrt(float(np.mean(x**2) * np.mean(y**2)))
+        likeness = float(np.mean(x * y)) / size if size else -0.5
+        if min(columns[first].min(), columns[second].min()) < 0.0 and not -0.8 < likeness < -0.2:
+            raise InputError(
+                f"{table.file}, columns {table.heads[places[first]]} and {table.heads[places[second]]}: have a "
+                f"correlation of {likeness:.2g}, and currents of two phases have one of -0.5: change the sign of one "
+                "whose sensor is reversed, or name the columns of two phases"
+            )
+
+
 _SUPPLY = (15.0, 1000.0)
 """Range of the frequency of a motor's current [Hz]."""
+BOTH_SIGNS = 0.5
+"""Standard deviations on both sides of zero from which on a current is no RMS with the noise of its sensor."""
 
 
-def with_rms(recording: Recording, turn: float) -> Recording:
+def with_rms(recording: Recording, turn: float, motor: Motor | None = None) -> Recording:
     """A recording of which an instantaneous current of one phase is replaced by its RMS over each period of the
-    supply; `turn` is the time of a turn of the crank [s]. Each period makes a row.
+    supply; `turn` is the time of a turn of the crank [s]. Each period makes a row. The current of a DC `motor` is the
+    one of its armature, which may have both signs.
 
     Raises
     ------
     InputError
-        for a current whose rows do not resolve its periods.
+        for a current whose rows do not resolve its periods, for one of an induction motor that has both signs and no
+        periods, and for the currents of phases of a DC motor.
     """
     current = recording.columns.get("motor.i")
-    if current is None:
+    phases = [name for name in PHASES if name in recording.heads]
+    if motor is DcMotor and phases:
+        raise InputError(
+            f"{recording.source}, column {recording.heads[phases[0]]}: is the current of a phase, and the motor is a "
+            "DcMotor; name the column of the current of its armature motor.i"
+        )
+    if current is None or motor is DcMotor:
         return recording
-    frequency = _alternating(recording.time, current, turn)
+    offset = float(np.mean(current)) if motor is InductionMotor else 0.0
+    frequency = _alternating(recording.time, current - offset, turn)
     if not frequency:
+        least, largest = (float(x) / (float(np.std(current)) or 1.0) for x in (current.min(), current.max()))
+        if motor is InductionMotor and least < -BOTH_SIGNS and largest > BOTH_SIGNS:
+            raise InputError(
+                f"{recording.source}, column {recording.heads['motor.i']}: goes from {current.min():.4g} to "
+                f"{current.max():.4g} A, and the RMS of a phase is positive: the column is an instantaneous current "
+                "whose periods the rows do not resolve; record >= 8 rows in a period of the supply, the currents of "
+                "two phases (motor.ia, motor.ib), or the RMS"
+            )
         return recording
     rows = 1.0 / (frequency * recording.step)
     if rows < 8.0:

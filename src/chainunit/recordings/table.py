@@ -12,6 +12,7 @@ from pydantic import Field
 
 from ..core.errors import InputError, near_name
 from ..core.quantities import Value, declaration, quantity
+from ..drives.motor import Motor
 from ..reading.lists import Entry, leaves
 from ..reading.tables import instance
 from ..study.conditions import given
@@ -64,9 +65,10 @@ class PlannedRecording:
         """Time of a turn of the crank [s]."""
         return 2.0 * math.pi / self.crank_speed
 
-    def read(self) -> Recording:
-        """The part that counts; errors are those of `chainunit.recordings.recording.read_signal`."""
-        return with_rms(read_signal(self.file, self.columns, self.begin, self.end), self.turn)
+    def read(self, motor: Motor | None = None) -> Recording:
+        """The part that counts, of a machine with this kind of `motor`; errors are those of
+        `chainunit.recordings.recording.read_signal` and `with_rms`."""
+        return with_rms(read_signal(self.file, self.columns, self.begin, self.end), self.turn, motor)
 
 
 def recording_rules(table: str) -> Iterator[Rule]:

@@ -41,13 +41,20 @@ class LinkageQuestion(NamedTuple):
     file: str
     unusual: tuple[UnusualValue, ...] = ()
     """values of the file that are of an unusual size"""
+    remarks: tuple[str, ...] = ()
+    """sentences on a linkage from a drawing of another program"""
 
 
 def linkage_report(
-    findings: LinkageFindings, source: str, unusual: tuple[UnusualValue, ...] = ()
+    findings: LinkageFindings,
+    source: str,
+    unusual: tuple[UnusualValue, ...] = (),
+    remarks: tuple[str, ...] = (),
 ) -> b.Report:
-    """The report on a linkage from the file `source`, which has these values of an unusual size."""
-    data, unit = linkage_data(findings, source, unusual), findings.machine.model.driver_port.unit
+    """The report on a linkage from the file `source`, which has these values of an unusual size, and on which there
+    are `remarks`."""
+    data = linkage_data(findings, source, unusual, remarks)
+    unit = findings.machine.model.driver_port.unit
     x = cited(data, unit_of=unit)
     return b.Report(
         data.title,
@@ -78,6 +85,7 @@ def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
 
 def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     yield b.Text(line("The driver gives one degree of freedom: ", x.sentence, "."), central=True)
+    yield from (b.Text(remark, central=True) for remark in x.drawn)
     if x.slips:
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=tuple(x.slips))
     yield from (b.Text(note, "note") for note in x.notes)
@@ -329,15 +337,18 @@ def _variables(f: LinkageFindings) -> Iterator[b.Block]:
             yield b.Given(((title, sections),))
 
 
-TASK: Task[LinkageQuestion, tuple[LinkageFindings, str, tuple[UnusualValue, ...]]] = Task(
+LinkageOutcome = tuple[LinkageFindings, str, tuple[UnusualValue, ...], tuple[str, ...]]
+TASK: Task[LinkageQuestion, LinkageOutcome] = Task(
     "linkage",
     lambda question, folder, progress: (
         linkage_findings(question.machine, question.speed),
         question.file,
         question.unusual,
+        question.remarks,
     ),
     lambda outcome: linkage_report(*outcome),
     files=PICTURES,
     accept=no_check,
+    sources=lambda question: (Path(question.file),),
     tells_remarks=True,
 )

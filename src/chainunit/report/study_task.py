@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..core.errors import InputError, printable
+from ..core.errors import InputError, shown
 from ..core.files import atomic_file
 from ..models import MODELS
 from ..study.choice import check_motor
@@ -32,7 +32,7 @@ def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> 
         for runs in random_runs(config.plans):
             if not runs.runs:
                 raise InputError(
-                    f"scheduler {printable(scheduler)}: is for random overloads, and this study has none "
+                    f"scheduler = {shown(scheduler)}: is for random overloads, and this study has none "
                     f"({runs.table}.runs); leave it out"
                 )
         check_scheduler(scheduler)

@@ -72,6 +72,8 @@ class Task(Generic[Question, Outcome]):
     """None where the outcome is what was sought, else a sentence for the terminal, or "": the exit status is 1"""
     alarmed: Callable[[Outcome], bool] = lambda outcome: False
     """whether the outcome, as it was sought, is an alarm: the exit status is 3"""
+    sources: Callable[[Question], Iterable[Path]] = lambda question: ()
+    """the files behind the outcome; those of a study follow from its tables"""
     content: type | None = None
     """the declared content of its result.json"""
     tells_remarks: bool = False
@@ -98,8 +100,7 @@ class Task(Generic[Question, Outcome]):
             )
         names = [html.NAME, f"{self._stem}.json", f"{self._stem}.md"]
         names += [name for name in self.files if "*" not in name]
-        if isinstance(question, Config):
-            names += [provenance.FILE, provenance.COPY]
+        names += [provenance.FILE, provenance.COPY] if isinstance(question, Config) else [provenance.FILE]
         return claim(folder, *names, *self.replaced(question))
 
     def clear(self, folder: Path) -> None:
@@ -138,13 +139,17 @@ class Task(Generic[Question, Outcome]):
     def write(
         self, question: Question, outcome: Outcome, report: Report, folder: Path, png: bool = False
     ) -> tuple[list[Path], WriteError | None]:
-        """Write all files, figures as PNG with `png`; of a study also its provenance and a copy of its file. Returns
-        the files, and the first error of a file that could not be written, or None."""
+        """Write all files, figures as PNG with `png`, and their provenance; of a study also a copy of its file.
+        Returns the files, and the first error of a file that could not be written, or None."""
         of_task = self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
-        of_study = provenance.writers(question, folder) if isinstance(question, Config) else []
+        of_sources = (
+            provenance.writers(question, folder)
+            if isinstance(question, Config)
+            else provenance.writers_without_study(self.sources(question), folder)
+        )
         paths: list[Path] = []
         failure = None
-        for write in (*of_task, *of_study):
+        for write in (*of_task, *of_sources):
             try:
                 paths += write()
             except WriteError as error:

@@ -113,7 +113,7 @@ NAMED: Mapping[str, tuple[str, str]] = {
 }
 """The quantities that are no single reduction: unit and description."""
 RANGE = "range"
-_WORDS = {name: reduction.words for name, reduction in REDUCTIONS.items()} | {
+_WORDS = {name: reduction.title for name, reduction in REDUCTIONS.items()} | {
     RANGE: "largest less least value"
 }
 _FORM = re.compile(r"(\w+)\((.+)\)")

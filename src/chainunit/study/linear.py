@@ -95,6 +95,8 @@ def linearize(
     """
     if hasattr(of, "config"):
         return _point_of_study(of.config, at).linear()
+    check_kind("of", of, str | Path, "a study, a study file, a linkage file or the name of a model")
+    check_kind("config", config, str | Path | None, "the path of a study file")
     return linear_point(str(of), at, None if config is None else Path(config), inverse=inverse).linear()
 
 

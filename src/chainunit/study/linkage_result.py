@@ -66,12 +66,16 @@ class LinkageData:
     over_the_way: Mapping[str, InUnit] = part("effort and inertia at each place of the driver")
     rest: LinkageAtRest = part("the linkage at rest")
     back: WayBack | None = part("the way back of a driver that swings", optional=True)
+    drawn: list[str] = part("sentences on a linkage from a drawing of another program")
     slips: list[str] = part("values of the file without a unit that are of an unusual size, in words")
     notes: list[str] = part("values of the file of an unusual size, in words")
 
 
-def linkage_data(f: LinkageFindings, source: str, unusual: Iterable[UnusualValue]) -> LinkageData:
-    """The findings on a linkage of the file `source`, which has these values of an unusual size, as data."""
+def linkage_data(
+    f: LinkageFindings, source: str, unusual: Iterable[UnusualValue], remarks: Iterable[str] = ()
+) -> LinkageData:
+    """The findings on a linkage of the file `source`, which has these values of an unusual size, as data; with
+    `remarks` on a drawing."""
     description, unit = f.description, f.machine.model.driver_port.unit
 
     def limits(variable: str, limit_unit: str) -> InUnit:
@@ -104,6 +108,7 @@ def linkage_data(f: LinkageFindings, source: str, unusual: Iterable[UnusualValue
         {"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
         _at_rest(f),
         WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
+        [f"{remark[:1].upper()}{remark[1:]}." for remark in remarks],
         [str(value) for value in slips_of(tuple(unusual))],
         [value.sentence for value in unusual if value.with_unit],
     )

@@ -7,7 +7,7 @@ import json
 import platform
 import re
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from hashlib import sha256
 from importlib import metadata
@@ -39,14 +39,17 @@ def writers(config: Config, folder: Path) -> list[Callable[[], list[Path]]]:
     ]
 
 
+def writers_without_study(sources: Iterable[Path], folder: Path) -> list[Callable[[], list[Path]]]:
+    """The function that writes the provenance of results without a study, from these files, into a folder."""
+    files = dict(_digests_of((str(file), file) for file in sources))
+    text = json.dumps({**_software(), "files": files}, indent=1) + "\n"
+    return [lambda: write_file(folder / FILE, text)]
+
+
 def provenance(config: Config) -> dict[str, Any]:
     """The provenance of the results of a study, ready for JSON. It is the same for the same study on one machine."""
     return {
-        "chainunit": __version__,
-        "commit": _commit(),
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-        "libraries": _libraries(),
+        **_software(),
         "study": {
             "file": Path(config.file.source).name,
             "sha256": sha256(study_text(config.file).encode()).hexdigest(),
@@ -58,6 +61,24 @@ def provenance(config: Config) -> dict[str, Any]:
     }
 
 
+def _software() -> dict[str, Any]:
+    """Version, libraries and platform."""
+    return {
+        "chainunit": __version__,
+        "commit": _commit(),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "libraries": _libraries(),
+    }
+
+
+def _digests_of(files: Iterable[tuple[str, Path]]) -> Iterator[tuple[str, str]]:
+    """The digests of the files that can be read, by their names."""
+    for name, file in files:
+        with contextlib.suppress(InputError, OSError):
+            yield name, digest(file)
+
+
 def _digests(file: FileContents) -> Iterator[tuple[str, str]]:
     """The digests of all files that the study names: linkage, catalogues, motors and machines, recordings."""
     catalogue = file.tables.get("catalogue", [])
@@ -67,9 +88,7 @@ def _digests(file: FileContents) -> Iterator[tuple[str, str]]:
         names += [name] if name.lower().endswith((".toml", ".fmu")) else []
     of_parts = (part_file for part in registered() for part_file in part.files(file.tables))
     names += [str(part_file.table.get(part_file.name, "")) for part_file in of_parts]
-    for name in dict.fromkeys(name for name in names if name):
-        with contextlib.suppress(InputError, OSError):
-            yield name, digest(beside(name, file.source))
+    return _digests_of((name, beside(name, file.source)) for name in dict.fromkeys(filter(None, names)))
 
 
 @cache

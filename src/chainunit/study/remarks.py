@@ -40,6 +40,11 @@ STATE_NOT_SAVED = note(
     "{title} cannot save its state (canGetAndSetFMUstate). Each event was run from rest, through the same start-up. "
     "With an FMU that can, the study takes less time.",
 )
+NO_ACCELERATION = fault(
+    "no-acceleration",
+    "{title} does not give its acceleration (a). Torques and forces of the machine are those at constant speed, "
+    "without the work that changes its speed. Give the FMU an output a, or its name in system.motor_names.",
+)
 
 
 def conclude(study: StudyRecord) -> None:
@@ -64,6 +69,10 @@ def conclude(study: StudyRecord) -> None:
         study.say(_LEFT_OUT, what=" and ".join(left_out))
     if study.answers:
         study.verdict = replace(model_verdict(study), step=config.run.step)
+        motor = study.drive.foreign
+        if motor is not None and "a" not in motor.connectors:
+            study.say(NO_ACCELERATION, title=motor.title)
+            study.verdict = study.verdict.without_acceleration()
         study.remarks += study.verdict.details(study.titles)
     config.organs.remark(study)
     if STEADY in study.answers:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Set
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any, Literal, NamedTuple
 
 from ..core.descriptions import USUAL_DRIVER
@@ -196,6 +196,13 @@ class Verdict:
             return ""
         halvings = math.floor(math.log(worst / RESIDUAL, 4.0)) + 1
         return f': run.step = "{1e3 * self.step / 2.0**halvings:.3g} ms"'
+
+    def without_acceleration(self) -> Verdict:
+        """The same on runs whose balance no shorter step closes, as the acceleration of the motor is not known."""
+        energy = self.topics["energy"]._replace(
+            remedy="give the acceleration a of the motor (system.motor_names)"
+        )
+        return replace(self, step=None, topics={**self.topics, "energy": energy})
 
     @derived()
     def caveat(self) -> str | None:

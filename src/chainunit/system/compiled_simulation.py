@@ -14,7 +14,7 @@ from ..core.quantities import Variable
 from .compiled import compiled, input_starts
 from .graph import System
 from .rows import selected
-from .signals import at_time
+from .signals import at_time, signals_by_name
 from .simulation import RunOptions, Simulation, check_forward
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class CompiledSimulation(Simulation):
         self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
     ) -> None:
         self._compiled = CompiledSystem(system)
-        self.time, self.signals = start_time, dict(signals or {})
+        self.time, self.signals = start_time, signals_by_name(signals)
         self._system = system
         self._check_signals()
         start = {full: float(at_time(signal, start_time)) for full, signal in self.signals.items()}

@@ -57,8 +57,11 @@ class ModelComponent:
 
     def __post_init__(self) -> None:
         layout = self.model.parameter_layout
+        check_kind(
+            "parameters", self.parameters, self.model.Parameters, f"the Parameters of {self.model.name}"
+        )
         values = layout.by_name(self.parameters)
-        if any(map(has_own_unit, values.values())):
+        if not all(isinstance(value, float) for value in values.values()):
             numbers = {v.name: one_number(v, values[v.name]) for v in layout.variables}
             object.__setattr__(self, "parameters", layout.from_names(numbers))
 
@@ -156,13 +159,17 @@ class System:
     slopes: bool = True
 
     def __post_init__(self) -> None:
-        for name in self.components:
+        check_kind("components", self.components, Mapping, "a mapping of names to components")
+        for name, component in self.components.items():
+            check_kind(f"components.{name}", component, Component, "a ModelComponent or an FmuComponent")
             # names of components become names of files, and full names are split at the first dot
             if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
                 raise InputError(f"{shown(name)}: a component's name must be of letters, digits and _")
+        pairs_of_names = "a list of pairs of full names"
         for name, pairs in (("joints", self.joints), ("wires", self.wires)):
+            check_kind(name, pairs, tuple | list, pairs_of_names)
             for pair in pairs:
-                check_kind(name, pair, tuple | list, "a list of pairs of full names")
+                check_kind(name, pair, tuple | list, pairs_of_names)
         partners: dict[str, str] = {}
         for joint in self.joints:
             for one, other in (joint, joint[::-1]):
@@ -175,6 +182,7 @@ class System:
                 raise InputError(f"{target}: is connected to {sources[target]} and to {source}")
             self._check_ends(source, target)
             sources[target] = source
+        check_kind("start", self.start, Mapping, "a mapping of full names to values")
         object.__setattr__(self, "start", self.in_units(self.start, "parameter", "input"))
 
     # -- names
@@ -203,20 +211,20 @@ class System:
         return connector
 
     def in_units(self, values: Mapping[str, Any], *causalities: str) -> dict[str, Any]:
-        """Values by full name of a variable: a text or a quantity of pint as a number in the unit of the variable,
-        all others as they are.
+        """Values by full name of a variable, in the unit of the variable; functions of time as they are.
 
         Raises
         ------
         InputError
-            where there is no such variable of one of these causalities, and for a unit of another kind.
+            where there is no such variable of one of these causalities, for a unit of another kind, and for a value
+            that is no number.
         """
         return {
             full: self._in_unit(self.connector(full, *causalities), full, x) for full, x in values.items()
         }
 
     def _in_unit(self, connector: Connector, full: str, value: Any) -> Any:
-        if not has_own_unit(value):
+        if callable(value) or (connector.type != "Real" and not has_own_unit(value)):
             return value
         return number_in(connector.unit or "1", full, value, connector.description)
 

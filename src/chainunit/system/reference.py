@@ -13,14 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.declared_numbers import in_declared_unit
 from ..core.engines import MATH, casadi_
-from ..core.errors import RunError
+from ..core.errors import InputError, RunError, shown
+from ..core.quantities import Quantity, Variable
 from .compiled import compiled
 from .graph import System
-from .signals import at_time, corners
+from .signals import at_time, corners, signals_by_name
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_TIMES = Variable("times", "times", Quantity("s", "times of the rows"))
 
 
 def monolithic(
@@ -59,8 +63,11 @@ def monolithic(
     """
     from scipy.integrate import DOP853
 
+    signals = system.in_units(signals_by_name(signals), "input")
     equations = _Equations(system, signals)
-    times = np.asarray(times, float)
+    times = in_declared_unit(_TIMES, times)
+    if np.ndim(times) != 1:
+        raise InputError(f"times = {shown(times)}: must be a list of times", "times")
     x = equations.start(float(times[0])) if start is None else [start[full] for full in equations.states]
     inner = [c for c in corners(signals.values()) if times[0] < c < times[-1]]
     states = np.empty((len(x), len(times)))

@@ -26,7 +26,7 @@ from ..work.progress import Progress
 from . import rows
 from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind
-from .signals import Profile, at_time
+from .signals import Profile, at_time, signals_by_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -180,7 +180,7 @@ class FmuSimulation(Simulation):
         self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
     ) -> None:
         self.system, self.time = system, start_time
-        self.signals = dict(signals or {})
+        self.signals = signals_by_name(signals)
         self._fmus: dict[str, Fmu] = {}
         self._instances: dict[str, Any] = {}
         self._state: dict[str, Any] = {}

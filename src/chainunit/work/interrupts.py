@@ -37,7 +37,7 @@ def received() -> int | None:
 
 
 def status() -> int:
-    """The exit status after the signal that was received; that of Ctrl-C without one."""
+    """The exit status after the signal that was received; without one, the status of Ctrl-C."""
     return 128 + (received() or signal.SIGINT)
 
 
@@ -74,6 +74,7 @@ def remembered() -> Iterator[None]:
 
 
 def _on_signal(number: int, frame: Any) -> None:
+    """The handler of the signals."""
     again = number in _received
     _received.append(number)
     if not _state["held"]:
@@ -91,6 +92,7 @@ def _on_lost(lost: Any) -> None:
 
 
 def _raise_again(number: int) -> None:
+    """Send this process the signal once more, after a pause."""
     time.sleep(_PAUSE)
     if _state["held"]:
         return

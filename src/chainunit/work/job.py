@@ -108,15 +108,15 @@ class Job:
 
 
 class BatchStore:
-    """The store of a `job` in a folder, which is made where it is missing or has another declaration. One with fewer
+    """The store of a `job` in a folder, which is made if it is missing or has another declaration. One with fewer
     points grows; one with more points keeps them.
 
     Raises
     ------
     InputError
-        where its file is no regular one.
+        if its file is no regular one.
     WriteError
-        where it cannot be written.
+        if it cannot be written.
     """
 
     earlier_points = 0
@@ -151,9 +151,9 @@ class BatchStore:
                         new[CHECKS][batch] = old[CHECKS][batch]
 
     def _declare(self, file: Any) -> None:
+        """Write the dimensions, the variables and the attributes of an empty file."""
         job = self.job
-        about = {"title": job.title, "source": f"chainunit {__version__}", "declaration": job.layout}
-        file.setncatts(about)
+        file.setncatts({"title": job.title, "source": f"chainunit {__version__}", "declaration": job.layout})
         file.createDimension(job.dimension, self._points)
         file.createDimension("batch", -(-self._points // job.batch))
         for v in job.variables:
@@ -161,14 +161,15 @@ class BatchStore:
             if v.letters:
                 file.createDimension(dims[1], v.letters)
             file.createVariable(v.name, "S1" if v.letters else v.dtype, dims).setncatts(v.attributes)
-        about = {"units": "1", "long_name": "CRC-32 of the values of a batch"}
-        file.createVariable(CHECKS, "u4", ("batch",)).setncatts(about)
+        attributes = {"units": "1", "long_name": "CRC-32 of the values of a batch"}
+        file.createVariable(CHECKS, "u4", ("batch",)).setncatts(attributes)
         # the values as they are
         file.set_auto_maskandscale(False)
         file.set_auto_chartostring(False)
 
     @contextlib.contextmanager
     def _opened(self, mode: Literal["r", "r+", "w"] = "r", part: Path | None = None) -> Iterator[Any]:
+        """The file of the store, with its values as they are stored."""
         from netCDF4 import Dataset
 
         with writing(self.file), netcdf(), Dataset(part or self.file, mode, format=_FORMAT) as file:
@@ -217,7 +218,7 @@ class BatchStore:
         Raises
         ------
         WriteError
-            where the file cannot be written.
+            if the file cannot be written.
         """
         begin, end = self.extent(batch)
         with self._opened("r+") as file:

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..core.errors import InputError, InterruptedRunError, RunError, printable
+from ..core.errors import InputError, InterruptedRunError, RunError, check_kind, printable
 from ..core.files import folder as make_folder
 from ..core.files import scratch
 from .job import BatchStore, Job
@@ -55,13 +55,13 @@ def run(
     Raises
     ------
     InputError
-        where the scheduler or its workers do not answer.
+        if the scheduler or its workers do not answer.
     RunError
-        where `work` fails, or a worker ends; the message names the batch. Earlier batches are in the store.
+        if `work` fails, or a worker ends; the message names the batch. Earlier batches are in the store.
     InterruptedRunError
         after Ctrl-C; likewise.
     WriteError
-        where the store cannot be written; likewise.
+        if the store cannot be written; likewise.
     """
     store = BatchStore(job, make_folder(folder))
     progress(job.title, 0, job.points)
@@ -113,6 +113,7 @@ def _finished(store: BatchStore, gaps: list[int], hands: _Hands) -> Iterator[tup
 
 
 def _results(work: Any, task: Any, begin: int, end: int) -> Any:
+    """The results of a batch; an error of `work` becomes a RunError, which passes between processes."""
     try:
         return work(task, begin, end)
     except InterruptedRunError:
@@ -124,6 +125,7 @@ def _results(work: Any, task: Any, begin: int, end: int) -> Any:
 
 
 def _made_here(job: Job, begin: int, end: int) -> Future:
+    """A batch that was made at once, in this process."""
     future: Future = Future()
     try:
         future.set_result(_results(job.work, job.task, begin, end))
@@ -227,8 +229,9 @@ def check_scheduler(scheduler: str) -> None:
     Raises
     ------
     InputError
-        where they do not answer within a few seconds.
+        if they do not answer within a few seconds.
     """
+    check_kind("scheduler", scheduler, str, "the address of a Dask scheduler")
 
     async def ask() -> Any:
         import distributed

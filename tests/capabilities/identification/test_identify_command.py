@@ -221,6 +221,11 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     numbers = found.answers
     assert list(numbers.index) == list(TRUTH) and numbers["is_determined"].sum() == 2
     assert math.isnan(numbers.loc["machine.left.web_mass", "value"])
+    for name, own in result["numbers"].items():
+        # as identified.toml and the page
+        assert (
+            not own["told"] or numbers.loc[name, "value"] == own["fitted"]["value"] != own["value"]["value"]
+        )
 
 
 def found_within(done, folder, most=4.0):
@@ -335,6 +340,7 @@ def test_a_wrong_crank_is_recognised(tmp_path):
         [each["given_deviation"]["value"] for each in result["numbers"].values()],
     )
     assert not (tmp_path / "out" / "identified.toml").exists()
+    assert "identified.toml has it" not in (tmp_path / "out" / "result.md").read_text("utf-8")
     suspects = [each["name"] for some in result["suspects"] for each in some["suspects"]]
     assert "machine.r" in suspects and not any("smooth" in name for name in suspects)
     first = result["suspects"][0]

@@ -121,7 +121,7 @@ def test_a_later_model_replaces_all_files(tmp_path):
         count = pairs[1].count(":") if pairs else 0
         assert len(list((tmp_path / "linear").glob("bode_*.png"))) == count
     kept = {path.name for path in (tmp_path / "linear").iterdir() if path.name[0] != "."}
-    assert kept == {"linear.json", "linear.npz", "linear.md", "report.html"}
+    assert kept == {"linear.json", "linear.npz", "linear.md", "report.html", "provenance.json"}
 
 
 def test_models_without_states_and_a_pair_without_effect(tmp_path):

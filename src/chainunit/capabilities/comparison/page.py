@@ -139,5 +139,8 @@ def _is_short(run: str, name: str) -> bool:
 
 
 TASK: Task[tuple[StoredResult, StoredResult], StudyComparison] = Task(
-    "compare", lambda pair, folder, progress: compare(*pair), comparison_report
+    "compare",
+    lambda pair, folder, progress: compare(*pair),
+    comparison_report,
+    sources=lambda pair: [stored.file for stored in pair],
 )

@@ -10,6 +10,7 @@ closes because each loss is read from another output than the electric power; wh
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -30,11 +31,8 @@ if TYPE_CHECKING:
 
 _HELD = 1e6
 """Factor on the heat capacity of a winding that keeps its temperature."""
-_LOSSES_IN_JOINTS = (
-    *(f"{law}.{name}" for law in ("pin", "pins", "guides") for name in ("friction", "damping")),
-    "joint_damping",
-)
-"""Parameters of machines by which their joints take power."""
+_LOSS_IN_JOINT = re.compile(r"(pins?|guides)(\.\w+)?\.(friction|damping)|joint_damping")
+"""The names of the parameters of machines by which their joints take power."""
 
 
 @declaration
@@ -155,7 +153,7 @@ def _machine(w: Window, feed: Any) -> dict[str, float]:
     """The power that the machine takes: of its joints and of the processing, where they can be told apart. The forces
     of the processing follow from the motion alone, so the same turns without friction take theirs alone."""
     whole, machine = w.mean("machine.dissipated_power"), w.drive.machine
-    names = [name for name in _LOSSES_IN_JOINTS if name in machine.by_name]
+    names = [name for name in machine.by_name if _LOSS_IN_JOINT.fullmatch(name)]
     if not names or machine.simulated is not machine or machine.model.States is not None:
         return {"machine": whole}
     smooth = machine.replace(dict.fromkeys(names, 0.0))

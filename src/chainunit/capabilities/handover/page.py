@@ -95,4 +95,5 @@ TASK: Task[Path, Handover] = Task(
     handover_report,
     files=(CYCLE, RUN, LOAD_CYCLE, STUDY, CANDIDATES, CHECKS),
     writers=_writers,
+    sources=lambda results: (results / "result.json",),
 )

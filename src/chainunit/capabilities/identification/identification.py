@@ -12,6 +12,7 @@ import numpy as np
 from ...core.brief import briefly_shown
 from ...core.errors import Faults, InputError, InterruptedRunError
 from ...drives.induction_motor import InductionMotor
+from ...drives.motor import Motor
 from ...recordings.fit import MOST_ROUNDS, Fit, fit
 from ...recordings.inspection import inspect_runs
 from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_offset
@@ -195,7 +196,7 @@ def identify(
     plan = plan_of(config.plans)
     workers = min(2, os.cpu_count() or 1)
     progress("reading recordings", 0.0, 1.0)
-    recordings = read_runs(plan.runs)
+    recordings = read_runs(plan.runs, config.motor.kind if config.motor else None)
     for recording in recordings.values():
         after_reading(recording.sentence)
     check_motor_is_known(recordings, is_known=config.knows_motor)
@@ -258,8 +259,8 @@ def plan_of(plans: Mapping[str, Any]) -> IdentificationPlan:
     return plan
 
 
-def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
-    """The recordings by the names of the runs, each with the part that counts.
+def read_runs(runs: Sequence[PlannedRun], motor: Motor | None = None) -> dict[str, Recording]:
+    """The recordings by the names of the runs of a machine with this kind of `motor`, each with the part that counts.
 
     Raises
     ------
@@ -269,7 +270,7 @@ def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
     faults, recordings = Faults(), dict[str, Recording]()
     for run in runs:
         with faults.collected():
-            recording = run.read()
+            recording = run.read(motor)
             begin, end = recording.time[0], recording.time[-1]
             if run.off is not None and not begin < run.off < end:
                 raise InputError(

@@ -140,7 +140,20 @@ def _numbers(x: IdentificationSummary) -> Iterator[b.Block]:
             lambda row: line(number(row[1].given, 4), " ± ", number(row[1].given_deviation, 2)),
         ),
     )
-    yield b.Text(
+    if x.is_described:
+        yield _meaning()
+    yield from table(
+        x.correlations,
+        ("pair", lambda pair: line(as_name(pair.first), ", ", as_name(pair.second))),
+        ("correlation", lambda pair: number(pair.correlation, 2)),
+        title="Numbers whose errors go together",
+        form="long",
+    )
+
+
+def _meaning() -> b.Text:
+    """What the table of a model that describes the recordings says of its numbers."""
+    return b.Text(
         f"A value is that of the best fit, as {FILE} has it. Its interval is that of the distribution which the "
         "recordings leave. A number is determined where the recordings alone give it with less than half the "
         "standard deviation that was known before. The interval of 95 % of a number that is not determined is that "
@@ -148,13 +161,6 @@ def _numbers(x: IdentificationSummary) -> Iterator[b.Block]:
         "is at its start, such as the middle of its bounds, and the noise is as stated: so the expected deviation "
         "may differ from the reached one.",
         "note",
-    )
-    yield from table(
-        x.correlations,
-        ("pair", lambda pair: line(as_name(pair.first), ", ", as_name(pair.second))),
-        ("correlation", lambda pair: number(pair.correlation, 2)),
-        title="Numbers whose errors go together",
-        form="long",
     )
 
 

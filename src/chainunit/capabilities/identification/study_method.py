@@ -35,15 +35,16 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
 
     @cached_property
     def answers(self) -> pd.DataFrame:
-        """The sought numbers by name: unit, value, standard deviation, interval of 95 % (low, high), and whether the
-        recordings determine the number; the value of one that they do not determine is no number. If the model does
-        not describe the recordings, deviation and interval are the ones before the recordings."""
+        """The sought numbers by name: unit, value in the best fit as ``identified.toml`` has it, standard deviation,
+        interval of 95 % (low, high), and whether the recordings determine the number; the value of one that they do
+        not determine is no number. If the model does not describe the recordings, deviation and interval are the ones
+        before the recordings."""
         import pandas as pd
 
         rows = {
             name: {
                 "unit": estimate.unknown.unit,
-                "value": estimate.value if estimate.is_determined else float("nan"),
+                "value": estimate.fitted if estimate.is_determined else float("nan"),
                 "deviation": estimate.deviation,
                 "low": estimate.low,
                 "high": estimate.high,

@@ -137,4 +137,5 @@ TASK: Task[LinearQuestion, LinearResult] = Task(
     linear_report,
     files=(NPZ, PICTURES),
     writers=_writers,
+    sources=lambda question: [Path(question.name), *filter(None, [question.config])],
 )

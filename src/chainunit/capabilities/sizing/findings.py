@@ -148,7 +148,7 @@ class SizingFindings(Findings):
             "Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
             self.answer,
             lambda study: SizingFindings.of_study(study).sized(study).sentence,
-            lambda study: SizingFindings.of_study(study).currents_until_trip(study),
+            _currents_until_trip,
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,
@@ -300,3 +300,9 @@ class ProtectionAnalysis(Analysis):
         if sizing.setting is not None:
             chosen = ChosenMotor(sizing.plan, sizing.duty, sizing.best)
             sizing.alternatives = alternatives(study, sizing.setting, work.rig, chosen, work.progress)
+
+
+def _currents_until_trip(study: StudyRecord) -> Mapping[str, float]:
+    """See `SizingFindings.currents_until_trip`; empty for a study without them."""
+    findings = SizingFindings.found_in(study)
+    return {} if findings is None else findings.currents_until_trip(study)

@@ -73,7 +73,7 @@ def read_plan(
     def read(entry: Entry, name: str) -> SweptParameter:
         return _parameter(entry, quantities.variables[name], quantities.values[name], form.method == "grid")
 
-    swept = SWEPT.read(form.parameter, faults, read, known=quantities.variables, fixed=fixed)
+    swept = SWEPT.read(form.parameter, faults, read, names=quantities.variables, fixed=fixed)
     names, parameters = list(swept), list(swept.values())
     with faults.collected():
         _check_results(form, model)

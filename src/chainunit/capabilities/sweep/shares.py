@@ -5,7 +5,8 @@ their shares in their coefficients (B. Sudret, Global sensitivity analysis using
 The size of the rest is that at points which a polynomial does not know: each fold of the points has one from the
 other folds. A share may lack all of the rest, or have as much too much, as terms may look alike at the points. So a
 poor polynomial widens the intervals, and makes no share wrong. Classes of a parameter narrow the interval of the
-share that it explains alone. The errors of the coefficients by chance come on top.
+share that it explains alone; a result with more waves along a parameter than there are classes of it is not seen. The
+errors of the coefficients by chance come on top.
 
 The result over a whole grid is split without an estimate.
 """
@@ -79,8 +80,8 @@ def shares_of_points(parameters: Sequence[SweptParameter], x: Any, y: Any) -> li
 
 
 def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
-    """The share of the terms `some` in the variance. Their parameter may have the share `most` in the rest, and what
-    the rest lacks may be in its terms."""
+    """The share of the terms `some` in the variance. They may have the share `most` of the rest too much or too
+    little, and the terms beside them all of it."""
     c, e = fit.coefficients, fit.errors
     part, whole, rest = float(np.sum(c[some] ** 2)), float(np.sum(c[1:] ** 2)), float(np.mean(e**2))
     if not whole > 0.0:
@@ -91,9 +92,9 @@ def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
     error = (
         2.0 * float(np.std(((1.0 - share) * contribution - share * others) * e)) / math.sqrt(len(e)) / whole
     )
-    reach, left = most * rest, (1.0 - most) * rest
-    low = (part - reach) / (whole - reach + left) - _SIGMAS * error - _ROUNDING
-    high = (part + reach) / max(part + reach, whole + reach - left) + _SIGMAS * error + _ROUNDING
+    least, highest, beside = max(0.0, part - most * rest), part + most * rest, whole - part
+    low = least / (least + beside + rest) - _SIGMAS * error - _ROUNDING
+    high = highest / (highest + max(0.0, beside - rest)) + _SIGMAS * error + _ROUNDING
     return Estimate(share, max(0.0, low), min(1.0, high))
 
 

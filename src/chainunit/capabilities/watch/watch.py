@@ -16,6 +16,7 @@ from ...core.errors import Faults, InputError
 from ...core.files import scratch
 from ...core.inputs import JSON, file_bytes, json_of
 from ...core.quantities import Layout
+from ...drives.motor import Motor
 from ...drives.terminal_signals import terminal_signals
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
@@ -195,7 +196,7 @@ def watch(config: Config, progress: TaskProgress = quiet) -> WatchedRecording:
     plan, observer = watch_plan_of(config.plans["watch"].watch), config.plans["watch"].observer
     workers = min(2, os.cpu_count() or 1)
     progress("reading the recording", 0.0, 1.0)
-    recording, errors = _read_files(plan)
+    recording, errors = _read_files(plan, config.motor.kind if config.motor else None)
     duration = float(recording.time[-1] - recording.time[0])
     least = FEWEST_TURNS * plan.turn
     if not least <= plan.learning < duration:
@@ -250,11 +251,11 @@ def watch(config: Config, progress: TaskProgress = quiet) -> WatchedRecording:
     )
 
 
-def _read_files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
+def _read_files(plan: WatchPlan, motor: Motor | None) -> tuple[Recording, MachineErrors | None]:
     """The recording, and the errors of the machine where the file of an identification has them."""
     faults, errors, recordings = Faults(), None, list[Recording]()
     with faults.collected():
-        recordings.append(plan.read())
+        recordings.append(plan.read(motor))
     if plan.identification is not None:
         with faults.collected():
             errors = _read_errors(plan.identification)

@@ -7,7 +7,7 @@ are not deleted.
 
 The program runs the code, so that nobody else may be able to put it there. An own folder that others can write, as a
 umask of 002 makes it, is closed to them. A folder that belongs to another user, or that stays open to others, is no
-cache, and is refused where the user named it; such a file is no entry. An entry has the
+cache, and is refused if the user named it; such a file is no entry. An entry has the
 hash of its content together with that of its sources: a renamed one is no entry, either. On Windows, which tells no
 owners and rights in this form, the folder must be one that only the user can write.
 """
@@ -54,7 +54,7 @@ def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
     Raises
     ------
     InputError
-        where the folder that CHAINUNIT_CACHE names is not safe.
+        if the folder that CHAINUNIT_CACHE names is not safe.
     """
     place = folder()
     if place is None or not _is_safe(place):
@@ -75,7 +75,7 @@ def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
 
 
 def _mark(name: str, content: bytes) -> bytes:
-    """The hash of an entry: of its name, which is that of its sources, and of its content."""
+    """The hash of the name of an entry, which is the hash of its sources, and of its content."""
     return hashlib.sha256(name.encode() + content).digest()
 
 
@@ -96,7 +96,7 @@ def _is_safe(place: Path) -> bool:
 
 
 def _trouble(about: os.stat_result) -> str:
-    """The reason why others could change a file or a folder; empty where only this user can."""
+    """The reason why others could change a file or a folder; empty if only this user can."""
     if not hasattr(os, "geteuid"):
         return ""
     if about.st_uid != os.geteuid():
@@ -108,8 +108,8 @@ _OPEN = "can be written by other users"
 
 
 def _close(place: Path) -> None:
-    """Close an own folder to others, and delete the code in it, which others may have put there. A folder behind a
-    link stays as it is, as others may have put the link there."""
+    """Close an own folder to others, and delete the code in it, which others may have put there. A folder to which a
+    link leads stays as it is, as others may have put the link there."""
     with contextlib.suppress(OSError):
         handle = os.open(place, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
         try:
@@ -134,7 +134,7 @@ def _read(place: Path, name: str) -> bytes | None:
 
         try:
             if os.open in os.supports_dir_fd:
-                # what is read is then what was checked, also where somebody exchanges the folder
+                # what is read is then what was checked, also if somebody exchanges the folder
                 inside, about = opened(place, os.O_RDONLY)
                 if _trouble(about):
                     return None

@@ -94,7 +94,7 @@ def compile_code(
     Raises
     ------
     RunError
-        where the compiler fails, with its messages, or makes no code.
+        if the compiler fails, with its messages, or makes no code.
     """
 
     def make() -> bytes:
@@ -125,8 +125,8 @@ def compile_code(
 
 
 class ProcessorFlags(NamedTuple):
-    """Flags for fast code that runs on this machine alone, the libraries behind them, and files that are part of the
-    code's name in the cache: the properties of this processor."""
+    """Flags for fast code that runs on this machine alone, the libraries that they need, and files that are part of
+    the code's name in the cache: the properties of this processor."""
 
     flags: tuple[str, ...]
     libraries: tuple[str, ...]

@@ -6,12 +6,13 @@ CasADi would write a function for each group of outputs, with all its operations
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping
 
-from .c_elementary import is_pair, own_forms
+from .c_elementary import own_forms
 from .c_forms import forms, number
 from .division import Division
+from .elementary import is_pair
+from .kernels import ModelFunction
 from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _LONGEST = 2500
@@ -21,79 +22,65 @@ _WIDEST = 60
 
 
 class Program:
-    """Groups of results of the same arguments.
+    """The C code of a `function` of a model.
 
-    `text` defines the function ``kernel_NAME(arg, res, w, wanted)``. Its arguments are the arguments of the program,
+    `text` defines the function ``kernel_NAME(arg, res, w, wanted)``. Its arguments are the arguments of the function,
     the place of the results, memory for `room` numbers, and a set of bits, one for each requested group.
     """
 
-    def __init__(
-        self,
-        name: str,
-        arguments: Sequence[Any],
-        groups: Sequence[Any],
-        offsets: Sequence[int],
-        frequency: str,
-    ) -> None:
-        """
-        Parameters
-        ----------
-        arguments : symbols, as casadi vectors
-        groups : results, as casadi vectors
-        offsets : place of each group among the results
-        frequency : frequency of calls, "OFTEN", "SELDOM" or "ONCE": for rare calls the time of the compiler counts
-            more
-        """
-        self.name, self._frequency = name, frequency
-        operations = Operations(arguments, groups)
-        self._collect(operations)
+    def __init__(self, function: ModelFunction) -> None:
+        operations = Operations(function.arguments, function.groups)
         division = Division(operations.items, operations.results, _LONGEST)
-        self._parts, self._needed_by, self._slots = division.parts, division.needed_by, division.slots
-        self.room = len(self._slots)
-        lines = [line for k, part in enumerate(self._parts) for line in self._part(k, part)]
-        self.text = "\n".join([*lines, *self._function(offsets)]) + "\n"
-
-    def _collect(self, operations: Operations) -> None:
-        """Collect all operations: the form of each in C, and the places of its operands. A number and an argument are
-        operations without operands."""
         in_c = forms() | own_forms()
+        self.name, self._frequency, self._items = function.name, function.frequency, operations.items
+        self._forms = [_form(operation, in_c) for operation in operations.items]
+        self._parts, self._slots = division.parts, division.slots
+        self.room = len(division.slots)
+        lines = [line for k, part in enumerate(division.parts) for line in self._part(k, part)]
+        lines += [
+            f"static void kernel_{self.name}(const double *const *arg, double *res, double *w, unsigned wanted) {{"
+        ]
+        lines += [
+            f"  if(wanted&{bits}u) {self.name}_{k}(arg,w);" for k, bits in enumerate(division.needed_by)
+        ]
+        for bit, (places, offset) in enumerate(zip(operations.results, function.offsets, strict=True)):
+            if places:
+                lines.append(f"  if(wanted&{1 << bit}u) {{")
+                lines += [f"    res[{offset + n}]={self._result(place)};" for n, place in enumerate(places)]
+                lines.append("  }")
+        self.text = "\n".join([*lines, "  (void)arg,(void)w,(void)wanted;", "}", ""])
 
-        def form(operation: Operation) -> str:
-            if operation.kind == NUMBER:
-                return number(operation.value)
-            argument, place = operation.entry
-            return f"i{argument}[{place}]" if operation.kind == ARGUMENT else in_c[operation.kind]
-
-        self._forms = [form(operation) for operation in operations.items]
-        self._operands = [operation.operands for operation in operations.items]
-        self._pairs = {k for k, operation in enumerate(operations.items) if is_pair(operation.kind)}
-        self._arguments = {
-            k: operation.entry for k, operation in enumerate(operations.items) if operation.kind == ARGUMENT
-        }
-        self._results = operations.results
+    def _result(self, place: int) -> str:
+        """A result: an argument, a number, or a value in the memory."""
+        operation = self._items[place]
+        if operation.kind == ARGUMENT:
+            return "arg[{}][{}]".format(*operation.entry)
+        return f"w[{self._slots[place]}]" if operation.operands else self._forms[place]
 
     def _part(self, k: int, part: list[int]) -> list[str]:
-        """The definition of a part."""
+        """The definition of a part, line by line. A value that is long or used twice has a line and a name."""
         lines: list[str] = []
         texts: dict[int, str] = {}
         calls: dict[str, str] = {}
         arguments = set()
         uses: dict[int, int] = {}
         for place in part:
-            for n, operand in enumerate(self._operands[place]):
+            for n, operand in enumerate(self._items[place].operands):
                 uses[operand] = uses.get(operand, 0) + self._forms[place].count(f"{{{n}}}")
 
-        def variable(place: int, text: str) -> str:
+        def named(place: int, text: str) -> str:
             lines.append(f"  const double a{place}={text};")
             return f"a{place}"
 
         def outside(place: int) -> str:
-            text = f"w[{self._slots[place]}]" if self._operands[place] else self._forms[place]
-            if place in self._arguments:
-                arguments.add(self._arguments[place][0])
-            elif not self._operands[place]:
-                return text  # a number
-            return variable(place, text) if uses[place] > 1 else text
+            """A number, an argument, or a value of another part."""
+            operation = self._items[place]
+            if operation.kind == NUMBER:
+                return self._forms[place]
+            if operation.kind == ARGUMENT:
+                arguments.add(operation.entry[0])
+            text = f"w[{self._slots[place]}]" if operation.operands else self._forms[place]
+            return named(place, text) if uses[place] > 1 else text
 
         def one_of_two(place: int, text: str) -> str:
             """A result of a function with two, which is called once for both."""
@@ -104,38 +91,26 @@ class Program:
             return f"{calls[call]}.{which}"
 
         for place in part:
-            for operand in self._operands[place]:
+            operation = self._items[place]
+            for operand in operation.operands:
                 if operand not in texts:
                     texts[operand] = outside(operand)
-            text = self._forms[place].format(*(texts[operand] for operand in self._operands[place]))
+            text = self._forms[place].format(*(texts[operand] for operand in operation.operands))
             inline = uses.get(place, 0) == 1 and len(text) <= _WIDEST and place not in self._slots
-            if place in self._pairs:
+            if is_pair(operation.kind):
                 text, inline = one_of_two(place, text), True
-            texts[place] = text if inline or place not in uses else variable(place, text)
+            texts[place] = text if inline or place not in uses else named(place, text)
             if place in self._slots:
                 lines.append(f"  w[{self._slots[place]}]={texts[place]};")
         pointers = [f"  const double *i{n}=arg[{n}];" for n in sorted(arguments)] or ["  (void)arg;"]
-        head = (
-            f"{self._frequency} static void {self.name}_{k}(const double *const *arg, double *restrict w) {{"
-        )
+        arguments_in_c = "const double *const *arg, double *restrict w"
+        head = f"{self._frequency} static void {self.name}_{k}({arguments_in_c}) {{"
         return [head, "  ROUNDED_APART", *pointers, *lines, "}"]
 
-    def _function(self, offsets: Sequence[int]) -> list[str]:
-        """The definition of the function that calls the parts."""
 
-        def result(place: int) -> str:
-            if place in self._arguments:
-                return "arg[{}][{}]".format(*self._arguments[place])
-            return f"w[{self._slots[place]}]" if self._operands[place] else self._forms[place]
-
-        lines = [
-            f"static void kernel_{self.name}(const double *const *arg, double *res, double *w, unsigned wanted) {{"
-        ]
-        for k, groups in enumerate(self._needed_by):
-            lines.append(f"  if(wanted&{groups}u) {self.name}_{k}(arg,w);")
-        for bit, (places, offset) in enumerate(zip(self._results, offsets, strict=True)):
-            if places:
-                lines.append(f"  if(wanted&{1 << bit}u) {{")
-                lines += [f"    res[{offset + n}]={result(place)};" for n, place in enumerate(places)]
-                lines.append("  }")
-        return [*lines, "  (void)arg,(void)w,(void)wanted;", "}"]
+def _form(operation: Operation, in_c: Mapping[str, str]) -> str:
+    """An operation in C, with slots for its operands; a number and an argument have none."""
+    if operation.kind == NUMBER:
+        return number(operation.value)
+    argument, place = operation.entry
+    return f"i{argument}[{place}]" if operation.kind == ARGUMENT else in_c[operation.kind]

@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any
 
 from .c_forms import number
-from .elementary import OWN
+from .elementary import OWN, is_pair
 from .operations import ARGUMENT, NUMBER, Operation
 from .recorder import CHOOSE, EXPONENT, MANTISSA, POWER2, recorded
 
@@ -120,27 +120,14 @@ def _function(function: Callable[..., Any], arguments: int) -> str:
     kind, result = ("Two", f"(Two){{{', '.join(results)}}}") if len(results) > 1 else ("double", results[0])
     parameters = ", ".join(f"double x{k}" for k in range(arguments))
     lines = [line(place, operation) for place, operation in enumerate(recording.items) if operation.operands]
-    head = f"static inline {kind} {c_name(function)}({parameters}) {{"
+    head = f"static inline {kind} {function.__name__}({parameters}) {{"
     return "\n".join([head, *lines, f"    return {result};", "}", ""])
-
-
-def c_name(function: Callable[..., Any]) -> str:
-    """The name of a function in C."""
-    return function.__name__
 
 
 def own_forms() -> dict[str, str]:
     """The form in C of each operation of a model that the functions of the header compute, by its kind."""
     forms = {"FMIN": "least_of({0},{1})", "FMAX": "largest_of({0},{1})"}
     for kind, (function, arguments, result) in OWN.items():
-        call = f"{c_name(function)}({','.join(f'{{{k}}}' for k in range(arguments))})"
+        call = f"{function.__name__}({','.join(f'{{{k}}}' for k in range(arguments))})"
         forms[kind] = f"{call}.{'ab'[result]}" if is_pair(kind) else call
     return forms
-
-
-def is_pair(kind: str) -> bool:
-    """Whether the function that computes operations of this kind has two results, as sine and cosine."""
-    if kind not in OWN:
-        return False
-    function, arguments, _ = OWN[kind]
-    return len(recorded(function, arguments).results) > 1

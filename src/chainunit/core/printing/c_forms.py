@@ -43,7 +43,7 @@ def c_file(name: str, package: str = __package__) -> str:
 
 
 def constant(name: str, value: Any) -> str:
-    """The definition of a number, an array, or an array of rows, where zeros fill up the shorter rows."""
+    """The definition of a number, an array, or an array of rows; zeros fill up the shorter rows."""
     if not isinstance(value, tuple):
         return f"#define {name} {number(value)}"
     if not isinstance(value[0], tuple):

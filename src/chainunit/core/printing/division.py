@@ -16,32 +16,34 @@ from .operations import Operation
 class Division:
     """Parts of `items`, each of `longest` operations at most.
 
-    `parts` are the places of the operations by part, without numbers and arguments, in an order in which each part
-    stands after the parts on which it depends; `needed_by` has for each part a bit for each of the groups `results`
-    that need it; `slots` are the places in memory of values that pass from one part to another or are results.
+    `results` are the places of the results by group. `parts` are the places of the operations by part, without
+    numbers and arguments, in an order in which each part stands after the parts on which it depends. `needed_by` has
+    for each part a number with a bit for each group that needs it. `slots` has, by the place of a value that passes
+    from one part to another or is a result, its place in memory.
     """
 
     def __init__(self, items: Sequence[Operation], results: Sequence[Sequence[int]], longest: int) -> None:
-        users = [0] * len(items)
+        # by operation, the bits of the groups that need it
+        needed_by = [0] * len(items)
         for bit, places in enumerate(results):
             for place in places:
-                users[place] |= 1 << bit
-        for place in reversed(range(len(users))):
+                needed_by[place] |= 1 << bit
+        for place in reversed(range(len(items))):
             for operand in items[place].operands:
-                users[operand] |= users[place]
+                needed_by[operand] |= needed_by[place]
         alike: dict[int, list[int]] = {}
-        for place, groups in enumerate(users):
+        for place, bits in enumerate(needed_by):
             if items[place].operands:
-                alike.setdefault(groups, []).append(place)
+                alike.setdefault(bits, []).append(place)
         self.parts: list[list[int]] = []
         self.needed_by: list[int] = []
         # parts that more groups need come first: they do not depend on parts that fewer groups need
-        for groups in sorted(alike, key=lambda g: (-g.bit_count(), g)):
-            places = alike[groups]
+        for bits in sorted(alike, key=lambda bits: (-bits.bit_count(), bits)):
+            places = alike[bits]
             count = -(-len(places) // longest)
             cuts = [n * len(places) // count for n in range(count + 1)]
             self.parts += [places[begin:end] for begin, end in pairwise(cuts)]
-            self.needed_by += [groups] * count
+            self.needed_by += [bits] * count
         part_of = {place: k for k, part in enumerate(self.parts) for place in part}
         crossing = {place for places in results for place in places if items[place].operands}
         for place, k in part_of.items():

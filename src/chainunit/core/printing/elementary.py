@@ -2,17 +2,17 @@
 
 The functions of a C library, of a browser and of numpy differ in their last bits. These are made of the basic
 operations alone, which IEEE 754 rounds in one way everywhere: whatever computes them has the same bits. Each is
-written once, for any engine of basic operations: `numpy_basic` computes arrays, `Recorder` lists the operations
-from which code is printed.
+written once, for any engine of basic operations, such as a `Recorder`, which lists the operations from which code is
+printed.
 
 An engine has ``sqrt abs copysign`` and
 
 ``choose(condition, a, b)``
-    `a` where the condition, a comparison, holds, else `b`; both are computed
+    `a` if the condition, a comparison, holds, else `b`; both are computed
 ``exponent(x)``
     the nearest exponent of 2 of a positive normal number, as a whole number
 ``mantissa(x)``
-    what that power is multiplied by, from the root of 1/2 to that of 2
+    what that power is multiplied by, from the root of 1/2 to the root of 2
 ``power2(k)``
     2 to the power of a whole number from -1022 to 1023
 
@@ -35,7 +35,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from types import SimpleNamespace
 from typing import Any
 
 from .recorder import Recorded, recorded
@@ -128,8 +127,6 @@ _TAN_22 = 0.41421356237309503
 _LOG_2 = (0.6931471805598903, 5.497923018708371e-14)
 """log(2) as a sum; up to 2**11 times the first part is exact."""
 _PER_LOG_2 = 1.4426950408889634
-ROOT_OF_HALF = 0x3FE6A09E667F3BCD
-"""The bits of the root of 1/2 as a whole number."""
 _WHOLE = 2.0**40
 """Size of an angle from which on the results are NaN."""
 _TINY = 1e-300
@@ -170,10 +167,10 @@ def arccosine(xp: Any, x: Any) -> Any:
     high, low = _HALF_PI
     near = xp.copysign(1.0, x)
     middle, tail = _short_sum(high, -near * s)
-    behind, rest = _short_sum(2.0 * high, -2.0 * s)
+    beyond, rest = _short_sum(2.0 * high, -2.0 * s)
     inside = middle + (tail + (low - near * lost))
     return xp.choose(
-        far, xp.choose(x < 0.0, behind + (rest + (2.0 * low - 2.0 * lost)), 2.0 * (s + lost)), inside
+        far, xp.choose(x < 0.0, beyond + (rest + (2.0 * low - 2.0 * lost)), 2.0 * (s + lost)), inside
     )
 
 
@@ -248,7 +245,7 @@ def _sum(a: Any, b: Any) -> tuple[Any, Any]:
 
 
 def _short_sum(a: Any, b: Any) -> tuple[Any, Any]:
-    """The same where `a` is not smaller than `b` in size, or 0."""
+    """The same if `a` is not smaller than `b` in size, or 0."""
     s = a + b
     return s, b - (s - a)
 
@@ -298,19 +295,6 @@ def recording(kind: str) -> Recorded:
     return recorded(function, arguments)
 
 
-def numpy_basic() -> SimpleNamespace:
-    """The engine of basic operations on arrays."""
-    import numpy as np
-
-    def bits(x: Any) -> Any:
-        return np.asarray(x, float).view(np.int64)
-
-    return SimpleNamespace(
-        sqrt=np.sqrt,
-        abs=np.abs,
-        copysign=np.copysign,
-        choose=np.where,
-        exponent=lambda x: (bits(x) - ROOT_OF_HALF >> 52).astype(float),
-        mantissa=lambda x: ((bits(x) - ROOT_OF_HALF & (1 << 52) - 1) + ROOT_OF_HALF).view(float),
-        power2=lambda k: (np.asarray(k + 1023.0).astype(np.int64) << 52).view(float),
-    )
+def is_pair(kind: str) -> bool:
+    """Whether the function that computes operations of this `kind` has two results, as sine and cosine."""
+    return kind in OWN and len(recording(kind).results) > 1

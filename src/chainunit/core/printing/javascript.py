@@ -14,7 +14,7 @@ Nothing is evaluated from texts, so that it runs under a content policy that adm
 ``derivatives()``
     to ``rates``, the derivatives of the states
 ``requirements()``, ``start_limits()``
-    to arrays of these names with a ``_`` behind: value, lower and upper limit of each requirement on the parameters,
+    to ``requirements_`` and ``start_limits_``: value, lower and upper limit of each requirement on the parameters,
     and on the states at the start
 ``start()``, ``run(...)``
     the states at the start, and a run in the time, see ``steps.js``
@@ -33,14 +33,13 @@ from importlib.resources import files
 from itertools import chain, count
 from typing import Any
 
-from .. import integrators
 from ..engines import casadi_
 from ..errors import InputError
 from ..model import Model
 from ..symbolic_trace import chosen_columns, outputs_of, trace
 from .division import Division
-from .elementary import OWN, recording
-from .kernels import ModelFunction, kernels
+from .elementary import OWN, is_pair, recording
+from .kernels import STEP_NUMBERS, ModelFunction, kernels
 from .operations import ARGUMENT, NUMBER, Operation, Operations
 from .recorder import CHOOSE, EXPONENT, MANTISSA, POWER2
 
@@ -62,12 +61,7 @@ _FORMS |= _CONDITIONS | {
 }  # fmt: skip
 """Each operation in JavaScript: ``{0}`` is its first operand, and ``{c[0]}`` that as a condition."""
 _RESULTS = {"values": "y", "derivatives": "rates", "derive": "k", "guess": "z", "initial": "x"}
-"""The arrays of the results of functions, by name; those of all others have the name of the function and ``_``."""
-_NUMBERS = (
-    "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR "
-    "DENSE"
-).split()
-"""The numbers of `chainunit.core.integrators` that the steps need."""
+"""By function, the array of its results; the arrays of all others have the name of the function and ``_``."""
 _HEAD = """\
 const f8 = new Float64Array(1), i4 = new Int32Array(f8.buffer), u4 = new Uint32Array(f8.buffer);
 const second = new Float64Array(1); // the second result of a function
@@ -86,8 +80,7 @@ const copysign = (a, b) => ((f8[0] = b), i4[1] < 0 ? -Math.abs(a) : Math.abs(a))
 def program(models: Mapping[str, str]) -> str:
     """The expression whose value has these models, each printed by `model_text`, by name."""
     rows = ",\n".join(f"{json.dumps(name)}: stepped({text})" for name, text in models.items())
-    constants = {name: value for name, value in vars(integrators).items() if name in _NUMBERS}
-    numbers = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in constants.items())
+    numbers = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in STEP_NUMBERS.items())
     steps = (files(__package__) / "steps.js").read_text("utf-8")
     return f'(() => {{\n"use strict";\n{_HEAD}{_elementary()}{numbers}{steps}return {{\n{rows}\n}};\n}})()'
 
@@ -196,8 +189,8 @@ def _statements(
     Parameters
     ----------
     outside : the text of a value that is computed elsewhere
-    kept : by place where values are stored
-    results : places of values that are needed behind the statements
+    kept : by place, the array entry in which a value is stored
+    results : places of values that are needed after the statements
     usual : see `_renamed`
     """
     inside = [place for place in places if items[place].operands]
@@ -228,7 +221,7 @@ def _statements(
             *values, c=[truths.get(k, f"({x}!==0)") for k, x in zip(operands, values, strict=True)]
         )
         stored = f"{kept[place]}=" if place in kept else ""
-        if _is_pair(kind):
+        if is_pair(kind):
             first = pairs.setdefault((text, operands), place)
             if first == place:
                 lines += [f"$s{place}={text}", f"$c{place}=second[0]"]
@@ -250,40 +243,43 @@ def _statements(
 
 _NAME = re.compile(r"\$\w+")
 _LETTERS = "abcdefghijlmnoqrstvABCDEFGHIJKLMNOPQRSTUVWXYZ"
-"""First letters of names of values: those of arrays are others."""
+"""First letters of names of values; arrays have others."""
 
 
 def _renamed(
     lines: Sequence[str], results: Sequence[str], usual: dict[Any, list[int]]
 ) -> tuple[str, list[str]]:
-    """The statements and texts with few names, each used again when nothing needs its value. A value has a name that
-    one of a statement like this had, its `usual` ones, if one is free: operations that stand again and again have
-    texts that a packer finds again."""
-    whole = [*lines, *results]
-    last = {name: n for n, line in enumerate(whole) for name in _NAME.findall(line)}
+    """The statements and texts with few short names, each used again as soon as nothing needs its value.
+
+    `usual` has the numbers of the names that statements of the same form had, by the form and the one before it. A
+    value takes one of them if it is free: statements that stand again and again then have equal texts, which a packer
+    finds.
+    """
+    texts = [*lines, *results]
+    last_use = {name: n for n, text in enumerate(texts) for name in _NAME.findall(text)}
     forms = ["", *(_NAME.sub("", line) for line in lines)]
-    names: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     busy: set[int] = set()
-    for n, line in enumerate(whole):
-        used = _NAME.findall(line)
-        new = used.pop(0) if line.startswith("$") and n < len(lines) else ""
-        busy.difference_update(names[name] for name in used if last[name] == n)
+    for n, text in enumerate(texts):
+        used = _NAME.findall(text)
+        new = used.pop(0) if text.startswith("$") and n < len(lines) else ""
+        busy.difference_update(numbers[name] for name in used if last_use[name] == n)
         if new:
             candidates = usual.setdefault((forms[n], forms[n + 1]), [])
-            names[new] = next(k for k in chain(candidates, count(min(len(usual), _NAMES))) if k not in busy)
-            if names[new] not in candidates:
-                candidates.append(names[new])
-            if last[new] > n:
-                busy.add(names[new])
-        whole[n] = _NAME.sub(lambda match: _short(names[match[0]]), line)
-    head = f"let {','.join(map(_short, sorted(set(names.values()))))};" if names else ""
-    return head + "".join(f"{line};" for line in whole[: len(lines)]), whole[len(lines) :]
+            numbers[new] = next(k for k in chain(candidates, count(min(len(usual), _NAMES))) if k not in busy)
+            if numbers[new] not in candidates:
+                candidates.append(numbers[new])
+            if last_use[new] > n:
+                busy.add(numbers[new])
+        texts[n] = _NAME.sub(lambda match: _short(numbers[match[0]]), text)
+    head = f"let {','.join(map(_short, sorted(set(numbers.values()))))};" if numbers else ""
+    return head + "".join(f"{text};" for text in texts[: len(lines)]), texts[len(lines) :]
 
 
 def _short(n: int) -> str:
     """The name of a value by its number."""
-    more, first = divmod(n, len(_LETTERS))
-    return _LETTERS[first] + (str(more) if more else "")
+    digits, letter = divmod(n, len(_LETTERS))
+    return _LETTERS[letter] + (str(digits) if digits else "")
 
 
 def _form(kind: str) -> str:
@@ -305,11 +301,6 @@ def _form(kind: str) -> str:
     return _FORMS[kind]
 
 
-def _is_pair(kind: str) -> bool:
-    """Whether the function that computes operations of this kind has two results, as sine and cosine."""
-    return kind in OWN and len(recording(kind).results) > 1
-
-
 def _elementary() -> str:
     """Sine, arctangent and the like (`chainunit.core.printing.elementary`)."""
     texts = {}
@@ -321,10 +312,12 @@ def _elementary() -> str:
             return _number(operation.value) if operation.kind == NUMBER else f"x{operation.entry[1]}"
 
         lines, values = _statements(traced.items, range(len(traced.items)), outside, {}, traced.results, {})
-        first, *other = values
-        also = "".join(f"second[0]={value};" for value in other)
+        first, *rest = values
+        second = "".join(f"second[0]={value};" for value in rest)
         names = ",".join(f"x{n}" for n in range(arguments))
-        texts[function.__name__] = f"function {function.__name__}({names}){{{lines}{also}return {first};}}\n"
+        texts[function.__name__] = (
+            f"function {function.__name__}({names}){{{lines}{second}return {first};}}\n"
+        )
     return "".join(texts.values())
 
 

@@ -5,13 +5,23 @@ C and JavaScript are printed from the same list.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from .. import integrators
 from ..engines import casadi_
 from ..model import Model
 from ..symbolic_trace import Trace
+
+STEP_NUMBERS = {
+    name: getattr(integrators, name)
+    for name in (
+        "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH "
+        "NO_ERROR DENSE"
+    ).split()
+}
+"""The numbers of `chainunit.core.integrators` that a printed loop of steps needs, by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +77,7 @@ def kernels(
     t: Trace, derived: Sequence[Any], slopes: bool = True, columns: Sequence[str] | None = None
 ) -> Iterator[ModelFunction]:
     """The functions of a traced model: its outputs and their derivatives in a direction (``values``, ``forward``),
-    and where it has such, the ``derivatives`` of its states and all for their start, the requirements on its
+    and, if it has such, the ``derivatives`` of its states and all for their start, the requirements on its
     parameters, and the values `derived` from them. With `columns`, by name, ``values`` gives these alone, in one
     group."""
     import casadi
@@ -77,12 +87,13 @@ def kernels(
     du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
     symbols = {"p": ps, "u": us, "x": xs, "k": ks, "z": zs, "d": du, "e": dx}
     # derived values come last, and only if the model has them
-    more = "k" if model.derived_count else ""
+    k = "k" if model.derived_count else ""
 
     def kernel(name: str, takes: str, groups: list[Any], offsets: list[int], frequency: str) -> ModelFunction:
         return ModelFunction(name, takes, [symbols[letter] for letter in takes], groups, offsets, frequency)
 
-    def one(name: str, takes: str, results: Sequence[Any], frequency: str = "ONCE") -> ModelFunction:
+    def single(name: str, takes: str, results: Sequence[Any], frequency: str = "ONCE") -> ModelFunction:
+        """A function with one group of results."""
         return kernel(name, takes, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
 
     if columns is None:
@@ -91,25 +102,25 @@ def kernels(
         outputs = [t.columns[name][1] for name in columns]
         places = [list(range(len(outputs)))]
     offsets = [sum(map(len, places[:g])) for g in range(len(places))]
-    values = [casadi.vertcat(*(outputs[k] for k in group)) for group in places]
-    yield kernel("values", f"pux{more}", values, offsets, "OFTEN")
+    values = [casadi.vertcat(*(outputs[place] for place in group)) for group in places]
+    yield kernel("values", f"pux{k}", values, offsets, "OFTEN")
     if slopes:
         apart = groups_without_slopes(model)
         smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
         smooth.append(casadi.vertcat(*t.derivatives))
         along = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
-        yield kernel("forward", f"puxde{more}", along, [*offsets, len(outputs)], "SELDOM")
+        yield kernel("forward", f"puxde{k}", along, [*offsets, len(outputs)], "SELDOM")
     if model.state_layout:
-        yield one("derivatives", f"pux{more}", t.derivatives, "OFTEN")
-        yield from _start(t, zs, one, more)
-        yield one("internal_step", "p", [model.internal_step(casadi_(), t.p)])
+        yield single("derivatives", f"pux{k}", t.derivatives, "OFTEN")
+        yield from _start(t, zs, single, k)
+        yield single("internal_step", "p", [model.internal_step(casadi_(), t.p)])
         if model.controlled:
-            yield one("tolerance", "p", [model.tolerance(casadi_(), t.p)])
-            yield one("closed", f"pux{more}", model.constrained_states(casadi_(), t.p, t.u, t.x), "OFTEN")
+            yield single("tolerance", "p", [model.tolerance(casadi_(), t.p)])
+            yield single("closed", f"pux{k}", model.constrained_states(casadi_(), t.p, t.u, t.x), "OFTEN")
     if limits := [v for row in model.requirements(casadi_(), t.p) for v in row]:
-        yield one("requirements", f"p{more}", limits)
+        yield single("requirements", f"p{k}", limits)
     if model.derived_count:
-        yield one("derive", "p", derived)
+        yield single("derive", "p", derived)
 
 
 def groups_without_slopes(model: Model) -> set[int]:
@@ -119,17 +130,18 @@ def groups_without_slopes(model: Model) -> set[int]:
     return difference_groups(model) | {g for g, group in enumerate(groups) if places[group[0]].type != "Real"}
 
 
-def _start(t: Trace, zs: Any, one: Any, more: str) -> Iterator[ModelFunction]:
-    """The functions that give the states at the start."""
+def _start(t: Trace, zs: Any, single: Callable[..., ModelFunction], k: str) -> Iterator[ModelFunction]:
+    """The functions that give the states at the start; `zs` are the unknowns in symbols, `single` makes a function
+    with one group, and `k` is the letter of the derived values, or empty."""
     import casadi
 
     model = t.model
     assert model.state_layout is not None
     z = casadi.vertsplit(zs) if model.start_problem.unknowns else []
     if z:
-        yield one("guess", "pu", model.start_guess(casadi_(), t.p, t.u))
-        yield one("improved", "puz", model.improve_start(casadi_(), t.p, t.u, z))
-    yield one("initial", "puz", model.state_layout.values(model.start_states(casadi_(), t.p, t.u, z)))
+        yield single("guess", "pu", model.start_guess(casadi_(), t.p, t.u))
+        yield single("improved", "puz", model.improve_start(casadi_(), t.p, t.u, z))
+    yield single("initial", "puz", model.state_layout.values(model.start_states(casadi_(), t.p, t.u, z)))
     if model.start_problem.required:
         limits = [v for row in model.start_limits(casadi_(), t.p, t.u, t.x) for v in row]
-        yield one("start_limits", f"pux{more}", limits)
+        yield single("start_limits", f"pux{k}", limits)

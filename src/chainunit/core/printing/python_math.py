@@ -26,6 +26,8 @@ def Quotient(a: float, b: float) -> float:
 
 
 def _without_errors(function: Callable[..., float]) -> Callable[..., float]:
+    """The function with NaN or inf in place of the errors of `math`."""
+
     def value(*x: float) -> float:
         try:
             return function(*x)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partialmethod
 from typing import Any
 
 from .operations import ARGUMENT, NUMBER, Operation
 
 CHOOSE, EXPONENT, MANTISSA, POWER2 = "CHOOSE", "EXPONENT", "MANTISSA", "POWER2"
-"""Kinds of operations beside those of CasADi: the second operand where the first one is not 0, else the third; the
+"""Kinds of operations beside those of CasADi: the second operand if the first one is not 0, else the third; the
 nearest exponent of 2 of a number, and what that power is multiplied by; and 2 to the power of a whole number."""
 
 
@@ -28,7 +28,8 @@ class Recorded:
 
 @dataclass(slots=True)
 class Recorder:
-    """An engine whose values are places in the list `items`, in which equal operations stand once."""
+    """An engine of basic operations, see `chainunit.core.printing.elementary`. Its values are places in the list
+    `items`, in which equal operations stand once."""
 
     items: list[Operation] = field(default_factory=list)
     _places: dict[str, int] = field(default_factory=dict)
@@ -48,33 +49,13 @@ class Recorder:
     def _noted(self, x: Any) -> Noted:
         return x if isinstance(x, Noted) else self.add(Operation(NUMBER, value=float(x)))
 
-    def sqrt(self, x: Any) -> Noted:
-        """The square root."""
-        return self.operation("SQRT", x)
-
-    def abs(self, x: Any) -> Noted:
-        """The size."""
-        return self.operation("FABS", x)
-
-    def copysign(self, a: Any, b: Any) -> Noted:
-        """The size of `a` with the sign of `b`."""
-        return self.operation("COPYSIGN", a, b)
-
-    def choose(self, condition: Any, a: Any, b: Any) -> Noted:
-        """`a` where the condition holds, else `b`."""
-        return self.operation(CHOOSE, condition, a, b)
-
-    def exponent(self, x: Any) -> Noted:
-        """The nearest exponent of 2 of a positive normal number."""
-        return self.operation(EXPONENT, x)
-
-    def mantissa(self, x: Any) -> Noted:
-        """A positive normal number over 2 to the power of that, from the root of 1/2 to that of 2."""
-        return self.operation(MANTISSA, x)
-
-    def power2(self, k: Any) -> Noted:
-        """2 to the power of a whole number from -1022 to 1023."""
-        return self.operation(POWER2, k)
+    sqrt = partialmethod(operation, "SQRT")
+    abs = partialmethod(operation, "FABS")
+    copysign = partialmethod(operation, "COPYSIGN")
+    choose = partialmethod(operation, CHOOSE)
+    exponent = partialmethod(operation, EXPONENT)
+    mantissa = partialmethod(operation, MANTISSA)
+    power2 = partialmethod(operation, POWER2)
 
 
 class Noted:
@@ -96,6 +77,8 @@ class Noted:
 
 
 def _operator(name: str, kind: str) -> None:
+    """Give `Noted` the operator of this name, also with a number on its left."""
+
     def forward(self: Noted, other: Any) -> Noted:
         return self.recorder.operation(kind, self, other)
 

@@ -93,6 +93,7 @@ class VectorCode:
         return "\n".join([*lines, "  (void)U,(void)a,(void)y;", "}", ""])
 
     def _value(self, place: int, vectors: bool) -> str:
+        """The text of a value: a number, a uniform value, which lanes take from ``U``, or a variable."""
         operation = self._items[place]
         if operation.kind == NUMBER:
             return number(operation.value)
@@ -101,6 +102,7 @@ class VectorCode:
         return f"a{place}"
 
     def _vector(self, place: int) -> str:
+        """The text of a value as a vector."""
         text = self._value(place, vectors=True)
         return text if self._varies[place] else f"V({text})"
 

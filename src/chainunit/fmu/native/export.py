@@ -86,9 +86,9 @@ def export(
     Raises
     ------
     KeyError, InputError
-        see `chainunit.fmu.export.export`; also where there is no compiler for a platform.
+        see `chainunit.fmu.export.export`; also if there is no compiler for a platform.
     RunError
-        where the compiler fails, with its messages.
+        if the compiler fails, with its messages.
     """
     targets, compiler = choose(platforms, fmi)
     interface = interface_of(model, start, script_with_names(names))
@@ -109,7 +109,7 @@ def export(
         description = model_description(interface, "", kinds, version, units)
     else:
         description = model_description_3(interface, "", kinds, version)
-    functions, room = kernels(interface)
+    functions, room = kernels(model)
     sources = {name: (recipes() / "native" / name).read_bytes() for name in layer}
     sources |= {"kernels.c": functions.encode(), "rules.h": interface.text(rules()).encode()}
     sources |= {HEADER: header().encode(), STEP: c_file(STEP).encode()}

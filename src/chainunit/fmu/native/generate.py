@@ -23,23 +23,15 @@ from ...core.quantities import Variable
 from ..description import Interface, shared_interface
 
 
-def kernels(interface: Interface) -> tuple[str, int]:
-    """``kernels.c`` with the model's functions, and the memory that they need, as a number of doubles. Start values
-    and the version of FMI do not change them."""
-    return _kernels(interface.model)
-
-
 @lru_cache(maxsize=16)
-def _kernels(model: Model) -> tuple[str, int]:
-    programs = list(_programs(shared_interface(model)))
+def kernels(model: Model) -> tuple[str, int]:
+    """``kernels.c`` with the functions of a model, and the memory that they need, as a number of doubles. They are
+    the same for all start values and versions of FMI."""
+    shared = shared_interface(model)
+    programs = [Program(function) for function in kernels_of(shared.trace, shared.derived)]
     table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
     text = "\n".join([_BEFORE_KERNELS, *(program.text for program in programs), _TABLE, *table, "};", ""])
     return text, max(program.room for program in programs)
-
-
-def _programs(interface: Interface) -> Iterator[Program]:
-    for kernel in kernels_of(interface.trace, interface.derived):
-        yield Program(kernel.name, kernel.arguments, kernel.groups, kernel.offsets, kernel.frequency)
 
 
 _BEFORE_KERNELS = """\
@@ -69,6 +61,7 @@ _TABLE = "const Kernels kernels = {"
 
 
 def _text(s: str) -> str:
+    """A text in C."""
     return json.dumps(s)
 
 
@@ -77,7 +70,7 @@ def _unit(unit: str) -> str:
 
 
 def _array(kind: str, name: str, items: list[str]) -> str:
-    # C has no empty arrays
+    """The definition of an array; C has no empty ones."""
     body = ",\n    ".join(items or ["0"])
     return f"static const {kind} {name}[] = {{\n    {body},\n}};\n"
 
@@ -99,6 +92,7 @@ def _capitals(module: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _printf(text: str) -> str:
+    """A text with fields in braces as a format of printf."""
     kinds = {"": "%s", "g": "%g", "d": "%u"}
     pieces = Formatter().parse(text)
     return "".join(x.replace("%", "%%") + (kinds[kind or ""] if name else "") for x, name, kind, _ in pieces)
@@ -116,22 +110,15 @@ def _quantity(v: Variable) -> str:
 def tables(interface: Interface, guid: str, room: int) -> str:
     """``model.c``: the tables that model.h declares, with the GUID (in FMI 3.0 the instantiation token) and the
     memory `room` of the kernels."""
-    model = interface.model
-
-    def rate_of(name: str) -> int:
-        return model.input_layout.names.index(model.input_rates[name]) if name in model.input_rates else -1
-
-    place, group_of = {}, {}
-    first = 0
-    group_rows = []
-    for g, group in enumerate(output_groups(interface.model)):
-        group_rows.append(f"{{{first}, {len(group)}}}")
-        for k, output in enumerate(group):
-            place[output], group_of[output] = first + k, g
-        first += len(group)
+    model, groups = interface.model, output_groups(interface.model)
+    inputs, parameters = model.input_layout.names, model.parameter_layout.names
     n_y = len(interface.others)
+    group_of = {output: g for g, group in enumerate(groups) for output in group}
+    place = {output: k for k, output in enumerate(output for group in groups for output in group)}
+    group_rows = [f"{{{place[group[0]]}, {len(group)}}}" for group in groups]
     starts = [s.start for s in (*interface.signals_of("parameter"), *interface.signals_of("input"))]
-    parameter_names = model.parameter_layout.names
+    rates = [inputs.index(model.input_rates[name]) if name in model.input_rates else -1 for name in inputs]
+    requirements = (*model.required, *model.start_problem.required)
     lines = [
         f"/* {model.name}: tables for model.h, generated from the model's declarations. */",
         "#include <math.h>",
@@ -142,15 +129,14 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         _array("double", "starts", [number(x or 0.0) for x in starts]),
         _array("Quantity", "declared", [_quantity(v) for v in (*interface.parameters, *interface.inputs)]),
         _array("double", "nominal", [number(v.quantity.nominal or 1.0) for v in interface.states]),
-        _array("int", "rate_of", [str(rate_of(v.name)) for v in interface.inputs]),
+        _array("int", "rate_of", list(map(str, rates))),
         _array("int", "place", [str(place[i]) for i in range(n_y)]),
         _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
         _array("Group", "group", group_rows),
         _array("Type", "discrete_type", [interface.others[i].type.upper() for i in interface.discrete]),
     ]
-    requirements = (*model.required, *model.start_problem.required)
     for i, r in enumerate(requirements):
-        lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.context]))
+        lines.append(_array("int", f"given_{i}", [str(parameters.index(name)) for name in r.context]))
     rows = [
         f"{{{_text(r.subject)}, {_unit(r.unit)}, {_text(r.why)}, {_text(r.remedy)}, {len(r.context)}, given_{i}}}"
         for i, r in enumerate(requirements)
@@ -168,7 +154,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "n_z": model.start_problem.unknowns,
         "n_w": room,
         "n_groups": len(group_rows),
-        "differenced": f"{sum(1 << g for g in difference_groups(interface.model))}u",
+        "differenced": f"{sum(1 << g for g in difference_groups(model))}u",
         "n_required": len(model.required),
         "n_start_required": len(model.start_problem.required),
         "start": "starts",
@@ -182,7 +168,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "discrete_type": "discrete_type",
         "required": "required" if rows else "NULL",
         "start_rounds": model.start_problem.rounds,
-        "max_steps": parameter_names.index(MAX_STEPS) if interface.states else -1,
+        "max_steps": parameters.index(MAX_STEPS) if interface.states else -1,
     }
     lines.append("const Model model = {")
     lines += [f"    .{name} = {value}," for name, value in fields.items()]

@@ -15,7 +15,7 @@ from ...core.printing.c_elementary import HEADER
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
-KERNELS, KERNELS_OBJECT, HEADERS = "kernels.c", "kernels.o", ("model.h", HEADER)
+KERNELS, _KERNELS_OBJECT, HEADERS = "kernels.c", "kernels.o", ("model.h", HEADER)
 
 
 def units_of(fmi: int) -> tuple[str, ...]:
@@ -71,23 +71,25 @@ def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
             raise InputError(f"platforms = {name}: no such platform; there are {', '.join(PLATFORMS)}")
         if fmi not in PLATFORMS[name].folders:
             raise InputError(f"platforms = {name}: FMI {fmi}.0 has no folder for it; export with fmi 3")
-    here = host()
+    local_platform = host()
     if not names:
         local_compiler = compiler()
-        if here is None or local_compiler is None:
+        if local_platform is None or local_compiler is None:
             raise InputError(
                 f"no C compiler ({COMPILERS}) for this machine found: install one, or export with backend python"
             )
-        if fmi not in PLATFORMS[here].folders:
-            raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with fmi 3 or backend python")
-        return (here,), local_compiler
+        if fmi not in PLATFORMS[local_platform].folders:
+            raise InputError(
+                f"FMI {fmi}.0 has no folder for {local_platform}; export with fmi 3 or backend python"
+            )
+        return (local_platform,), local_compiler
     # zig comes first, for its old system libraries; the system's compiler knows only this machine
-    able = zig_compiler() or (compiler() if set(names) == {here} else None)
-    if able is None:
+    chosen_compiler = zig_compiler() or (compiler() if set(names) == {local_platform} else None)
+    if chosen_compiler is None:
         raise InputError(
             f"platforms = {', '.join(names)}: needs zig, a C compiler for all of them: pip install 'chainunit[cross]'"
         )
-    return tuple(dict.fromkeys(names)), able
+    return tuple(dict.fromkeys(names)), chosen_compiler
 
 
 def build(
@@ -111,7 +113,7 @@ def build(
     Raises
     ------
     RunError
-        where the compiler fails, with its messages.
+        if the compiler fails, with its messages.
     """
     target_platform = PLATFORMS[name]
     libraries = {}
@@ -131,12 +133,12 @@ def build_here(compiler: Compiler, fmi: int, identifier: str, sources: Mapping[s
     Raises
     ------
     RunError
-        where the compiler fails, with its messages.
+        if the compiler fails, with its messages.
     """
-    here = host() or "linux64"
-    # a library is the same in each folder; of macOS that of FMI 2.0 has all processors
-    version = 2 if 2 in PLATFORMS[here].folders else 3
-    (library,) = build(compiler, here, version, identifier, sources, units_of(fmi)).values()
+    name = host() or "linux64"
+    # a library is the same in each folder; of macOS the one of FMI 2.0 has all processors
+    version = 2 if 2 in PLATFORMS[name].folders else 3
+    (library,) = build(compiler, name, version, identifier, sources, units_of(fmi)).values()
     return library
 
 
@@ -146,39 +148,21 @@ def _compile(
     target_platform: Platform,
     identifier: str,
     sources: Mapping[str, bytes],
-    files: Sequence[str],
-) -> bytes:
-    options = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
-    link = (*_SHARED, *target_platform.link_options)
-    library = identifier + target_platform.suffix
-    return compile_with_kernels(compiler, (*options, *_FLAGS), link, sources, files, library)
-
-
-def compile_with_kernels(
-    compiler: Compiler,
-    flags: Sequence[str],
-    link: Sequence[str],
-    sources: Mapping[str, bytes],
     units: Sequence[str],
-    library: str,
 ) -> bytes:
-    """The library of that name from some of the `sources`, with flags of the compiler, and more of the linker.
-
-    The kernels are compiled apart: they take almost all of the time, and are the same for any start values.
-
-    Raises
-    ------
-    RunError
-        where the compiler fails, with its messages.
-    """
+    """The library for a target. The kernels are compiled apart: they take almost all of the time, and are the same
+    for any start values."""
+    options = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
+    flags = (*options, *_FLAGS)
     kernels = {name: sources[name] for name in (KERNELS, *HEADERS)}
     object_code = compile_code(
-        compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT
+        compiler, (*flags, "-c", KERNELS, "-o", _KERNELS_OBJECT), kernels, _KERNELS_OBJECT
     )
-    rest = {name: text for name, text in sources.items() if name != KERNELS} | {KERNELS_OBJECT: object_code}
-    others = [name for name in units if name != KERNELS]
-    arguments = (*flags, *others, KERNELS_OBJECT, "-o", library, *link)
-    return compile_code(compiler, arguments, rest, library)
+    rest = {name: text for name, text in sources.items() if name != KERNELS}
+    library = identifier + target_platform.suffix
+    arguments = (*flags, *(name for name in units if name != KERNELS), _KERNELS_OBJECT, "-o", library)
+    link = (*_SHARED, *target_platform.link_options)
+    return compile_code(compiler, (*arguments, *link), rest | {_KERNELS_OBJECT: object_code}, library)
 
 
 def fat(slices: Sequence[bytes]) -> bytes:

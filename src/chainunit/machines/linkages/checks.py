@@ -2,70 +2,36 @@
 
 from __future__ import annotations
 
-import keyword
 import math
-import re
-import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
+from .declarations import RESERVED
 from .joint_kind import JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
+from .names import alike_points
 from .structure import DriverEntry, groups_of
 
 Fault = tuple[str, str]
 Entries = Sequence[Mapping[str, Any]]
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_WORD = re.compile(r"[^\W\d]\w*")
 POINT_NAMES = ("angle", "w", "a", "centroid", "mass", "inertia")
 """Names that the variables of a link have already."""
 _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
 
 
-def words_in(entry: Any) -> set[str]:
-    """All words in the texts of a table."""
-    if isinstance(entry, str):
-        return {*_WORD.findall(entry)}
-    inside = entry.values() if isinstance(entry, Mapping) else entry if isinstance(entry, list) else ()
-    return set().union(*map(words_in, inside))
-
-
-def name_fault(name: str) -> str:
-    """What is wrong with a name; empty where nothing is."""
-    if not _NAME.fullmatch(name):
-        return "a name has letters, digits and _, and begins with a letter"
-    if keyword.iskeyword(name):
-        return f"{name} is a word of programming languages; choose another name, such as {name}_1"
-    return ""
-
-
-def model_name(stem: str) -> str:
-    """The name of a machine whose file states none, from the name of the file: ``60 kN press`` gives
-    ``linkage_60_kN_press``, ``größer`` gives ``grosser``. It is an identifier of C, as FMUs need one."""
-    plain = unicodedata.normalize("NFKD", stem.replace("ß", "ss"))
-    name = re.sub(r"[^A-Za-z0-9_]", "_", "".join(c for c in plain if not unicodedata.combining(c)))
-    return f"linkage_{name}" if name_fault(name) else name
-
-
 def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
-    """The fault of a table of guides where no joint slides."""
+    """The fault of a table of guides if no joint slides."""
     if "guides" in data and not any(joint["type"] == PRISMATIC for joint in joints):
         yield "guides", "no joint of the linkage slides; leave the table out"
 
 
 def study_fault(data: Mapping[str, Any]) -> None:
-    """Refuse a study file.
-
-    Raises
-    ------
-    InputError
-        in one line.
-    """
+    """Refuse a study file."""
     study_tables = [key for key in _STUDY if key in data]
     if study_tables and "links" not in data:
         raise InputError(
@@ -75,26 +41,21 @@ def study_fault(data: Mapping[str, Any]) -> None:
         )
 
 
-def quantity_names(
-    parameters: Entries, inputs: Entries, tables: Mapping[str, Any], reserved: frozenset[str], links: Entries
-) -> Iterator[Fault]:
-    """Names of parameters, inputs and tables that two things share, or that have a meaning already."""
+def quantity_names(names: Mapping[str, Sequence[str]], links: Entries) -> Iterator[Fault]:
+    """Names of parameters, inputs and tables that two things share, or that have a meaning already; `names` are
+    those by the table of the file."""
     seen: dict[str, str] = {}
+    link_names = {link["name"] for link in links}
     link_quantities = {f"{quantity}_of_{link['name']}" for link in links for quantity in link.get("own", ())}
-    names = [
-        (kind, entry["name"])
-        for kind, entries in (("parameters", parameters), ("inputs", inputs))
-        for entry in entries
-    ]
-    for kind, name in (*names, *(("tables", name) for name in tables)):
+    for kind, name in ((kind, name) for kind, members in names.items() for name in members):
         key = f"{kind}.{name}"
         if name in (*WORDS, *CONSTANTS, *MOTION):
             yield key, "the name has a meaning in expressions; choose another one"
-        elif name in link_quantities or (kind != "tables" and name in reserved):
+        elif name in link_quantities or (kind != "tables" and name in RESERVED):
             yield key, "is a variable of every linkage; choose another name"
         elif name in seen:
             yield key, f"is a name in [{seen[name]}], too; choose another one"
-        elif kind != "tables" and name in {link["name"] for link in links}:
+        elif kind != "tables" and name in link_names:
             yield key, "is the name of a link, too; choose another one"
         seen.setdefault(name, kind)
 
@@ -113,47 +74,24 @@ def spring_faults(loads: Entries, joints: Entries) -> Iterator[Fault]:
             yield key, f"both ends are in the joint {pins[ends]}; give points that move apart"
 
 
-def alike_points(points: Mapping[str, Iterable[str]], used: set[tuple[str, ...]]) -> str:
-    """Words on a point that nothing joins, whose name looks like that of a point of another link: a pin that was
-    meant. `used` are the points that joints, loads and masses name, by link."""
-    owners: dict[str, list[str]] = {}
-    for link, names in points.items():
-        for point in names:
-            owners.setdefault(point, []).append(link)
-    for link, names in points.items():
-        for point in names:
-            if owners[point] != [link] or (link, point) in used:
-                continue
-            for other, those in owners.items():
-                if those != [link] and other != point and _alike(point, other):
-                    return (
-                        f"; the names of the points {link}.{point} and {those[0]}.{other} look alike: a pin joins "
-                        "points of one name"
-                    )
-    return ""
-
-
-def _alike(first: str, second: str) -> bool:
-    """Whether two names may be meant to be one: but for capitals and signs between, or a letter more."""
-    a, b = (name.replace("_", "").lower() for name in (first, second))
-    if a == b:
-        return True
-    digits = [re.sub(r"\D", "", name) for name in (a, b)]
-    short, long = sorted((a, b), key=len)
-    return digits[0] == digits[1] and len(long) == len(short) + 1 and long.startswith(short)
-
-
 def freedom_faults(
-    links: Entries, joints: Entries, driver: Mapping[str, Any], hint: str = ""
+    points: Mapping[str, Iterable[str]],
+    links: Entries,
+    joints: Entries,
+    loads: Entries,
+    driver: Mapping[str, Any],
 ) -> Iterator[Fault]:
-    """Too many or too few degrees of freedom, and groups of a class that is not covered; the `hint` follows a refusal
-    of too many."""
-    entries = [JointEntry.from_table(j) for j in joints]
+    """Too many or too few degrees of freedom, and groups of a class that is not covered. Too many may come from a
+    name of a point that is not spelled as that of the pin that it was meant to be."""
+    names = [link["name"] for link in links]
     try:
-        groups_of([link["name"] for link in links], entries, DriverEntry(**driver))
+        groups_of(names, [JointEntry.from_table(j) for j in joints], DriverEntry(**driver))
     except InputError as error:
-        text = f"{error}{hint if isinstance(error, FreeLinksError) else ''}"
-        yield f"links.{error.key}" if error.key in {link["name"] for link in links} else "joints", text
+        used = {tuple(entry[end]) for entry in (*joints, *loads) for end in ("on", "by") if end in entry}
+        used |= {(joint["by"][0], joint["toward"]) for joint in joints if "toward" in joint}
+        used |= {(link["name"], point) for link in links for point in link["masses"]}
+        hint = alike_points(points, used) if isinstance(error, FreeLinksError) else ""
+        yield f"links.{error.key}" if error.key in names else "joints", f"{error}{hint}"
 
 
 Places = Mapping[str, Mapping[str, tuple[float, float]]]

@@ -1,35 +1,26 @@
-"""Why a linkage does not close: the group, its gap, and the lengths with which it closes."""
+"""Why a linkage does not close: the group, its gap, and the lengths with which it closes; or its dead position."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 
-from ...core.engines import MATH
 from ...core.errors import InputError
 from ...groups.dyad import RRP, Dyad
+from ...groups.group import Group
 from ...mechanism.assur import AssurGroup
-from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism
+from ..admissible import rounded_inward
 from .joint_kinds import SINGLES
 
-PLACES = 720
-"""Places over the span at which a group is looked at."""
+LEAST_MARGIN = 1e-3
+"""Least margin of a group: closer to a dead position its forces have no limit."""
 _ROUNDING = 1e-12
 """Gap in parts of the lengths that is rounding: the group just closes, in a dead position."""
 _NO_MARGIN = 1e-6
 _ROUNDED = 2e-3
 """Part of a length by which its two limits, rounded towards each other, may come closer."""
-
-
-def open_group(links: Sequence[str], where: str, hint: str = "") -> InputError:
-    """The refusal of a group that does not close."""
-    return InputError(
-        f"the group of {', '.join(links)} cannot close at {where}{hint or ': change its lengths'}",
-        key=f"links.{links[0]}",
-    )
-
 
 _MEET = ", and its two ways of closing meet"
 _DEAD = {
@@ -44,8 +35,8 @@ _DEAD = {
 """What holds in the dead position of a group, by its kind and with its links."""
 
 
-def dead_group(group: AssurGroup, where: str, margin: float, least: float) -> InputError:
-    """The refusal of a group that comes to a dead position, where its `margin` is not above the `least` one."""
+def dead_group(group: AssurGroup, where: str, margin: float) -> InputError:
+    """The refusal of a group that comes to a dead position, as its `margin` is not above the least one."""
     key = f"links.{group.links[0]}"
     if group.kind in SINGLES:
         return InputError(SINGLES[group.kind].dead(group, where), key)
@@ -53,22 +44,47 @@ def dead_group(group: AssurGroup, where: str, margin: float, least: float) -> In
     size = f"{margin:.1g}" if margin > _NO_MARGIN else "0"
     return InputError(
         f"the group of {', '.join(group.links)} comes to a dead position at {where}: there {reason}, so that its "
-        f"forces have no limit (its margin is {size} and must be > {least:g}); change its lengths",
+        f"forces have no limit (its margin is {size} and must be > {LEAST_MARGIN:g}); change its lengths",
         key=key,
     )
 
 
-def just_closes(linkage: Linkage, number: int, derived: Sequence[Any], q: float) -> bool:
-    """Whether a group that does not close at the place `q` of the driver does so by rounding alone: its links are in
-    line there, as those of a parallelogram at its change point. The arguments are those of `gap_hint`."""
-    group, before = linkage.groups[number], linkage.before(number)
-    if not isinstance(group, Dyad | RRP):
-        return False
-    try:
-        gap, size = _gap(group, _apart(group, Mechanism(MATH, before, q, derived[: before.derived_count])))
-    except (ArithmeticError, ValueError, IndexError):
-        return False
-    return gap <= _ROUNDING * size
+def open_group(
+    group: AssurGroup,
+    where: str,
+    dyad: Group | None,
+    before: Callable[[float], Mechanism],
+    places: Sequence[float],
+) -> InputError:
+    """The refusal of a group that does not close, with its gap and the lengths that close it over all places. A group
+    that fails to close by rounding alone, as a parallelogram at its change point, is in a dead position.
+
+    Parameters
+    ----------
+    where : the first of the places in words
+    dyad : the group with its lengths; None for a driver
+    before : the linkage before the group, of the place of the driver
+    places : that at which the group does not close, then those over the way
+    """
+    hint = ": change its lengths"
+    if isinstance(dyad, Dyad | RRP):
+        with suppress(ArithmeticError, ValueError, IndexError):
+            apart = _apart(dyad, before(places[0]))
+            gap, size = _gap(dyad, apart)
+            if gap <= _ROUNDING * size:
+                return dead_group(group, where, 0.0)
+            hint = _gap_hint(dyad, [apart, *(_apart(dyad, before(place)) for place in places[1:])])
+    return InputError(
+        f"the group of {', '.join(group.links)} cannot close at {where}{hint}", key=f"links.{group.links[0]}"
+    )
+
+
+def _apart(group: Dyad | RRP, m: Mechanism) -> float:
+    """The distance of the outer joints of the group [m]."""
+    if isinstance(group, Dyad):
+        return math.sqrt((m.pins[group.first.pin].p - m.pins[group.second.pin].p).squared())
+    line = group.rail.at_position(m.links)
+    return abs(line.u.cross(m.pins[group.first.pin].p - line.pin.p))
 
 
 def _gap(group: Dyad | RRP, apart: float) -> tuple[float, float]:
@@ -79,73 +95,40 @@ def _gap(group: Dyad | RRP, apart: float) -> tuple[float, float]:
     return max(apart - (one + other), abs(one - other) - apart), one + other
 
 
-def gap_hint(
-    linkage: Linkage, number: int, derived: Sequence[Any], q: float, span: tuple[float, float]
-) -> str:
-    """Words on the gap in a group at the place `q` of the driver, and on the lengths that close it over the `span`;
-    empty for a group whose gap is no matter of two lengths, or where what stands before it does not close.
-
-    Parameters
-    ----------
-    number : index of the group in the linkage
-    """
-    low, high = span
-    places = [low + (high - low) * k / PLACES for k in range(PLACES + 1)]
-    group, before = linkage.groups[number], linkage.before(number)
-    if not isinstance(group, Dyad | RRP):
-        return ""
-    try:
-        apart = [
-            _apart(group, Mechanism(MATH, before, place, derived[: before.derived_count]))
-            for place in (q, *places)
-        ]
-    except (ArithmeticError, ValueError, IndexError):
-        return ""
-    gap, _ = _gap(group, apart[0])
+def _gap_hint(group: Dyad | RRP, apart: Sequence[float]) -> str:
+    """Words on the gap in a group, and on the lengths that close it. Its outer joints are `apart` [m]: first where it
+    does not close, then at places over the way."""
+    first, (gap, _) = group.first, _gap(group, apart[0])
+    least, most = min(apart), max(apart)
     if isinstance(group, RRP):
-        rod = group.first
-        wanted = [(rod.name, rod.length, max(apart), math.inf)]
-        gap_text = (
-            f": its line is {_mm(apart[0])} from the pin {rod.pin}, {_mm(gap)} more than {rod.name} is long"
+        state = (
+            f"its line is {_mm(apart[0])} from the pin {first.pin}, {_mm(gap)} more than {first.name} is long"
         )
+        limits = {first.name: (most, math.inf)}
     else:
-        one, other = group.first, group.second
-        near, far = abs(one.length - other.length), one.length + other.length
+        second = group.second
+        near, far = abs(first.length - second.length), first.length + second.length
         missing = (
             f"more than both are long ({_mm(far)})"
             if apart[0] > far
             else f"less than they differ ({_mm(near)})"
         )
-        gap_text = f": its pins {one.pin} and {other.pin} are {_mm(apart[0])} apart, {_mm(gap)} {missing}"
-        wanted = [
-            (a.name, a.length, max(max(apart) - b.length, b.length - min(apart)), min(apart) + b.length)
-            for a, b in ((one, other), (other, one))
-        ]
-    if not gap > 0.0:
-        return ""
+        state = f"its pins {first.pin} and {second.pin} are {_mm(apart[0])} apart, {_mm(gap)} {missing}"
+        limits = {
+            bar.name: (max(most - length, length - least), least + length)
+            for bar, length in ((first, second.length), (second, first.length))
+        }
     fits = []
-    for name, _, low, high in wanted:
+    for name, (low, high) in limits.items():
         if high - low > _ROUNDED * low:
-            most = "" if high == math.inf else f" and {_mm(high, -1.0)}"
-            fits.append(f"a length of {name} {'between' if most else 'above'} {_mm(low, 1.0)}{most}")
-    return (
-        f"{gap_text}; {' or '.join(fits)} closes it all the way"
-        if fits
-        else f"{gap_text}; change both lengths"
-    )
-
-
-def _apart(group: Dyad | RRP, m: Mechanism) -> float:
-    """How far apart the outer joints of the group are [m]."""
-    if isinstance(group, Dyad):
-        return math.sqrt((m.pins[group.first.pin].p - m.pins[group.second.pin].p).squared())
-    line = group.rail.at_position(m.links)
-    return abs(line.u.cross(m.pins[group.first.pin].p - line.pin.p))
+            most_text = "" if high == math.inf else f" and {_mm(high, -1.0)}"
+            fits.append(
+                f"a length of {name} {'between' if most_text else 'above'} {_mm(low, 1.0)}{most_text}"
+            )
+    remedy = f"{' or '.join(fits)} closes it all the way" if fits else "change both lengths"
+    return f": {state}; {remedy}"
 
 
 def _mm(length: float, sense: float = 0.0) -> str:
-    """A length in four digits, rounded upward where `sense` is +1, downward where it is -1."""
-    if sense and length > 0.0:
-        unit = 10.0 ** (math.floor(math.log10(length)) - 3)
-        length = (math.ceil if sense > 0.0 else math.floor)(length / unit) * unit
-    return f"{1e3 * length:.4g} mm"
+    """A length in four digits; as a limit that is rounded upward if `sense` is +1, downward if it is -1."""
+    return f"{1e3 * (rounded_inward(length, sense) if sense else length):.4g} mm"

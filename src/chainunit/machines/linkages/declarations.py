@@ -8,6 +8,7 @@ from typing import Any
 
 from ...core.ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
 from ...core.quantities import Layout, Value, declaration, declared_class, fields_of, group, quantity
+from ...mechanism.assur import PRISMATIC, REVOLUTE
 from ...mechanism.driver_ports import AddedInertia
 from ...mechanism.models import names_of
 from ..parts import Force, GuideLaw, Pin
@@ -120,6 +121,21 @@ class WayRunning(Energies):
     tau: Value = quantity("N", "force needed at the driver, J a + tau_bias", nominal=1000.0)
 
 
+LOSSES: Mapping[str, tuple[str, type]] = {"pins": (REVOLUTE, PinLaw), "guides": (PRISMATIC, GuideLaw)}
+"""By table, the kind of the joints and the declaration of their losses."""
+
+
+def with_differing(common: type, table: str, laws: Mapping[str, Mapping[str, float]]) -> tuple[str, Any, Any]:
+    """The field of the losses in a `table` of the common parameters, with the `laws` of joints that differ."""
+    declared, shared = LOSSES[table][1], getattr(common(), table)
+    fields = [
+        (name, declared, group(declared, f"{table.removesuffix('s')} {name}", default=declared(**values)))
+        for name, values in laws.items()
+    ]
+    differing: Any = declared_class(f"{declared.__name__}s", (declared,), fields)
+    return table, differing, group(differing, table, default=differing(**Layout(declared).by_name(shared)))
+
+
 def common_parameters(linear: bool, guides: bool, starts: Mapping[str, float]) -> type:
     """The parameters that a linkage has whatever its file says: of a driver that slides (`linear`) or turns, with
     `guides` or without, and with the given start values by name."""
@@ -144,21 +160,15 @@ def field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
 
 def with_starts(declared: type, starts: Mapping[str, float]) -> type:
     """A declaration with other start values, by name."""
-    flat = Layout(declared).from_names(dict(starts))
-    fields = [
-        (f.name, f.type, group(f.metadata["of"], f.metadata["group"], default=getattr(flat, f.name)))
-        if "of" in f.metadata
-        else (
-            f.name,
-            f.type,
-            dataclasses.field(
-                default=getattr(flat, f.name),
-                metadata=f.metadata
-                | {"quantity": dataclasses.replace(f.metadata["quantity"], start=getattr(flat, f.name))},
-            ),
-        )
-        for f in dataclasses.fields(declared)
-    ]
+    flat, fields = Layout(declared).from_names(dict(starts)), []
+    for name, kind, slot in fields_of(declared):
+        start, data = getattr(flat, name), slot.metadata
+        if "of" in data:
+            started: Any = group(data["of"], data["group"], default=start)
+        else:
+            described = dataclasses.replace(data["quantity"], start=start)
+            started = dataclasses.field(default=start, metadata=data | {"quantity": described})
+        fields.append((name, kind, started))
     return declared_class(declared.__name__, (), fields)
 
 

@@ -53,8 +53,7 @@ def _dimension(node: ast.AST, dimensions: Dimensions, parsed: Expression) -> Dim
         case ast.UnaryOp(operand=inner):
             return _dimension(inner, dimensions, parsed)
         case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int() | float() as power)):
-            inside = _dimension(base, dimensions, parsed)
-            return None if inside is None else tuple((name, k * power) for name, k in inside)
+            return _powered(_dimension(base, dimensions, parsed), power)
         case ast.BinOp():
             first, steps = parts_of_chain(node)
             a = _dimension(first, dimensions, parsed)
@@ -84,28 +83,27 @@ def _dimension(node: ast.AST, dimensions: Dimensions, parsed: Expression) -> Dim
     return None
 
 
+def _powered(dimension: Dimension | None, power: float) -> Dimension | None:
+    return None if dimension is None else tuple((unit, k * power) for unit, k in dimension)
+
+
 def _of_function(
     name: str, args: list[Dimension | None], node: ast.AST, parsed: Expression
 ) -> Dimension | None:
-    first = args[0]
+    first, *others = args
     if name == "sqrt":
-        return None if first is None else tuple((unit, 0.5 * k) for unit, k in first)
+        return _powered(first, 0.5)
     if name == "abs":
         return first
     if name == "table":  # of numbers, which take any dimension
         return None
-    if name in ("step", "positive", "ramp"):
-        for argument in args[1:]:
-            first = _same(first, argument, node, parsed)
-        return first if name == "positive" else ()
     if name == "where":
-        _same(first, args[3], node, parsed)
-        return _same(args[1], args[2], node, parsed)
-    if name in ("min", "max"):
-        return _same(first, args[1], node, parsed)
-    if name == "atan2":
-        _same(first, args[1], node, parsed)
-        return ()
+        _same(first, others[2], node, parsed)
+        return _same(others[0], others[1], node, parsed)
+    if name in ("min", "max", "positive", "step", "ramp", "atan2"):
+        for argument in others:
+            first = _same(first, argument, node, parsed)
+        return first if name in ("min", "max", "positive") else ()
     if first:
         raise InputError(f"is {shown(parsed.text)}; {name} takes an angle or a ratio, not {_unit(first)}")
     return ()

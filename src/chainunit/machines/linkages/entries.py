@@ -1,27 +1,23 @@
-"""The entries of a linkage file: numbers with units, expressions, points, parameters, inputs and tables, each read by
-its key, with all faults collected."""
+"""The entries of a linkage file: numbers with units, expressions and points, each read by its key, with all faults
+collected."""
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import fields, replace
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core import units
-from ...core.errors import InputError, near_name, printable, shown
-from ...core.model import About
-from ...core.quantities import USUAL, Layout, Quantity, Variable, base_units
-from ...mechanism.expressions import CONSTANTS, WORDS, Expression, as_float, expression
+from ...core.errors import InputError, meant, near_name, shown
+from ...core.quantities import USUAL, Quantity, Variable, base_units
+from ...mechanism.assur import GROUND
+from ...mechanism.expressions import Expression, as_float, expression
 from ...reading.lists import Entry
 from ...reading.tables import UnusualValue
-from .checks import name_fault, words_in
-from .declarations import CommonParameters
 from .dimensions import Dimensions, checked_dimension, dimension_of_unit
-from .loads import MOTION, OF_POINT
+from .loads import MOTION, OF_POINT, parts_of_extreme
+from .names import name_fault, words_in
 from .way import WHOLE
 
 UNITS = (
@@ -34,13 +30,21 @@ UNITS = (
 _USUAL = USUAL | {"m": (0.0, USUAL["m"][1]), "m2": (1e-8, 10.0), "kg/m3": (10.0, 3e4)}
 """Usual sizes by unit; a length may be a coordinate, of any small size."""
 
+MOST_POINTS = 200
+"""Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
+point costs an export about 10 ms, and each step of an FMU about 6 ns."""
+FEWER = f"must have at most {MOST_POINTS}: keep those between which the curve is nearly straight"
+_AXES = {"x": "m", "y": "m", "angle": "rad"}
+
 LARGEST = 1e30
 """Largest size of a value in SI units."""
-Known = Mapping[str, str | None]
+NameUnits = Mapping[str, str | None]
+"""The units of quantities by name, None for one that its first use tells."""
 
 
 class EntryReader(Entry):
-    """The reader of the entries of one file."""
+    """The reader of the entries of one file. Its methods collect the fault of a wrong entry, or raise an InputError
+    in one line, which a block `with self.at(key)` collects."""
 
     def __init__(self, data: Mapping[str, Any], name: str) -> None:
         super().__init__("", data)
@@ -56,13 +60,19 @@ class EntryReader(Entry):
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
         self.unusual: list[UnusualValue] = []
+        self.table_units: dict[str, str | None] = {}
+        """units of the values of the tables over phi"""
+        self.curve_units: dict[str, tuple[str | None, str | None]] = {}
+        """units of the places and of the values of all tables"""
+        self.sizes: dict[str, int] = {}
+        """numbers of points of the tables"""
+        self.looked_up = 0
+        """points of the tables that loads and parameters look up"""
 
-    def table(
-        self, key: str, parent: Mapping[str, Any] | None = None, default: Any = None
-    ) -> Mapping[str, Any]:
-        """A table; faults where it is none."""
-        name = key.rpartition(".")[2]
-        entry = (self.data if parent is None else parent).get(name, {} if default is None else default)
+    def table(self, key: str, parent: Mapping[str, Any] | None = None) -> Mapping[str, Any]:
+        """A table of the file, or of a `parent` table by the last name of its `key`; empty, with a fault, if it is
+        none."""
+        entry = (self.data if parent is None else parent).get(key.rpartition(".")[2], {})
         if not isinstance(entry, Mapping):
             self.fault(key, f"is {shown(entry)}; must be a table")
             return {}
@@ -89,7 +99,8 @@ class EntryReader(Entry):
         return value
 
     def tables(self, kind: str, keys: tuple[str, ...] = ()) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-        """The tables in a table, each behind its name and its full key; their keys are `keys`, if any are given."""
+        """The name, the full key and the table of each of the tables in a table; `keys` are the keys that they may
+        have, if they are checked here."""
         entries = self.table(kind)
         self.fault_reserved_names(kind, entries)
         for name in entries:
@@ -107,33 +118,29 @@ class EntryReader(Entry):
                 self.refused.add(name)
 
     def doubt(self, variable: Variable, entry: Any, value: float) -> None:
-        """Note the `value` of a key, which the file has as `entry`, where it is of no usual size."""
-        doubt = UnusualValue.of(variable, entry, value)
+        """Note the `value` of a key, which the file has as `entry`, if it is of no usual size."""
+        doubt = UnusualValue.of_entry(variable, entry, value)
         if doubt is not None and doubt not in self.unusual:
             self.unusual.append(doubt)
 
     def number(self, key: str, entry: Any, unit: str, description: str = "") -> float:
-        """A number, or a text with a unit; the variable has this `description`. One of an unusual size is noted."""
-        if isinstance(entry, bool) or not isinstance(entry, int | float | str):
+        """A number, or a text with a unit, in the SI `unit`; one of an unusual size is noted by its key and this
+        `description`, if the key is not empty."""
+        parts = units.split(entry) if isinstance(entry, str) else None
+        if isinstance(entry, bool) or (not isinstance(entry, int | float) and parts is None):
+            hint = units.spelling(entry, unit) if isinstance(entry, str) else ""
             raise InputError(
-                f"{is_given(entry)}; must be a number or a text with a unit, such as {_like(unit)}"
+                f"{is_given(entry)}; must be a number or a text with a unit, such as {_like(unit)}{hint}"
             )
-        if isinstance(entry, str):
-            parts = units.split(entry)
-            if parts is None:
-                raise InputError(
-                    f"is {shown(entry)}; must be a number or a text with a unit, such as {_like(unit)}"
-                    f"{units.spelling(entry, unit)}"
-                )
-            try:
-                value = units.convert(*parts, unit) if parts[1] else parts[0]
-            except ValueError:
-                hint = units.spelling(entry, unit)
-                raise InputError(
-                    f"is {shown(entry)}{hint or f'; the unit does not fit, write it as {_like(unit)}'}"
-                ) from None
-        else:
+        if parts is None:
             value = as_float(entry)
+        elif not parts[1]:
+            value = parts[0]
+        elif units.converts(parts[1], unit):
+            value = units.convert(*parts, unit)
+        else:
+            hint = units.spelling(entry, unit) or f"; the unit does not fit, write it as {_like(unit)}"
+            raise InputError(f"is {shown(entry)}{hint}")
         within(value, entry)
         if unit == "rad" and abs(value) > WHOLE * (1.0 + 1e-12) and not units.has_unit(entry):
             raise InputError(
@@ -143,45 +150,34 @@ class EntryReader(Entry):
             self.doubt(sized(key, unit, _USUAL.get(unit), description), entry, value)
         return value
 
-    def limit(self, end: str, whole: Mapping[str, Any], unit: str) -> float:
-        """The `end` (min or max) of a parameter; where its unit does not fit that of the value, either may be the
-        wrong one, so that both are named."""
-        bound = whole[end]
-        parts = units.split(bound) if isinstance(bound, str) else None
-        if "unit" not in whole and parts is not None and parts[1] and not units.converts(parts[1], unit):
-            raise InputError(
-                f"has value = {shown(whole['value'])} and {end} = {shown(bound)}, which are of different kinds; "
-                "correct the unit of one of them"
-            )
-        return self.number("", bound, unit)
+    def numbers(self, key: str, entry: Any, listed: Sequence[str], must: str) -> tuple[float, ...]:
+        """A list of numbers in the `listed` units; `must` are the words on what it must be."""
+        if not isinstance(entry, list) or len(entry) != len(listed):
+            raise InputError(f"{is_given(entry)}; must be {must}")
+        return tuple(self.number(key, x, unit) for x, unit in zip(entry, listed, strict=True))
 
     def entry(
-        self, key: str, entry: Any, unit: str, motion: Known | None = None, inputs: bool = False
+        self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False
     ) -> Any:
-        """A number in SI units, or the text of an expression, with its unit checked; NaN where it is wrong. `motion`
-        are the units of the names that a load knows beside parameters and inputs."""
+        """A number in SI units, or the text of an expression, with its unit checked; NaN if it is wrong. `motion` are
+        the units of the names that a load knows beside parameters and inputs."""
         with self.at(key):
             if not isinstance(entry, str) or _is_quantity(entry):
                 return self.number(key, entry, unit)
-            if self.refused & words_in(entry):  # the name itself is faulted where it is given
+            if self.refused & words_in(entry):  # the name itself is faulted at its own key
                 return math.nan
-            names = {**self.units, **(motion or {})}
             parsed = expression(entry)
-            names |= self.further_units(parsed, motion is not None)
-            for name in parsed.names:
-                if name not in names and name not in self.derived:
-                    raise InputError(f"is {shown(entry)}; {name} is no parameter{self.note(name, names)}")
-                if name in self.inputs and not inputs:
-                    raise InputError(
-                        f"is {shown(entry)}; {name} is an input, and lengths cannot change in a run; use a parameter"
-                    )
+            names = {**self.units, **(motion or {}), **self.further_units(parsed, motion is not None)}
+            self.check_names(parsed, names, inputs)
             self.used |= {*parsed.names}
-            if parsed.names == (entry.strip(),) and self.units.get(entry.strip(), "") is None:
-                self.units[entry.strip()] = names[entry.strip()] = unit
+            name = entry.strip()
+            if parsed.names == (name,) and self.units.get(name, "") is None:
+                self.units[name] = names[name] = unit
                 self.derived_dimensions = None
             checked_dimension(parsed.text, self.dimensions(names), unit)
             for width in parsed.widths:
-                if moving := {*width.of.names} & ({*self.inputs} | {*(motion or {})}) or {*width.of.tables}:
+                moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
+                if moving:
                     raise InputError(
                         f"is {shown(entry)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
                         "must be a number or an expression of parameters; a ramp that begins at such a value a is "
@@ -192,10 +188,21 @@ class EntryReader(Entry):
             return entry
         return math.nan
 
-    def dimensions(self, units: Known) -> Dimensions:
+    def check_names(self, parsed: Expression, names: NameUnits, inputs: bool) -> None:
+        """Refuse an expression with a name that is not among the `names`, or of an input without leave."""
+        for name in parsed.names:
+            if name not in names and name not in self.derived:
+                raise InputError(f"is {shown(parsed.text)}; {name} is no parameter{self.note(name, names)}")
+            if name in self.inputs and not inputs:
+                raise InputError(
+                    f"is {shown(parsed.text)}; {name} is an input, and lengths cannot change in a run; use a "
+                    "parameter"
+                )
+
+    def dimensions(self, units: NameUnits) -> Dimensions:
         """The dimensions of names with these `units`, and of the parameters that are expressions of others."""
 
-        def of_units(units: Known) -> Dimensions:
+        def of_units(units: NameUnits) -> Dimensions:
             return {name: None if unit is None else dimension_of_unit(unit) for name, unit in units.items()}
 
         if self.derived_dimensions is None:
@@ -209,47 +216,90 @@ class EntryReader(Entry):
                 self.derived_dimensions[name] = dimensions[name]
         return {**self.derived_dimensions, **of_units(units)}
 
-    def start_values(self, parameters: Iterable[Mapping[str, Any]]) -> dict[str, float]:
-        """The start values of parameters by name, also of those that are expressions of others. Entries that have no
-        finite value with them are faulted."""
-        values = {parameter["name"]: float(parameter["value"]) for parameter in parameters}
-
-        def number(key: str, text: str) -> float:
-            x = expression(text).number(values)
-            if not math.isfinite(x):
-                names = ", ".join(f"{name} = {values[name]:.6g}" for name in expression(text).names)
-                self.fault(key, f"is {shown(text)}, which has no value, or an infinite one, with {names}")
-            return x
-
-        for name, text in self.derived.items():
-            values[name] = number(f"parameters.{name}", text)
-        for key, text in self.expressed:
-            if all(math.isfinite(values.get(name, 0.0)) for name in expression(text).names):
-                number(key, text)
-        return values
+    # extremes of the motion and tables in expressions
 
     def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
-        """The units of extremes and tables of an expression, by name.
+        """The units of the extremes and tables of an expression, by name; a load may have them."""
+        if not in_load:
+            self.count(parsed)
+            if parsed.extremes or parsed.tables:
+                raise InputError(
+                    f"is {shown(parsed.text)}; extremes and tables over x belong into the force or torque of a load"
+                )
+            return {}
+        units_by_name: dict[str, str | None] = {
+            extreme: self.extreme(extreme, parsed.text) for extreme in parsed.extremes
+        }
+        for name in parsed.tables:
+            if name not in self.curve_units:
+                if name in self.refused:
+                    continue
+                hint = near_name(name, self.curve_units)
+                raise InputError(f"is {shown(parsed.text)}; {name} is no table{hint}")
+            units_by_name[f"x of {name}"], units_by_name[f"table {name}"] = self.curve_units[name]
+            self.used.add(name)
+        return units_by_name
+
+    def count(self, *expressions: Expression) -> None:
+        """Add the points of the tables in the expressions of a load or of a parameter to those of the file: a table
+        over phi counts once in all of them, a table over x as often as it is looked up.
 
         Raises
         ------
         InputError
-            in one line, where the entry cannot have them.
+            in one line, for the expressions with which the file first has more than `MOST_POINTS`.
         """
-        if parsed.extremes or parsed.tables:
+        before = self.looked_up
+        over_phi = {name for parsed in expressions for name in parsed.names} & {*self.table_units}
+        for parsed in expressions:
+            self.looked_up += sum(parsed.points) + sum(self.sizes.get(name, 0) for name in parsed.lookups)
+        self.looked_up += sum(self.sizes[name] for name in over_phi)
+        if before <= MOST_POINTS < self.looked_up:
             raise InputError(
-                f"is {shown(parsed.text)}; extremes and tables over x belong into the force or torque of a load"
+                f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
+                f"{FEWER}"
             )
-        return {}
 
     def note(self, name: str, names: Iterable[str]) -> str:
         """A hint on a name that is not known in an expression."""
+        if name in self.curve_units:
+            return f"; it is a table over x: write table(x, {name})"
         if name in MOTION:
             return f"; {name} is known in a {'force' if name in OF_POINT else 'load'} alone"
         return near_name(name, names)
 
+    def extreme(self, name: str, text: str) -> str:
+        """The unit of an extreme.
+
+        Raises
+        ------
+        InputError
+            in one line, if the linkage has no such place.
+        """
+        begin = f"is {shown(text)}; in {name} "
+        if "." not in name:
+            argument = name.partition("(")[2].removesuffix(")")
+            raise InputError(
+                f"{begin}{argument} is no place of the motion; write a point of a link and its axis, such as "
+                "min(ram.C.y); of two numbers the lesser is min(a, b)"
+            )
+        _, link, point, axis = parts_of_extreme(name)
+        if link not in self.points or link == GROUND:
+            links = [candidate for candidate in self.points if candidate != GROUND]
+            raise InputError(f"{begin}{link} is no link{meant(link, links)} links: {', '.join(links)}")
+        if point and point not in self.points[link]:
+            raise InputError(
+                f"{begin}{point} is no point of {link}{meant(point, self.points[link])} its points: "
+                f"{', '.join(self.points[link])}"
+            )
+        if axis not in _AXES or (point and axis == "angle"):
+            raise InputError(f"{begin}{axis} must be x or y of a point, or x, y or angle of a link")
+        return _AXES[axis]
+
+    # points
+
     def vector(
-        self, key: str, entry: Any, unit: str, motion: Known | None = None, inputs: bool = False
+        self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False
     ) -> list[Any]:
         """Two entries."""
         if not isinstance(entry, list) or len(entry) != 2:
@@ -262,119 +312,8 @@ class EntryReader(Entry):
         self.fault_reserved_names(key, points)
         return {name: self.vector(f"{key}.{name}", place, "m") for name, place in points.items()}
 
-    def common(self) -> dict[str, float]:
-        """Start values of the parameters that every linkage has."""
-        common = {}
-        keys = {"gravity": "g", "ratio": "ratio"}
-        tables = {
-            "pins": ("friction", "diameter", "w_smooth", "damping"),
-            "guides": ("friction", "v_smooth", "damping"),
-        }
-        declared = {v.name: v for v in Layout(CommonParameters).variables}
-        entries = [(key, name, self.data.get(key)) for key, name in keys.items()]
-        for table, names in tables.items():
-            entries_of_table = self.table(table)
-            self.keys(table, entries_of_table, names)
-            entries += [(f"{table}.{key}", f"{table}.{key}", entries_of_table.get(key)) for key in names]
-        for key, name, value in entries:
-            if value is not None:
-                with self.at(key):
-                    quantity = declared[name].quantity
-                    x = self.number("", value, quantity.unit)
-                    if not quantity.admits(x):
-                        raise InputError(f"is {shown(value)}; must be {quantity.allowed_range}")
-                    self.doubt(replace(declared[name], name=key), value, x)
-                    common[name] = quantity.within_bounds(x)
-        return common
-
-    def about(self) -> dict[str, str]:
-        """Who made the machine, as its FMUs say it."""
-        table = self.table("about")
-        names = tuple(field.name for field in fields(About))
-        self.keys("about", table, names)
-        return {key: printable(self.text(f"about.{key}", "", table), 1000) for key in table if key in names}
-
-    def check_parameter(self, key: str, entry: Any, text: str) -> None:
-        """Fault a parameter that is a wrong expression of other parameters.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
-        if isinstance(entry, Mapping):
-            self.keys(key, entry, ("value", "description"))
-        parsed = expression(text)
-        self.further_units(parsed, False)
-        for name in parsed.names:
-            if (name not in self.units and name not in self.derived) or name in self.inputs:
-                raise InputError(f"is {shown(text)}; {name} is no parameter{near_name(name, self.units)}")
-        self.used |= {*parsed.names}
-
-    def expressions(self, table: Mapping[str, Any]) -> None:
-        """Take up the parameters that are expressions of others, in any order, and check each."""
-        texts = {
-            name: str(entry["value"] if isinstance(entry, Mapping) else entry)
-            for name, entry in table.items()
-            if is_expression(entry)
-        }
-        order = TopologicalSorter({name: words_in(text) & {*texts} for name, text in texts.items()})
-        with contextlib.suppress(CycleError):
-            order.prepare()
-        while ready := order.get_ready():
-            for name in ready:
-                key, is_right = f"parameters.{name}", False
-                if not self.refused & words_in(texts[name]):
-                    with self.at(key):
-                        self.check_parameter(key, table[name], texts[name])
-                        is_right = True
-                self.derived[name] = texts[name] if is_right else "0"
-                self.refused |= set() if is_right else {name}
-            order.done(*ready)
-        waiting = [name for name in texts if name not in self.derived]
-        for name in waiting:
-            words_on_loop = f"refers to itself by way of {', '.join(waiting)}; give one of them a number"
-            self.fault(f"parameters.{name}", words_on_loop)
-            self.derived[name] = "0"
-        self.dimensions({})
-
-    def quantities(self, kind: str) -> list[dict[str, Any]]:
-        """Parameters or inputs; parameters that are expressions of others are taken up apart."""
-        entries = []
-        table = self.table(kind)
-        self.fault_reserved_names(kind, table)
-        for name, entry in table.items():
-            if kind == "parameters" and is_expression(entry):
-                continue
-            key = f"{kind}.{name}"
-            if name in (*WORDS, *CONSTANTS, *MOTION):
-                self.refused.add(name)
-            whole = entry if isinstance(entry, Mapping) else {"value": entry}
-            self.keys(key, whole, ("value", "unit", "min", "max", "description", "tunable"))
-            with self.at(key):
-                value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
-                limits = {end: self.limit(end, whole, unit or "1") for end in ("min", "max") if end in whole}
-                if not limits.get("min", -math.inf) <= value <= limits.get("max", math.inf):
-                    ends = [f"{end} = {shown(whole[end])}" for end in limits]
-                    raise InputError(f"is {shown(whole['value'])}; must be within {' and '.join(ends)}")
-                self.units[name] = unit
-                entries.append(
-                    {
-                        "name": name,
-                        "value": value,
-                        "unit": unit,
-                        "description": str(whole.get("description", "")),
-                        "tunable": bool(whole.get("tunable", False)),
-                        **limits,
-                    }
-                )
-            self.units.setdefault(name, None)
-        if kind == "parameters":
-            self.expressions(table)
-        return entries
-
     def with_unit(self, entry: Any, unit: Any) -> tuple[float, str | None]:
-        """A value in SI units, and its unit; None where it is told by the first use."""
+        """A value in SI units, and its unit; None if its first use tells it."""
         if unit is not None:
             fits = [si_unit for si_unit in UNITS if _same_unit(str(unit), si_unit)]
             if not fits:
@@ -386,32 +325,21 @@ class EntryReader(Entry):
             raise InputError(
                 f"is {shown(entry)}; must be a number with a unit; a parameter may be an expression"
             )
-        if isinstance(entry, str) and (parts := units.split(entry)) and parts[1]:
-            for si_unit in UNITS:
-                if units.converts(parts[1], si_unit):
-                    return within(units.convert(*parts, si_unit), entry), si_unit
-            hints = [units.spelling(entry, si_unit) for si_unit in UNITS]
-            unknown = f"; the unit is not known; write it as in {_like('m')}"
-            raise InputError(f"is {shown(entry)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
-        return self.number("", entry, "1"), None
+        parts = units.split(entry) if isinstance(entry, str) else None
+        if parts is None or not parts[1]:
+            return self.number("", entry, "1"), None
+        for si_unit in UNITS:
+            if units.converts(parts[1], si_unit):
+                return within(units.convert(*parts, si_unit), entry), si_unit
+        hints = [units.spelling(entry, si_unit) for si_unit in UNITS]
+        unknown = f"; the unit is not known; write it as in {_like('m')}"
+        raise InputError(f"is {shown(entry)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
 
 
 def sized(key: str, unit: str, usual: tuple[float, float] | None, description: str = "") -> Variable:
     """The value of a key as a variable of these `usual` sizes, with this `description`."""
     description = description or units.kind_of(unit)
     return Variable(key, description, Quantity(unit, description, usual=usual))
-
-
-def is_expression(entry: Any) -> bool:
-    """Whether the entry of a parameter is an expression of others, and no number with a unit."""
-    value = entry.get("value") if isinstance(entry, Mapping) else entry
-    parts = units.split(value) if isinstance(value, str) else (0.0, "")
-    if not isinstance(value, str) or (parts is not None and parts[1][:1] not in ("+", "-", "*", "/")):
-        return False
-    try:
-        return bool(expression(value).names)
-    except InputError:
-        return False
 
 
 def _is_quantity(text: str) -> bool:
@@ -427,17 +355,13 @@ def _is_quantity(text: str) -> bool:
         return False
     if parts[1].startswith(",") and re.search(r"[+*/()]", parts[1]):
         raise InputError(f"is {shown(text)}; {units.COMMA}")
-    if re.search(r"[+*()]|\s[-/]\s", parts[1]) and not _is_unit(parts[1]):
+    is_unit = any(units.converts(parts[1], unit) for unit in UNITS)  # such as kg*m2 or N/(m s)
+    if re.search(r"[+*()]|\s[-/]\s", parts[1]) and not is_unit:
         raise InputError(
             f"is {shown(text)}; an expression has no units inside: write its numbers in SI units, such as "
             "2 * r + 0.01"
         )
     return True
-
-
-def _is_unit(text: str) -> bool:
-    """Whether a text is a unit of a linkage, such as kg*m2 or N/(m s)."""
-    return any(units.converts(text, unit) for unit in UNITS)
 
 
 def within(value: float, entry: Any) -> float:

@@ -3,31 +3,42 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from functools import cached_property
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from functools import cached_property, partial
+from itertools import takewhile
+from typing import Any, NamedTuple
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...groups.triad import Triad
+from ...groups.triad import MOST_MISFIT, Triad
+from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
-from .closing import dead_group, gap_hint, just_closes, open_group
-from .narrow import check_triads, lows
+from .closing import LEAST_MARGIN, dead_group, open_group
 from .outputs import DescribedLinkage
-from .probes import description_axis
 from .structure import Structure
 from .way import WHOLE, DriverWay
 
-LEAST_MARGIN = 1e-3
-"""Least margin of a group: closer to a dead position its forces have no limit."""
+NEAR = 0.35
+"""Between two places the margin may fall from here to zero."""
 _PLACES = 720
-"""Places on a turn, or on a range, at which the end of the closing is looked for."""
+"""Places on a turn, or on a range, at which the end of the closing is looked for, and the gap of a group."""
 _HALVINGS = 60
+
+
+def signs_of(margins: Sequence[float]) -> list[float]:
+    """The signs of margins; with them all later margins count above 0 on this side of a dead position."""
+    return [math.copysign(1.0, margin) for margin in margins]
+
+
+def signed(margins: Sequence[Any], signs: Sequence[float]) -> list[Any]:
+    """Margins with these signs."""
+    return [margin * sign for margin, sign in zip(margins, signs, strict=True)]
 
 
 class RangeEnd(NamedTuple):
     """An end of the range in which a linkage closes: the place of the driver, and the links of the group that closes
-    no farther; none where the driver's own range ends."""
+    no farther; none if the driver's own range ends."""
 
     place: float
     links: Sequence[str]
@@ -38,30 +49,33 @@ class FollowedLinkage:
 
     def __init__(self, structure: Structure, way: DriverWay, linkage: DescribedLinkage) -> None:
         self.structure, self.way, self.linkage = structure, way, linkage
-        self._signs: list[float] = []
+        self._drivers = len(structure.groups) - len(linkage.groups)
+        """1 if the first group of the structure is the driver of the linkage, a cylinder; else 0"""
+        self.signs: list[float] = []
+        """the signs of the margins at the first place of the way, once it is followed"""
+        self.margins: list[list[float]] = []
+        """the margins with these signs at all places"""
 
     @cached_property
-    def _derived(self) -> Sequence[float]:
-        return derived_numbers(MATH, self.linkage)
+    def derived(self) -> Sequence[float]:
+        """The numbers that the groups derive from the lengths; none if the linkage does not close."""
+        try:
+            return derived_numbers(MATH, self.linkage)
+        except (ArithmeticError, ValueError):
+            return ()
 
     def at(self, q: float) -> Mechanism:
         """The links with the driver at the place `q`.
 
         Raises
         ------
-        ArithmeticError, ValueError
-            where a group does not close.
+        ArithmeticError, ValueError, IndexError
+            if a group does not close.
         """
-        return Mechanism(MATH, self.linkage, q, self._derived)
+        return Mechanism(MATH, self.linkage, q, self.derived)
 
-    def _margins(self, m: Mechanism) -> list[float]:
-        """The margins of the groups, above 0 on the side of the first ones that were asked for."""
-        margins = m.margins()
-        self._signs = self._signs or [math.copysign(1.0, margin) for margin in margins]
-        return [margin * sign for margin, sign in zip(margins, self._signs, strict=True)]
-
-    def _margins_at(self, q: float) -> list[float]:
-        return self._margins(self.at(q))
+    def _margins_at(self, signs: Sequence[float], q: float) -> list[float]:
+        return signed(self.at(q).margins(), signs)
 
     def turns(self) -> dict[str, tuple[float, float]]:
         """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad].
@@ -69,31 +83,33 @@ class FollowedLinkage:
         Raises
         ------
         InputError
-            where the linkage does not close, or passes a dead position, with the place of the driver.
+            if the linkage does not close, or passes a dead position, with the place of the driver.
         """
-        try:
-            derived = self._derived
-        except (ArithmeticError, ValueError):
-            raise self._not_closing(()) from None
-        check_triads(self.linkage, derived)
         places = self.way.closed_places()
-        angles: dict[str, list[float]] = {}
-        margins_over_way: list[list[float]] = []
-        for q in places:
-            try:
+        angles = {name: [self.structure.poses[name][2]] for name in self.structure.links}
+        margins = self.margins = []
+        try:
+            check_triads(self.linkage, self.derived)
+            for q in places:
                 m = self.at(q)
-            except (ArithmeticError, ValueError):
-                raise self._not_closing(derived) from None
-            margins_over_way.append(self._margins(m))
-            for group, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
-                if not margin > LEAST_MARGIN:
-                    raise dead_group(group, self.way.words(q), margin, LEAST_MARGIN)
-            self._add_angles(angles, m)
-        for k, q, least in lows(self._margins_at, margins_over_way, places):
+                self.signs = self.signs or signs_of(m.margins())
+                margins.append(signed(m.margins(), self.signs))
+                for group, margin in zip(self.structure.groups, margins[-1], strict=True):
+                    if not margin > LEAST_MARGIN:
+                        raise dead_group(group, self.way.words(q), margin)
+                for name, course in angles.items():
+                    # without a jump from the one before
+                    turn = math.remainder(self.linkage.angle(name, m) - course[-1], WHOLE)
+                    course.append(course[-1] + turn)
+        except InputError:
+            raise
+        except (ArithmeticError, ValueError, IndexError):
+            raise self._not_closing() from None
+        for k, q, least in lows(partial(self._margins_at, self.signs), margins, places):
+            if math.isnan(least):
+                raise self._open_group(k, q)
             if not least > LEAST_MARGIN:
-                if math.isnan(least):
-                    raise self._open_group(k, derived, q)
-                raise dead_group(self.structure.groups[k], self.way.words(q), least, LEAST_MARGIN)
+                raise dead_group(self.structure.groups[k], self.way.words(q), least)
         turns = {}
         for name, (_, *samples) in angles.items():
             rate = self.way.rate(samples)
@@ -101,136 +117,187 @@ class FollowedLinkage:
             turns[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * places[0]
         return turns
 
-    def _add_angles(self, angles: dict[str, list[float]], m: Mechanism) -> None:
-        """Add the angle of each link, without jumps; the first one of each is that of its rough pose."""
-        for name in self.structure.links:
-            axis = description_axis(m.links[name].u, self.linkage.parts.frames[name])
-            angle = math.atan2(axis.y, axis.x)
-            before = angles.setdefault(name, [self.structure.poses[name][2]])
-            before.append(before[-1] + math.remainder(angle - before[-1], WHOLE))
+    # where it does not close
 
-    def _open_group(self, k: int, derived: Sequence[float], q: float) -> InputError:
-        """The refusal of the group `k` of the structure, which does not close at the place `q`; a change point, at
-        which it fails to close by rounding, is a dead position."""
-        group, where = self.structure.groups[k], self.way.words(q)
-        number = k - (len(self.structure.groups) - len(self.linkage.groups))
-        if number < 0:
-            return open_group(group.links, where)
-        if just_closes(self.linkage, number, derived, q):
-            return dead_group(group, where, 0.0, LEAST_MARGIN)
-        return open_group(group.links, where, gap_hint(self.linkage, number, derived, q, self.way.span))
+    def _before(self, k: int) -> Callable[[float], Mechanism]:
+        """The linkage before the group `k` of the structure, of the place of the driver."""
+        linkage = self.linkage.before(max(k - self._drivers, 0))
+        return lambda q: Mechanism(MATH, linkage, q, self.derived)
 
-    def _open_at(self, q: float, derived: Sequence[float]) -> int | None:
-        """The number of the first group of the structure that does not close at a place; None where all close."""
-        groups = self.structure.groups
-        behind_driver = len(groups) - len(self.linkage.groups)
-        for k in range(len(groups)):
-            number = k + 1 - behind_driver
-            part = self.linkage.before(number) if number < len(self.linkage.groups) else self.linkage
+    def _open_group(self, k: int, q: float) -> InputError:
+        """The refusal of the group `k` of the structure, which does not close at the place `q`."""
+        low, high = self.way.span
+        places = [q, *(low + (high - low) * n / _PLACES for n in range(_PLACES + 1))]
+        group = self.linkage.groups[k - self._drivers] if k >= self._drivers else None
+        return open_group(self.structure.groups[k], self.way.words(q), group, self._before(k), places)
+
+    def _open_at(self, q: float) -> int | None:
+        """The number of the first group of the structure that does not close at a place; None if all close."""
+        for k in range(len(self.structure.groups)):
             try:
-                Mechanism(MATH, part, q, derived[: part.derived_count])
+                self._before(k + 1)(q)
             except (ArithmeticError, ValueError, IndexError):
                 return k
         return None
 
-    def _not_closing(self, derived: Sequence[float]) -> InputError:
+    def _not_closing(self) -> InputError:
         """The refusal with the first place at which the linkage does not close, and the group that does not."""
         for q in self.way.places():
-            k = self._open_at(q, derived)
+            k = self._open_at(q)
             if k is not None:
-                return self._open_group(k, derived, q)
+                return self._open_group(k, q)
         return InputError("the linkage does not close: change its lengths", key="links")
 
     # the range in which it closes
 
     def range_words(self) -> str:
-        """Words on the range of the driver in which the linkage closes around its start, for a refusal; empty where
-        there is none, or where the driver has to go all the way round."""
+        """Words on the range of the driver in which the linkage closes around its start, for a refusal; empty if
+        there is none, or if the driver has to go all the way round."""
         if any(isinstance(group, Triad) for group in self.linkage.groups):
             return ""
-        ends = self.closing_range()
+        # the start of a slide may lie outside its range
+        low, high = self.way.limits or (-math.inf, math.inf)
+        start = min(max(self.way.start, low), high)
+        ends = self.closing_range(start)
         if ends is None:
             return ""
-        bounds = []
-        for end, sense in zip(ends, (1.0, -1.0), strict=True):
-            unit = "m" if self.way.linear else "deg"
-            group = f" (group of {', '.join(end.links)})" if end.links else ""
-            place = self.way.inside(end.place, sense if end.links else 0.0)
-            bounds.append((f"{place} {unit}", group))
-        (low, of_low), (high, of_high) = bounds
-        for_whom = "for a driver that swings, " if self.way.turns else ""
-        start = self._start_in_range()
+        unit = "m" if self.way.linear else "deg"
+        least, most = (
+            f"{self.way.inside(end.place, sense if end.links else 0.0)} {unit}"
+            for end, sense in zip(ends, (1.0, -1.0), strict=True)
+        )
+        low_group, high_group = (f" (group of {', '.join(end.links)})" if end.links else "" for end in ends)
         around = "its start" if start == self.way.start else self.way.words(start)
         return (
-            f"; around {around} the linkage closes from {low}{of_low} to {high}{of_high}: {for_whom}write "
-            f'range = ["{low}", "{high}"] in [driver], or less, as the forces grow without limit towards such an end'
+            f"; around {around} the linkage closes from {least}{low_group} to {most}{high_group}: "
+            f"{'for a driver that swings, ' if self.way.turns else ''}write "
+            f'range = ["{least}", "{most}"] in [driver], or less, as the forces grow without limit towards such an '
+            "end"
         )
 
-    def _start_in_range(self) -> float:
-        """The start, or the end of the range that is nearest to it: that of a slide may lie outside."""
-        low, high = self.way.limits or (-math.inf, math.inf)
-        return min(max(self.way.start, low), high)
-
-    def closing_range(self) -> tuple[RangeEnd, RangeEnd] | None:
-        """The ends of the range around the start in which all groups close, clear of dead positions; None where they
-        do not at the start."""
-        start, (low, high) = self._start_in_range(), self.way.limits or (-math.inf, math.inf)
-        self._signs = []
-        if not self._good(start):
+    def closing_range(self, start: float) -> tuple[RangeEnd, RangeEnd] | None:
+        """The ends of the range around a place in which all groups close, clear of dead positions; None if they do
+        not at the place, or if the driver goes all the way round."""
+        low, high = self.way.limits or (start - WHOLE, start + WHOLE)
+        try:
+            signs = signs_of(self.at(start).margins())
+        except (ArithmeticError, ValueError, IndexError):
             return None
-        ends = []
-        for limit, sense in ((low, -1.0), (high, 1.0)):
-            reach = WHOLE if math.isinf(limit) else abs(limit - start)
-            bad = self._first_bad([start + sense * reach * k / _PLACES for k in range(_PLACES + 1)])
-            ends.append(RangeEnd(start + sense * reach, ()) if bad is None else self._end(*bad))
-        lower, upper = ends
+        if self._good_margins(signs, start) is None:
+            return None
+        lower, upper = (self._range_end(signs, start, limit) for limit in (low, high))
         return None if upper.place - lower.place >= WHOLE and not self.way.linear else (lower, upper)
 
-    def _good_margins(self, q: float) -> list[float] | None:
-        """The margins at a place where all groups close, clear of dead positions; None elsewhere."""
+    def _good_margins(self, signs: Sequence[float], q: float) -> list[float] | None:
+        """The margins at a place at which all groups close, clear of dead positions; None elsewhere."""
         try:
-            margins = self._margins_at(q)
-        except (ArithmeticError, ValueError):
+            margins = self._margins_at(signs, q)
+        except (ArithmeticError, ValueError, IndexError):
             return None
         return margins if all(margin > LEAST_MARGIN for margin in margins) else None
 
-    def _good(self, q: float) -> bool:
-        """Whether all groups close at a place, clear of dead positions."""
-        return self._good_margins(q) is not None
-
-    def _first_bad(self, places: Sequence[float]) -> tuple[float, float] | None:
-        """A good place and the next bad one behind it, of `places` that lie close together; None where all are
-        good."""
-        passed: list[float] = []
-        margins: list[list[float]] = []
-        bad = None
-        for q in places:
-            here = self._good_margins(q)
-            if here is None:
-                bad = q
-                break
-            passed.append(q)
-            margins.append(here)
+    def _range_end(self, signs: Sequence[float], start: float, limit: float) -> RangeEnd:
+        """The last good place on the way from the start to a limit, by halving, and the group that is good no
+        farther."""
+        places = [start + (limit - start) * k / _PLACES for k in range(_PLACES + 1)]
+        good_margins = takewhile(lambda m: m is not None, (self._good_margins(signs, q) for q in places))
+        margins = [margins for margins in good_margins if margins is not None]
+        passed = places[: len(margins)]
         # a low between two places may be bad, too
-        bad_places = [
-            q for _, q, least in lows(self._margins_at, margins, passed) if not least > LEAST_MARGIN
-        ]
-        if bad_places:
-            bad = min(bad_places, key=lambda q: abs(q - places[0]))
-        if bad is None:
-            return None
-        return [q for q in passed if abs(q - places[0]) < abs(bad - places[0])][-1], bad
-
-    def _end(self, good: float, bad: float) -> RangeEnd:
-        """The last good place before a bad one, by halving, and the group that is no farther good."""
+        between = lows(partial(self._margins_at, signs), margins, passed)
+        all_bad = [q for _, q, least in between if not least > LEAST_MARGIN] + places[len(passed) :][:1]
+        if not all_bad:
+            return RangeEnd(limit, ())
+        bad = min(all_bad, key=lambda q: abs(q - start))
+        good = [q for q in passed if abs(q - start) < abs(bad - start)][-1]
         for _ in range(_HALVINGS):
             middle = 0.5 * (good + bad)
-            if self._good(middle):
-                good = middle
-            else:
+            if self._good_margins(signs, middle) is None:
                 bad = middle
-        k = self._open_at(bad, self._derived)
+            else:
+                good = middle
+        k = self._open_at(bad)
         if k is None:
-            margins = self._margins_at(bad)
-            k = min(range(len(margins)), key=margins.__getitem__)
+            here = self._margins_at(signs, bad)
+            k = here.index(min(here))
         return RangeEnd(good, self.structure.groups[k].links)
+
+
+def lows(
+    margins_at: Callable[[float], Sequence[float]],
+    margins: Sequence[Sequence[float]],
+    places: Sequence[float],
+) -> Iterator[tuple[int, float, float]]:
+    """The number of a group, the place and the value of each low of its margin that may lead to a dead position; NaN
+    if the linkage does not close. The `margins` are the margins at the `places`."""
+    last = len(places) - 1
+    for group, margins_of_group in enumerate(zip(*margins, strict=True)):
+        for k, here in enumerate(margins_of_group):
+            low, high = max(k - 1, 0), min(k + 1, last)
+            if here < NEAR and here <= margins_of_group[low] and here <= margins_of_group[high]:
+                yield group, *_lowest(margins_at, group, places[low], places[high])
+
+
+def _lowest(
+    margins_at: Callable[[float], Sequence[float]], group: int, low: float, high: float
+) -> tuple[float, float]:
+    """The place of the least margin of a group in a range that has one low, and that margin; if the linkage does not
+    close, the first such place and NaN."""
+    from scipy.optimize import minimize_scalar
+
+    open_places: list[float] = []
+
+    def value(q: float) -> float:
+        try:
+            margin = math.nan if open_places else margins_at(q)[group]
+        except (ArithmeticError, ValueError):
+            margin = math.nan
+        if math.isnan(margin):
+            open_places.append(q)
+        return margin
+
+    accuracy = {"xatol": 1e-5 * abs(high - low)}
+    least = minimize_scalar(value, bounds=sorted((low, high)), method="bounded", options=accuracy)
+    return (open_places[0], math.nan) if open_places else (float(least.x), float(least.fun))
+
+
+def lesser(xp: Any, a: Any, b: Any) -> Any:
+    """The lesser of two numbers, NaN if either is: `fmin` of C would pass by a NaN, and so a linkage that does not
+    close."""
+    return 0.5 * (a + b - xp.abs(a - b))
+
+
+# triads
+
+
+def turns_of_triads(linkage: Linkage) -> dict[str, float]:
+    """The turns of the ternary link of each triad in a turn of the crank, by name; the triads of the linkage have
+    them from here on. Triads from the first one on that does not close have none."""
+    turns = {}
+    with suppress(ArithmeticError, ValueError):
+        for k, group in enumerate(linkage.groups):
+            if isinstance(group, Triad):
+                before = linkage.before(k)
+                placed = partial(Mechanism, MATH, before, derived=derived_numbers(MATH, before))
+                turns[group.name] = group.turns = group.turns_in_a_turn(MATH, placed)
+    return turns
+
+
+def misfits(linkage: Linkage, derived: Sequence[Any]) -> Iterator[tuple[str, Any]]:
+    """The name of each triad with the largest misfit of its legs over the turn, in parts of their lengths."""
+    last = 0
+    for group in linkage.groups:
+        last += group.derived_count
+        if isinstance(group, Triad):
+            yield group.name, derived[last - 2]
+
+
+def check_triads(linkage: Linkage, derived: Sequence[Any]) -> None:
+    """Refuse triads that cannot be followed all the way round."""
+    for name, misfit in misfits(linkage, derived):
+        if not misfit <= MOST_MISFIT:
+            raise InputError(
+                f"the triad of {name} does not close all the way round, or moves too sharply to be followed: change "
+                "its lengths",
+                key=f"links.{name}",
+            )

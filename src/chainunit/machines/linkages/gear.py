@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from ...core.errors import InputError, shown
 from ...core.planar import ZERO, Link, Motion, Vec2, mirrored, rotated
@@ -21,7 +21,11 @@ from ...groups.body import Bar, Load
 from ...groups.group import Group, SolvedGroup
 from ...groups.joints import Hinge, HingeData, JointData, LinkageInMotion, Placed, Rates, Third
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
-from .joint_kind import JointEntry, JointParts, JointReader, JointTable, SingleLinkKind
+from .joint_kind import JointEntry, JointParts, JointTable, SingleLinkKind
+from .names import connected, owners_of
+
+if TYPE_CHECKING:
+    from .entries import EntryReader
 
 _AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
 _MOST = 12
@@ -118,7 +122,7 @@ class Mesh(Placed):
 class GearedLink(Group):
     """A wheel on a pin that moves in a known way, in mesh with another wheel: its bar, the pitch point, the wheel
     `by`, the pin at its centre, and how the wheel turns. It has the angle `angle` [rad] at the place `start` of the
-    driver. Its margin is 1 or, if its ratio is no whole number, 0 where its source has turned by nearly half a
+    driver. Its margin is 1 or, if its ratio is no whole number, 0 if its source has turned by nearly half a
     turn."""
 
     bar: Bar
@@ -183,7 +187,7 @@ class GearKind(SingleLinkKind):
     equations = 1
     alone = "geared link"
 
-    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add the teeth."""
         teeth: Any = table.get("teeth")
         internal = table.get("internal", False)
@@ -204,11 +208,14 @@ class GearKind(SingleLinkKind):
             )
         joint |= {"teeth": teeth, "internal": internal}
 
-    def complete(self, reader: JointReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+    def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
         """Add the arm with its points at the centres, and the pitch point, which it carries by the name of the
         joint."""
         key, wheels = f"joints.{joint['name']}", (joint["on"][0], joint["by"][0])
-        centres = [dict(_meeting(reader.points, joints, *joint[end])) for end in ("on", "by")]
+        met = [{tuple(j["on"]), tuple(j["by"])} for j in joints if j["type"] == REVOLUTE]
+        # pins join points of one name, too
+        met += [{(link, name) for link in links} for name, links in owners_of(reader.points).items()]
+        centres = [dict(connected(tuple(joint[end]), met)) for end in ("on", "by")]
         arm = next(
             (link for link in reader.points if link not in wheels and all(link in c for c in centres)), ""
         )
@@ -287,17 +294,3 @@ def _ratio(joint: JointEntry, link: str) -> Fraction:
     on, by = joint.table["teeth"]
     ratio = Fraction(by, on) if link == joint.on[0] else Fraction(on, by)
     return ratio if joint.table["internal"] else -ratio
-
-
-def _meeting(
-    points: Mapping[str, Mapping[str, Any]], joints: Sequence[JointTable], link: str, point: str
-) -> set[tuple[str, str]]:
-    """The points, by link and name, that pins hold together with this one, and itself."""
-    pins = [{tuple(joint["on"]), tuple(joint["by"])} for joint in joints if joint["type"] == REVOLUTE]
-    met, grown = set[tuple[str, str]](), {(link, point)}
-    while met != grown:
-        met = grown
-        names = {name for _, name in met}
-        alike = {(owner, name) for owner, owned in points.items() for name in names & {*owned}}
-        grown = met.union(alike, *(pair for pair in pins if pair & met))
-    return met

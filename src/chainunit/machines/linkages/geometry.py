@@ -8,17 +8,20 @@ A description places the points of a link in the link's own frame. A group has f
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from ...core.errors import InputError
 from ...core.planar import ZERO, Vec2, mirrored, rotated
 from ...groups.body import Mass
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import value_of
 from .joint_kind import Entry, JointEntry
-from .structure import LinkEntry, Structure
+from .structure import CYLINDER, LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
+TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER)
+"""Kinds of groups that can be assembled in two ways."""
 
 
 class LinkFrame(NamedTuple):
@@ -35,6 +38,11 @@ class LinkFrame(NamedTuple):
         """The components of a vector in this frame."""
         return Vec2(self.axis.dot(v), self.axis.cross(v))
 
+    def x_axis(self, u: Vec2) -> Vec2:
+        """The x axis of the description, from the direction `u` of this frame."""
+        e = self.axis
+        return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)
+
 
 OWN = LinkFrame(ZERO, ALONG_X)
 
@@ -42,7 +50,7 @@ OWN = LinkFrame(ZERO, ALONG_X)
 class LinkGeometry:
     """The links of a `structure` with values: `xp` is the engine, `values` are the quantities by name."""
 
-    def __init__(self, xp: Any, structure: Structure, values: Mapping[str, Any]) -> None:
+    def __init__(self, xp: Any, structure: Structure, values: dict[str, Any]) -> None:
         self.xp, self.structure, self.values = xp, structure, values
         self._points: dict[str, dict[str, Vec2]] = {}
 
@@ -50,7 +58,7 @@ class LinkGeometry:
         """The value of an entry."""
         return value_of(self.xp, entry, self.values)
 
-    def vector(self, entries: tuple[Entry, Entry]) -> Vec2:
+    def vector(self, entries: Sequence[Entry]) -> Vec2:
         """The value of a point."""
         return Vec2(self.number(entries[0]), self.number(entries[1]))
 
@@ -84,25 +92,17 @@ class LinkGeometry:
         length = self.xp.sqrt((b - a).squared())
         return LinkFrame(a, (b - a) * (1.0 / length)), length
 
-    def _turn_of(self, joint: JointEntry) -> Vec2:
-        """The unit vector of the angle of `on` less that of `by`."""
-        angle = self.number(joint.angle)
-        return Vec2(self.xp.cos(angle), self.xp.sin(angle))
-
-    def _line_of(self, joint: JointEntry) -> Vec2:
-        """The direction of a prismatic joint's line in its link `by`, a unit vector."""
-        link, start = joint.by
-        return self.span(link, start, joint.toward)[0].axis
-
     def across(self, joint: JointEntry, v: Vec2, link: str) -> Vec2:
         """A vector of a link's frame in that of the link on the other side of the prismatic joint."""
-        turn = self._turn_of(joint)
+        angle = self.number(joint.angle)
+        turn = Vec2(self.xp.cos(angle), self.xp.sin(angle))
         return rotated(v, turn if joint.on[0] == link else mirrored(turn))
 
     def direction(self, joint: JointEntry, link: str) -> Vec2:
-        """The direction of a prismatic joint's line in the frame of one of its links."""
-        line = self._line_of(joint)
-        return line if joint.by[0] == link else self.across(joint, line, joint.by[0])
+        """The direction of a prismatic joint's line in the frame of one of its links, a unit vector."""
+        by, start = joint.by
+        line = self.span(by, start, joint.toward)[0].axis
+        return line if by == link else self.across(joint, line, by)
 
     def line_through(self, joint: JointEntry, link: str, point: Vec2) -> Vec2:
         """The place, in the link on the other side, of a point through which the line of a `point` of the link
@@ -111,23 +111,46 @@ class LinkGeometry:
         return self.point(other, joint.at(other)) + self.across(joint, point - joint_point, link)
 
 
-class RoughPoses:
-    """The links of a `geometry` with numbers where the rough poses of its structure put them, from which the assembly
-    modes follow."""
+def start_sides(geometry: LinkGeometry) -> dict[str, float]:
+    """The assembly mode of each dyad that has two, by its first link, from the rough poses of the structure; the
+    `geometry` has numbers.
 
-    def __init__(self, geometry: LinkGeometry) -> None:
-        self._geometry, self._poses = geometry, geometry.structure.poses
+    Raises
+    ------
+    InputError
+        if a dyad starts in a dead position.
+    """
+    structure = geometry.structure
 
-    def place(self, link: str, joint: JointEntry) -> Vec2:
-        """The rough place of a joint's point."""
-        return self._place_of(link, self._geometry.point(link, joint.at(link)))
+    def place(link: str, point: str) -> Vec2:
+        x, y, angle = structure.poses.get(link, (0.0, 0.0, 0.0))
+        turned = rotated(geometry.point(link, point), Vec2(math.cos(angle), math.sin(angle)))
+        return Vec2(x, y) + turned
 
-    def _place_of(self, link: str, point: Vec2) -> Vec2:
-        x, y, angle = (0.0, 0.0, 0.0) if link == GROUND else self._poses[link]
-        return Vec2(x, y) + rotated(point, Vec2(math.cos(angle), math.sin(angle)))
-
-    def line(self, joint: JointEntry) -> Vec2:
-        """The rough line of a prismatic joint, from its one point to the other [m]."""
+    def line(joint: JointEntry) -> Vec2:
         link, start = joint.by
-        a, b = (self._place_of(link, self._geometry.point(link, point)) for point in (start, joint.toward))
-        return b - a
+        return place(link, joint.toward) - place(link, start)
+
+    sides = {}
+    for group in structure.groups:
+        if group.kind not in TWO_WAYS:
+            continue
+        first, last = group.links[0], group.links[-1]
+        outer, inner, other = (structure.joints[joint.name] for joint in group.joints)
+        start = place(outer.other_link(first), outer.at(outer.other_link(first)))
+        if group.kind == "RRP":
+            value = (place(last, inner.at(last)) - start).dot(line(other))
+        else:
+            end = place(other.other_link(last), other.at(other.other_link(last)))
+            if group.kind == "RPR":
+                value = (start - end).dot(line(inner))
+            else:
+                value = (end - start).cross(place(last, inner.at(last)) - start)
+        if abs(value) < 1e-9:
+            raise InputError(
+                f"the start pose does not tell how {first} is assembled: it stands in a dead position; give the "
+                "start at another place of the driver",
+                key="start",
+            )
+        sides[first] = math.copysign(1.0, value)
+    return sides

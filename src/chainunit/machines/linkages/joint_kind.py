@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from ...core.errors import shown
 from ...groups.body import Bar
 from ...groups.group import Group
 from ...mechanism.assur import PRISMATIC, REVOLUTE, AssurGroup
+
+if TYPE_CHECKING:
+    from .entries import EntryReader
 
 Entry = float | str
 """A number, or the text of an expression."""
@@ -52,24 +55,6 @@ class JointEntry(NamedTuple):
         return self.by[0] if self.on[0] == link else self.on[0]
 
 
-class JointReader(Protocol):
-    """What a kind of joint needs of the reader of a file."""
-
-    @property
-    def points(self) -> Mapping[str, Mapping[str, Any]]:
-        """The points of each link, the ground too."""
-
-    @property
-    def errors(self) -> Sequence[Any]:
-        """The faults so far."""
-
-    def fault(self, name: str, message: str) -> None:
-        """Collect the fault of a key."""
-
-    def entry(self, key: str, entry: Any, unit: str) -> Any:
-        """A number in SI units, or the text of an expression."""
-
-
 class JointParts(Protocol):
     """What a kind of joint needs of the parts of a linkage."""
 
@@ -93,7 +78,7 @@ class JointParts(Protocol):
 
 class JointKind:
     """A kind of joint: its `name` in `type`, its `noun` in reports, the `keys` that it has besides `type`, `on` and
-    `by`, of which the first one tells the kind where `type` is missing, with words on their `use`. `losses` are the
+    `by`, of which the first one tells the kind if `type` is missing, with words on their `use`. `losses` are the
     table of the losses of all such joints, and its keys; `limits` say what is not in their reactions; `equations` is
     their number. `alone` is the kind of the group that a single link forms by such a joint and a pin, if there is
     one."""
@@ -107,10 +92,10 @@ class JointKind:
     equations: ClassVar[int] = 2
     alone: ClassVar[str] = ""
 
-    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add its own keys from its `table` to the `joint`, which has its ends."""
 
-    def complete(self, reader: JointReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+    def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
         """Add what follows from all `joints` of the file; `points` by link are added to the links."""
 
     def start_faults(
@@ -135,7 +120,7 @@ class GuideKind(JointKind):
     use = "for a cylinder or a guide give it `toward` with a further point of {by}, on the line of the way"
     losses = ("guides", ("friction", "damping"))
 
-    def read(self, reader: JointReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
+    def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add the line, the angle and the length of the block."""
         by, start = joint["by"]
         toward = table.get("toward")

@@ -1,10 +1,10 @@
-"""The loads of a linkage file, the tables that they know, and the extremes of the motion that they name."""
+"""The loads of a linkage file, and the tables that they know."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,15 +13,11 @@ from ...core import units
 from ...core.errors import InputError, meant, near_name, shown
 from ...core.inputs import cells_of, file_text, lines_of_table
 from ...mechanism.assur import GROUND
-from ...mechanism.expressions import Expression, expression
-from .checks import name_fault
-from .entries import EntryReader, Known, is_among, is_given, within
-from .loads import parts_of_extreme
+from ...mechanism.expressions import expression
+from .entries import FEWER, MOST_POINTS, NameUnits, is_among, is_given, within
+from .names import name_fault
+from .parameters import ParameterReader
 
-MOST_POINTS = 200
-"""Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
-point costs an export about 10 ms, and each step of an FMU about 6 ns."""
-_FEWER = f"must have at most {MOST_POINTS}: keep those between which the curve is nearly straight"
 LOADS = {
     "force": ("type", "on", "force"),
     "follower": ("type", "on", "force"),
@@ -29,28 +25,22 @@ LOADS = {
     "spring": ("type", "on", "by", "stiffness", "length", "damping"),
 }
 """Keys of each type of load."""
-_OF_LINK: Known = {"phi": "rad", "w": "rad/s", "angle": "rad", "angle_rate": "rad/s"}
-_OF_FORCE: Known = {**_OF_LINK, "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
-_AXES = {"x": "m", "y": "m", "angle": "rad"}
+_OF_LINK: NameUnits = {"phi": "rad", "w": "rad/s", "angle": "rad", "angle_rate": "rad/s"}
+_OF_FORCE: NameUnits = {**_OF_LINK, "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
 _OWN = re.compile(r"\b(min|max|stroke)\(\s*(x|y|angle)\s*\)")
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
 """A number whose comma may stand between thousands."""
-Column = list[tuple[float, str | None]]
-"""A column of a table, each value with its unit."""
+Column = tuple[list[float], str | None]
+"""The values of a column of a table in SI units, and their unit."""
 _HEADING = re.compile(r"\s*([^\[(]*?)\s*(?:[\[(]\s*(.*?)\s*[\])])?\s*")
 
 
-class LoadReader(EntryReader):
+class LoadReader(ParameterReader):
     """The reader of loads and tables."""
 
     def __init__(self, data: Mapping[str, Any], name: str, folder: Path) -> None:
         super().__init__(data, name)
         self.folder = folder
-        self.table_units: dict[str, str | None] = {}
-        self.curve_units: dict[str, tuple[str | None, str | None]] = {}
-        self.sizes: dict[str, int] = {}
-        """numbers of points of the tables"""
-        self.looked_up = 0
 
     # tables
 
@@ -61,16 +51,14 @@ class LoadReader(EntryReader):
             self.refused.add(name)
             with self.at(key):
                 over = "phi" if "phi" in table else "x"
-                places, values = self.columns(key, table, over)
-                of_x, of_value = places[0][1], values[0][1]
-                abscissas = [x for x, _ in places]
+                (abscissas, of_x), (values, of_value) = self.columns(key, table, over)
                 turns = over == "phi" and of_x == "rad" and "range" not in self.table("driver")
                 if any(b <= a for a, b in pairwise(abscissas)):
                     raise InputError(f"{over} must rise" + ", within less than one turn" * turns)
                 if turns and abscissas[-1] - abscissas[0] >= 2.0 * math.pi:
                     raise InputError("phi must rise, within less than one turn: the table repeats itself")
                 self.sizes[name] = len(abscissas)
-                curves[name] = {"over": over, "places": abscissas, "values": [x for x, _ in values]}
+                curves[name] = {"over": over, "places": abscissas, "values": values}
                 if over == "phi":
                     self.table_units[name] = of_value
                 self.curve_units[name] = of_x, of_value
@@ -95,21 +83,18 @@ class LoadReader(EntryReader):
                 f"must have {over} and value, two lists of one length, of {least} or more, or file, a CSV file"
             )
         if len(places) > MOST_POINTS:
-            raise InputError(f"has {len(places)} points; {_FEWER}")
-        linear = "joint" in self.table("driver")
-        if over == "phi":
-            unit = "m" if linear else "rad"
-            abscissas: Column = [(self.number(key, x, unit), unit) for x in places]
-        else:
-            abscissas = self.like(places)
-        return abscissas, self.like(values)
+            raise InputError(f"has {len(places)} points; {FEWER}")
+        if over == "x":
+            return self.like(places), self.like(values)
+        unit = "m" if "joint" in self.table("driver") else "rad"
+        return ([self.number(key, x, unit) for x in places], unit), self.like(values)
 
     def like(self, entries: list[Any]) -> Column:
         """Values of one unit, that of the first one."""
-        first = self.with_unit(entries[0], None)
-        if first[1] is None:
-            return [self.with_unit(x, None) for x in entries]
-        return [(self.number("", x, first[1]), first[1]) for x in entries]
+        _, unit = self.with_unit(entries[0], None)
+        if unit is None:
+            return [self.with_unit(x, None)[0] for x in entries], None
+        return [self.number("", x, unit) for x in entries], unit
 
     def columns_of_file(self, name: Any) -> tuple[Column, Column]:
         """The two columns of a CSV file beside the linkage file, with units in a heading ("way [mm], force [kN]")."""
@@ -119,7 +104,7 @@ class LoadReader(EntryReader):
         text = lines_of_table(file, file_text(file))
         lines = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
         if len(lines) > MOST_POINTS + 1:
-            raise InputError(f"{name}: has {len(lines)} rows; {_FEWER}")
+            raise InputError(f"{name}: has {len(lines)} rows; {FEWER}")
         mark = next((mark for mark in ";\t" if any(mark in line for line in lines)), ",")
         rows = cells_of(name, lines, mark)
         if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != 2), None):
@@ -143,7 +128,7 @@ class LoadReader(EntryReader):
                 f"{name}: {shown(commas[0])} is not clear, as its comma may stand between thousands or before "
                 "decimals; write all numbers with a decimal point and without marks between thousands"
             )
-        columns: tuple[Column, Column] = ([], [])
+        columns: tuple[list[float], list[float]] = ([], [])
         for place, row in enumerate(rows, 1):
             for k, cell in enumerate(row):
                 value = _number(cell)
@@ -151,86 +136,12 @@ class LoadReader(EntryReader):
                     # what begins as no number may be of a file that is no table
                     cited = f" {shown(cell)}" if cell.lstrip()[:1] in (*"+-.0123456789",) else ""
                     raise InputError(f"{name}: row {place} of numbers, column {k + 1}:{cited} is no number")
-                columns[k].append((within(value * scales[k], cell), column_units[k]))
-        return columns
-
-    # extremes of the motion
-
-    def further_units(self, parsed: Expression, in_load: bool) -> dict[str, str | None]:
-        """The units of the extremes and tables of an expression, by name; a load may have them."""
-        if not in_load:
-            self.count(parsed)
-            return super().further_units(parsed, in_load)
-        units_by_name: dict[str, str | None] = {
-            extreme: self.extreme(extreme, parsed.text) for extreme in parsed.extremes
-        }
-        for name in parsed.tables:
-            if name not in self.curve_units:
-                if name in self.refused:
-                    continue
-                hint = near_name(name, self.curve_units)
-                raise InputError(f"is {shown(parsed.text)}; {name} is no table{hint}")
-            units_by_name[f"x of {name}"], units_by_name[f"table {name}"] = self.curve_units[name]
-            self.used.add(name)
-        return units_by_name
-
-    def count(self, *expressions: Expression) -> None:
-        """Add the points of the tables in the expressions of a load or of a parameter to those of the file: a table
-        over phi counts once in all of them, a table over x as often as it is looked up.
-
-        Raises
-        ------
-        InputError
-            in one line, for the expressions with which the file first has more than `MOST_POINTS`.
-        """
-        before = self.looked_up
-        over_phi = {name for parsed in expressions for name in parsed.names} & {*self.table_units}
-        for parsed in expressions:
-            self.looked_up += sum(parsed.points) + sum(self.sizes.get(name, 0) for name in parsed.lookups)
-        self.looked_up += sum(self.sizes[name] for name in over_phi)
-        if before <= MOST_POINTS < self.looked_up:
-            raise InputError(
-                f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
-                f"{_FEWER}"
-            )
-
-    def note(self, name: str, names: Any) -> str:
-        """A hint on a name that an expression does not know, such as a table over x."""
-        if name in self.curve_units:
-            return f"; it is a table over x: write table(x, {name})"
-        return super().note(name, names)
-
-    def extreme(self, name: str, text: str) -> str:
-        """The unit of an extreme.
-
-        Raises
-        ------
-        InputError
-            in one line, where the linkage has no such place.
-        """
-        begin = f"is {shown(text)}; in {name} "
-        if "." not in name:
-            argument = name.partition("(")[2].removesuffix(")")
-            raise InputError(
-                f"{begin}{argument} is no place of the motion; write a point of a link and its axis, such as "
-                "min(ram.C.y); of two numbers the lesser is min(a, b)"
-            )
-        _, link, point, axis = parts_of_extreme(name)
-        if link not in self.points or link == GROUND:
-            links = [candidate for candidate in self.points if candidate != GROUND]
-            raise InputError(f"{begin}{link} is no link{meant(link, links)} links: {', '.join(links)}")
-        if point and point not in self.points[link]:
-            raise InputError(
-                f"{begin}{point} is no point of {link}{meant(point, self.points[link])} its points: "
-                f"{', '.join(self.points[link])}"
-            )
-        if axis not in _AXES or (point and axis == "angle"):
-            raise InputError(f"{begin}{axis} must be x or y of a point, or x, y or angle of a link")
-        return _AXES[axis]
+                columns[k].append(within(value * scales[k], cell))
+        return (columns[0], column_units[0]), (columns[1], column_units[1])
 
     # loads
 
-    def load(self, name: str, written: Any) -> dict[str, Any]:
+    def load(self, name: str) -> dict[str, Any]:
         """A load."""
         key = f"loads.{name}"
         table = self.table(key, self.table("loads"))
@@ -244,46 +155,42 @@ class LoadReader(EntryReader):
             on = table.get("on")
             if not is_among(on, self.points) or on == GROUND:
                 self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
-                return load
-            torque = _placed(table.get("torque"), [str(on)])
-            entry = self.entry(f"{key}.torque", torque, "N.m", self.known(_OF_LINK), True)
-            self.count_in(key, [entry])
-            return load | {"on": [on], "torque": entry}
-        for end in ("on", "by") if kind == "spring" else ("on",):
-            with self.at(f"{key}.{end}"):
-                load[end] = self.end(table.get(end))
-                if kind != "spring" and load[end][0] == GROUND:
-                    raise InputError("acts on the ground; give a point of a link")
+            else:
+                load["on"] = [on]
+        else:
+            for end in ("on", "by") if kind == "spring" else ("on",):
+                with self.at(f"{key}.{end}"):
+                    load[end] = self.end(table.get(end))
+                    if kind != "spring" and load[end][0] == GROUND:
+                        raise InputError("acts on the ground; give a point of a link")
         if kind == "spring":
-            if "stiffness" not in table and "damping" not in table:
-                self.fault(key, "has neither stiffness nor damping; give one of them, or take the spring out")
-            if "stiffness" in table and "length" not in table:
-                self.fault(
-                    f"{key}.length",
-                    'is missing; must be the length at which the spring has no force, such as "200 mm", or 0 for '
-                    "one that pulls at every length",
-                )
-            for quantity, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
-                load[quantity] = self.positive(f"{key}.{quantity}", table.get(quantity, 0.0), unit)
-            return load
-        if "on" not in load:
-            return load
-        force = table.get("force")
-        if isinstance(force, list):
-            force = [_placed(component, load["on"]) for component in force]
-        load["force"] = self.vector(f"{key}.force", force, "N", self.known(_OF_FORCE), True)
-        self.count_in(key, load["force"])
+            self.spring(key, table, load)
+        elif "on" in load:
+            motion = {**(_OF_LINK if kind == "torque" else _OF_FORCE), **self.table_units}
+            motion |= {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
+            if kind == "torque":
+                torque = _placed(table.get("torque"), load["on"])
+                load["torque"] = self.entry(f"{key}.torque", torque, "N.m", motion, True)
+            else:
+                force = _placed(table.get("force"), load["on"])
+                load["force"] = self.vector(f"{key}.force", force, "N", motion, True)
+            entries = load["force"] if kind != "torque" else [load["torque"]]
+            with self.at(key):
+                self.count(*(expression(entry) for entry in entries if isinstance(entry, str)))
         return load
 
-    def count_in(self, key: str, entries: Sequence[float | str]) -> None:
-        """Count the points of the tables in a load; faults where they are too many."""
-        with self.at(key):
-            self.count(*(expression(entry) for entry in entries if isinstance(entry, str)))
-
-    def known(self, motion: Known) -> Known:
-        """The units of the names that a load knows beside parameters and inputs."""
-        way = {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
-        return {**motion, **way, **self.table_units}
+    def spring(self, key: str, table: Mapping[str, Any], load: dict[str, Any]) -> None:
+        """Add stiffness, length and damping of a spring."""
+        if "stiffness" not in table and "damping" not in table:
+            self.fault(key, "has neither stiffness nor damping; give one of them, or take the spring out")
+        if "stiffness" in table and "length" not in table:
+            self.fault(
+                f"{key}.length",
+                'is missing; must be the length at which the spring has no force, such as "200 mm", or 0 for one '
+                "that pulls at every length",
+            )
+        for quantity, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
+            load[quantity] = self.positive(f"{key}.{quantity}", table.get(quantity, 0.0), unit)
 
     def end(self, entry: Any) -> list[str]:
         """A point of a link, as "link.point" or a list of two."""
@@ -305,7 +212,9 @@ class LoadReader(EntryReader):
 
 
 def _placed(entry: Any, place: list[str]) -> Any:
-    """An expression in which extremes of the load's own place have the name of this place."""
+    """An expression, or a list of some, in which extremes of the load's own place have the name of this place."""
+    if isinstance(entry, list):
+        return [_placed(component, place) for component in entry]
     if not isinstance(entry, str):
         return entry
     return _OWN.sub(lambda m: f"{m[1]}({'.'.join([place[0]] if m[2] == 'angle' else place)}.{m[2]})", entry)

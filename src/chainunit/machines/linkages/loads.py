@@ -33,33 +33,25 @@ def extremes_of(loads: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for _, text in _texts(loads) for name in expression(text).extremes))
 
 
-def widths_of(loads: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, Width], ...]:
-    """The key of a load and each width in its expressions that depends on parameters."""
-    return tuple(
-        (key, width)
-        for key, text in _texts(loads)
-        for width in expression(text).widths
-        if not width.of.is_number
-    )
-
-
 def checked_widths(
     loads: Sequence[Mapping[str, Any]], values: Mapping[str, Any]
 ) -> tuple[tuple[str, Width, float], ...]:
-    """The widths that depend on parameters, each behind the key of its load and with its sign at these `values`.
+    """The widths in the expressions of loads that depend on parameters: the key of the load, the width, and its sign
+    at these `values`.
 
     Raises
     ------
     InputError
-        in one line, for one that is zero, or below zero where it must not.
+        in one line, for one that is zero, or below zero although it must not.
     """
     checked = []
-    for key, width in widths_of(loads):
-        value = width.of.number(values)
-        if wrong := width.fault(value):
-            parameters = ", ".join(f"{name} = {values[name]:.6g}" for name in width.of.names)
-            raise InputError(f"{wrong}{f' ({parameters})' * bool(parameters)}", key=key)
-        checked.append((key, width, math.copysign(1.0, value)))
+    for key, width in ((key, width) for key, text in _texts(loads) for width in expression(text).widths):
+        if not width.of.is_number:
+            value = width.of.number(values)
+            if wrong := width.fault(value):
+                parameters = ", ".join(f"{name} = {values[name]:.6g}" for name in width.of.names)
+                raise InputError(f"{wrong}{f' ({parameters})' * bool(parameters)}", key=key)
+            checked.append((key, width, math.copysign(1.0, value)))
     return tuple(checked)
 
 
@@ -78,7 +70,7 @@ def loads_by_speed(loads: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
-    """The expressions of forces and torques, each behind its key."""
+    """The key and the text of each expression of a force or a torque."""
     for load in loads:
         for key, entries in (("force", load.get("force", ())), ("torque", (load.get("torque", 0.0),))):
             yield from ((f"loads.{load['name']}.{key}", entry) for entry in entries if isinstance(entry, str))
@@ -117,15 +109,14 @@ class ForceLaw(NamedTuple):
     axis: Vec2 | None
     values: Mapping[str, Any]
     tables: Mapping[str, TableCurve]
-    angle: LinkAngle | None = None
+    angle: LinkAngle
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """Force and moment [N, N m], and the dissipated power by speed."""
         pin, link = m.pins[self.point], m.links[self.link]
-        names = _motion(xp, m, w, self) | {
-            "x": pin.p.x, "y": pin.p.y, "vx": pin.p1.x * w, "vy": pin.p1.y * w
-        }  # fmt: skip
+        names = _motion(xp, m, w, self, self.components)
+        names |= {"x": pin.p.x, "y": pin.p.y, "vx": pin.p1.x * w, "vy": pin.p1.y * w}
         fx, fy = (value_of(xp, component, names) for component in self.components)
         force = Vec2(fx, fy)
         if self.axis is not None:
@@ -142,21 +133,24 @@ class TorqueLaw(NamedTuple):
     torque: Entry
     values: Mapping[str, Any]
     tables: Mapping[str, TableCurve]
-    angle: LinkAngle | None = None
+    angle: LinkAngle
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """The torque on the link [N m], which counts as dissipated."""
         link = m.links[self.link]
-        torque = value_of(xp, self.torque, _motion(xp, m, w, self))
+        torque = value_of(xp, self.torque, _motion(xp, m, w, self, [self.torque]))
         return Effect((Wrench(self.link, ZERO, torque),), dissipative=-(torque * link.t1))
 
 
-def _motion(xp: Any, m: Moving, w: Any, load: ForceLaw | TorqueLaw) -> dict[str, Any]:
-    """The quantities that both kinds of loads know."""
-    table_values = {name: table.value(xp, m.q) for name, table in load.tables.items()}
+def _motion(
+    xp: Any, m: Moving, w: Any, load: ForceLaw | TorqueLaw, entries: Sequence[Entry]
+) -> dict[str, Any]:
+    """The quantities that both kinds of loads know, for these entries of the load."""
+    used = {name for entry in entries if isinstance(entry, str) for name in expression(entry).names}
+    table_values = {name: table.value(xp, m.q) for name, table in load.tables.items() if name in used}
     names = {**load.values, **table_values, "phi": m.q, "w": w, "angle_rate": m.links[load.link].t1 * w}
-    return names if load.angle is None else names | {"angle": load.angle(xp, m)}
+    return names | ({"angle": load.angle(xp, m)} if "angle" in used else {})
 
 
 class SpringDamper(NamedTuple):

@@ -12,7 +12,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, partial, reduce
 from typing import Any, cast
 
 import numpy as np
@@ -24,22 +24,22 @@ from ...core.model import About, FmuData, Requirement
 from ...core.planar import ZERO
 from ...core.quantities import Value, declared_class, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
-from ...groups.triad import MOST_MISFIT, Triad
+from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
-from ...mechanism.expressions import expression, value_of
+from ...mechanism.expressions import value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, words_on_motion
-from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
-from .following import LEAST_MARGIN, FollowedLinkage
-from .geometry import LinkGeometry
+from .closing import LEAST_MARGIN
+from .declarations import LinkageMotion, LinkBody, common_parameters, field_of, with_differing
+from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
+from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
 from .loads import (
     ForceLaw,
-    LinkAngle,
     SpringDamper,
     TorqueLaw,
     checked_widths,
@@ -47,13 +47,10 @@ from .loads import (
     name_of_load,
     parts_of_extreme,
     requirement_of_width,
-    widths_of,
 )
-from .narrow import lesser, turns_of_triads
 from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
-from .probes import constant_outputs, description_axis, notes_on, repeated_outputs
-from .structure import check_groups, structure_of
+from .structure import Structure, check_groups
 from .way import DriverWay
 
 STANDARD_GRAVITY = 9.81
@@ -68,7 +65,7 @@ def machine_of(data: Mapping[str, Any]) -> InverseMachine:
     Raises
     ------
     InputError
-        where the linkage is not determined, has a group that is not covered, or does not close.
+        if the linkage is not determined, has a group that is not covered, or does not close.
     """
     return _machine_of(json.dumps(data, sort_keys=True))
 
@@ -90,12 +87,10 @@ class FileMachine(InverseMachine):
         """The linkage with the start values."""
         return self.described_by.at_start
 
-
-def _places_without(effect: Any, q: Any) -> Any:
-    """The numbers of the places `q` at which a load has no value, or an infinite one, ascending."""
-    numbers = [x for w in effect.wrenches for x in (w.force.x, w.force.y, w.moment)]
-    finite = [np.broadcast_to(np.isfinite(x), q.shape) for x in numbers]
-    return np.flatnonzero(~np.all(finite, axis=0))
+    def _derived(self, xp: Any, p: Any) -> list[Any]:
+        """See `LinkageModel`; the numbers of the start values are known."""
+        described = self.described_by
+        return [*described.start_derived] if described.is_start(xp, p) else super()._derived(xp, p)
 
 
 class LinkageDescription(LinkageOutputs):
@@ -103,7 +98,7 @@ class LinkageDescription(LinkageOutputs):
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data = data
-        self.structure = structure_of(data)
+        self.structure = Structure.of(data)
         self.way = DriverWay.of(data, self.structure.rate)
         check_groups(self.structure, data.get("groups", ()))
         tables = data.get("tables", {})
@@ -128,16 +123,20 @@ class LinkageDescription(LinkageOutputs):
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
         geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
-        self.sides = dict(LinkageParts(geometry).sides)
-        self.sides |= turns_of_triads(self._loaded(LinkageParts(geometry, self.sides), p))
+        self.sides = start_sides(geometry)
         self.at_start = self._loaded(LinkageParts(geometry, self.sides), p)
+        self.sides |= turns_of_triads(self.at_start)
+        self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
-        self._check_extremes()
-        self.start_derived = derived_numbers(MATH, self.at_start)
-        p = self._ready()
-        self.widths = (
-            checked_widths(data["loads"], self.values(MATH, p, u)) if widths_of(data["loads"]) else ()
-        )
+        self.start_derived = self.followed.derived
+        values = geometry.values
+        if self.extremes:
+            self.start_derived = derived_numbers(MATH, self.at_start)
+            # the loads know the extremes from here on
+            values |= zip(self.extremes, self.start_derived[-len(self.extremes) :], strict=True)
+        self.widths = checked_widths(data["loads"], values)
+        p = self.Parameters()
+        object.__setattr__(p, "derived", self.start_derived)
         self.check_loads(p, 1.0)
 
     # declarations
@@ -152,6 +151,7 @@ class LinkageDescription(LinkageOutputs):
                 fields.append((name, LinkBody, group(LinkBody, title, default=LinkBody(**quantities))))
         guides = any(j.kind == PRISMATIC for j in self.structure.joints.values())
         common = common_parameters(self.way.linear, guides, self.data["common"])
+        fields += [with_differing(common, table, laws) for table, laws in self.data.get("losses", {}).items()]
         if self.way.swings:
             ratio = self._ratio
             fields.append(("ratio", Value, quantity("1", _FIXED_RATIO, default=ratio, min=ratio, max=ratio)))
@@ -189,29 +189,32 @@ class LinkageDescription(LinkageOutputs):
 
     # the linkage
 
-    def parts(self, xp: Any, p: Any, u: Any) -> LinkageParts:
-        """The groups with the values of parameters and inputs."""
-        return LinkageParts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), self.sides)
-
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
-        return self._loaded(self.parts(xp, p, u), p)
+        geometry = LinkGeometry(xp, self.structure, self.values(xp, p, u))
+        return self._loaded(LinkageParts(geometry, self.sides), p)
 
     def _loaded(self, parts: LinkageParts, p: Any) -> DescribedLinkage:
         """The linkage of these parts, with the loads on it."""
         loads: dict[str, Any] = {"weight": Weight(p.g)}
         for load in self.data["loads"]:
             loads[name_of_load(load)] = self._load(load, parts)
-        loads["pins"] = PinLosses(p.pins, p.pins.damping)
+        laws = {
+            table: {parts.receivers[name][0]: getattr(getattr(p, table), name) for name in named}
+            for table, named in self.data.get("losses", {}).items()
+        }
+        loads["pins"] = PinLosses(p.pins, p.pins.damping, laws.get("pins", {}))
         if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
                 parts.receivers[joint["name"]][0]: parts.geometry.number(joint["length"])
                 for joint in self.data["joints"]
                 if "length" in joint
             }
-            loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths)
+            loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths, laws.get("guides", {}))
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)
-        return DescribedLinkage(parts.ground, parts.driver, parts.groups, loads, parts, extremes=extremes)
+        return DescribedLinkage(
+            parts.ground, parts.driver, tuple(parts.groups), loads, parts, extremes=extremes
+        )
 
     def _extreme(self, name: str, parts: LinkageParts) -> MotionExtreme:
         """An extreme of the motion, by its name in expressions."""
@@ -222,51 +225,33 @@ class LinkageDescription(LinkageOutputs):
         def coordinate(xp: Any, m: Any) -> tuple[Any, Any, Any]:
             moving = m.links[link]
             if axis == "angle":
-                return self.angle(xp, link, description_axis(moving.u, frame), m.q), moving.t1, moving.t2
+                return self.angle(xp, link, frame.x_axis(moving.u), m.q), moving.t1, moving.t2
             k = moving.beside(place.x, place.y)
             return getattr(k.p, axis), getattr(k.p1, axis), getattr(k.p2, axis)
 
-        return MotionExtreme(coordinate, self.places(), 1.0 if kind == "max" else -1.0, ends)
-
-    def _check_extremes(self) -> None:
-        """Refuse extremes of the angle of a link that turns round.
-
-        Raises
-        ------
-        InputError
-            in one line.
-        """
-        for name in self.extremes:
-            extreme = parts_of_extreme(name)
-            link = extreme.link
-            if extreme.axis == "angle" and self.way.turns and self.link_turns[link][0]:
-                raise InputError(
-                    f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
-                    "point, or of a link that swings",
-                    key=f"links.{link}",
-                )
+        return MotionExtreme(coordinate, self.way.places(), 1.0 if kind == "max" else -1.0, ends)
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
-        kind, link = load["type"], load["on"][0]
-        if kind == "torque":
-            angle = self._angle_for([load["torque"]], link, parts)
-            tables = self._tables_for([load["torque"]])
-            return TorqueLaw(link, load["torque"], parts.geometry.values, tables, angle)
+        kind, (link, *point), geometry = load["type"], load["on"], parts.geometry
         if kind == "spring":
-            ends = [
+            one, other = (
                 (None if link == GROUND else link, parts.pin_on(link, point))
                 for link, point in (load["on"], load["by"])
-            ]
-            stiffness, length, damping = (
-                parts.geometry.number(load[key]) for key in ("stiffness", "length", "damping")
             )
-            return SpringDamper((ends[0], ends[1]), stiffness, length, damping)
-        pin = parts.pin_on(link, load["on"][1])
-        axis = parts.frames[link].axis if kind == "follower" else None
+            return SpringDamper(
+                (one, other), *(geometry.number(load[key]) for key in ("stiffness", "length", "damping"))
+            )
+        frame = parts.frames[link]
+
+        def angle(xp: Any, m: Any) -> Any:
+            return self.angle(xp, link, frame.x_axis(m.links[link].u), m.q)
+
+        law = geometry.values, self.tables, angle
+        if kind == "torque":
+            return TorqueLaw(link, load["torque"], *law)
+        axis = frame.axis if kind == "follower" else None
         fx, fy = load["force"]
-        angle = self._angle_for([fx, fy], link, parts)
-        tables = self._tables_for([fx, fy])
-        return ForceLaw(link, pin, (fx, fy), axis, parts.geometry.values, tables, angle)
+        return ForceLaw(link, parts.pin_on(link, *point), (fx, fy), axis, *law)
 
     def check_loads(self, p: Any, speed: float) -> None:
         """Refuse a force or a torque that has no value, or an infinite one, at a place of the way.
@@ -281,35 +266,28 @@ class LinkageDescription(LinkageOutputs):
         InputError
             in one line, for the first such load.
         """
-        xp, q = numpy_(), np.array(self.places())
-        linkage = self.linkage(xp, p, self.Inputs())
-        loads = {load["name"]: linkage.loads[name_of_load(load)] for load in self.data["loads"]}
-        laws = {name: law for name, law in loads.items() if isinstance(law, ForceLaw | TorqueLaw)}
+        xp, q = numpy_(), np.array(self.way.places())
+        laws = {load["name"]: load for load in self.data["loads"] if load["type"] != "spring"}
         if not laws:
             return
+        linkage = self.linkage(xp, p, self.Inputs())
+        first_wrong: dict[str, int] = {}
         with np.errstate(all="ignore"):
             m = Mechanism(xp, linkage, q, getattr(p, "derived", ()))
-            faults = {name: _places_without(law.effect(xp, m, speed, {}), q) for name, law in laws.items()}
-        first = min(faults, key=lambda name: faults[name][:1].tolist() or [len(q)])
-        if faults[first].size:
+            for name, load in laws.items():
+                wrenches = linkage.loads[name_of_load(load)].effect(xp, m, speed, {}).wrenches
+                total = sum(abs(x) for w in wrenches for x in (w.force.x, w.force.y, w.moment))
+                wrong = ~np.isfinite(np.broadcast_to(total, q.shape))
+                if np.any(wrong):
+                    first_wrong[name] = int(np.argmax(wrong))
+        if first_wrong:
+            name = min(first_wrong, key=first_wrong.__getitem__)
             unit = "m/s" if self.way.linear else "rad/s"
-            key = f"loads.{first}.{'torque' if isinstance(laws[first], TorqueLaw) else 'force'}"
-            place = self.way.words(float(q[faults[first][0]]))
+            place = self.way.words(float(q[first_wrong[name]]))
             raise InputError(
-                f"has no value, or an infinite one, at {place} and a speed of {speed:.6g} {unit}", key=key
+                f"has no value, or an infinite one, at {place} and a speed of {speed:.6g} {unit}",
+                key=f"loads.{name}.{'torque' if laws[name]['type'] == 'torque' else 'force'}",
             )
-
-    def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
-        """The angle of a link for a load; None where the load does not depend on it."""
-        if not any(isinstance(entry, str) and "angle" in expression(entry).names for entry in entries):
-            return None
-        frame = parts.frames[link]
-        return lambda xp, m: self.angle(xp, link, description_axis(m.links[link].u, frame), m.q)
-
-    def _tables_for(self, entries: Sequence[float | str]) -> dict[str, TableCurve]:
-        """The tables over the coordinate that a load takes."""
-        names = {name for entry in entries if isinstance(entry, str) for name in expression(entry).names}
-        return {name: curve for name, curve in self.tables.items() if name in names}
 
     # the way of the driver
 
@@ -322,11 +300,10 @@ class LinkageDescription(LinkageOutputs):
     def angle_counts(self) -> str:
         """How the angle of the driver counts, in words."""
         driver = self.structure.driver
-        return driver.angle_counts(self.at_start.parts.geometry.number(driver.zero))
-
-    def places(self) -> list[float]:
-        """Places of the driver from the start on, around or over its range."""
-        return self.way.places()
+        degrees = round(math.degrees(self.at_start.parts.geometry.number(driver.zero)), 6)
+        named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
+        way = "counter-clockwise" if driver.sense > 0.0 else "clockwise"
+        return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
 
     def _followed(self, linkage: DescribedLinkage) -> FollowedLinkage:
         """The linkage over the way of its driver."""
@@ -334,16 +311,29 @@ class LinkageDescription(LinkageOutputs):
         return FollowedLinkage(self.structure, self.way, replace(linkage, extremes=()))
 
     def _turns(self) -> dict[str, tuple[float, float]]:
-        """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes."""
-        followed = self._followed(self.at_start)
+        """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes. Refuse
+        extremes of the angle of a link that turns round, too."""
         try:
-            return followed.turns()
+            turns = self.followed.turns()
         except InputError as error:
-            raise InputError(f"{error}{followed.range_words()}", key=error.key) from None
+            raise InputError(f"{error}{self.followed.range_words()}", key=error.key) from None
+        for name in self.extremes:
+            _, link, _, axis = parts_of_extreme(name)
+            if axis == "angle" and self.way.turns and turns[link][0]:
+                raise InputError(
+                    f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
+                    "point, or of a link that swings",
+                    key=f"links.{link}",
+                )
+        return turns
+
+    def is_start(self, xp: Any, p: Any) -> bool:
+        """Whether the parameters are numbers with the start values, whose linkage is known."""
+        return xp is MATH and p == self.Parameters()
 
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
-        parameters; empty where there is none."""
+        parameters; empty if there is none."""
         try:
             self._followed(self.linkage(MATH, p, self.Inputs())).turns()
         except InputError as error:
@@ -356,20 +346,13 @@ class LinkageDescription(LinkageOutputs):
 
     # the model
 
-    def _ready(self) -> Any:
-        """The start values of the parameters, with the numbers that are derived from them."""
-        p = self.Parameters()
-        object.__setattr__(p, "derived", self.start_derived)
-        return p
-
     def end_stops(self) -> EndStops | None:
         """The usual end stops of a driver with a range, for its start values; None for one that turns round."""
         if self.way.turns:
             return None
-        p, u = self._ready(), self.Inputs()
-        linkage = self.linkage(MATH, p, u)
         states = [
-            MachineState(MATH, Mechanism(MATH, linkage, q, self.start_derived), 0.0) for q in self.places()
+            MachineState(MATH, Mechanism(MATH, self.at_start, q, self.start_derived), 0.0)
+            for q in self.way.places()
         ]
         mass = max(state.J for state in states)
         low, high = self.span
@@ -385,29 +368,7 @@ class LinkageDescription(LinkageOutputs):
         """The model."""
         data = self.data
         receivers = self.at_start.parts.receivers
-        bearings = {self.variable("joint", name): receivers[name][0] for name in self.structure.joints}
-        titles = {name: self.variable("joint", name) for name in self.structure.joints}
-        names = tuple(parameter["name"] for parameter in data.get("parameters", ()))
-        groups = self.structure.groups
-        triads = [assur_group for assur_group in groups if assur_group.kind == "triad"]
-        demands = (
-            (
-                groups,
-                "least margin of the group of {} over the way of the driver",
-                "the linkage does not close all the way, or comes to a dead position",
-            ),
-            (
-                triads,
-                "largest misfit of a leg of the group of {} over the turn of the driver, in parts of its length",
-                "the group does not close all the way round from the start pose, or moves too sharply to be followed",
-            ),
-        )
-        required = tuple(
-            Requirement(subject.format(", ".join(assur_group.links)), "1", why, names)
-            for members, subject, why in demands
-            for assur_group in members
-        ) + tuple(requirement_of_width(*width, names) for width in self.widths)
-
+        variables = {name: self.variable("joint", name) for name in self.structure.joints}
         title = data["title"] or data["name"]
         return FileMachine(
             name=data["name"],
@@ -418,8 +379,8 @@ class LinkageDescription(LinkageOutputs):
             direct_description=words_on_motion(f"{title}, moving by itself", self.port),
             made=(machine_of, (data,)),
             fmu_data=FmuData(self.notes, About(**data.get("about", {}))),
-            repeated=repeated_outputs(self.structure, self.variable),
-            constant=constant_outputs(self.structure, self.variable),
+            repeated=self.repeated,
+            constant=self.constant,
             driver_port=self.port,
             span=self.span,
             turns=self.way.turns,
@@ -429,51 +390,89 @@ class LinkageDescription(LinkageOutputs):
             Parameters=self.Parameters,
             Inputs=self.Inputs,
             Outputs=self.outputs,
-            joints=bearings,
-            pins=titles,
+            joints={variable: receivers[name][0] for name, variable in variables.items()},
+            pins=variables,
             usual_speed=(0.05, 200.0),
             described_by=self,
             linkage=self.linkage,
             probes=self.probes,
-            required=required,
+            required=self.required,
             requirements=self.limits,
             obstacle=self.obstacle,
         )
 
+    @property
+    def required(self) -> tuple[Requirement, ...]:
+        """The requirements whose values and limits `limits` gives."""
+        names = tuple(parameter["name"] for parameter in self.data.get("parameters", ()))
+        groups = {", ".join(assur.links): assur.kind for assur in self.structure.groups}
+        margins = (
+            Requirement(
+                f"least margin of the group of {links} over the way of the driver",
+                "1",
+                "the linkage does not close all the way, or comes to a dead position",
+                names,
+            )
+            for links in groups
+        )
+        fits = (
+            Requirement(
+                f"largest misfit of a leg of the group of {links} over the turn of the driver, in parts of its "
+                "length",
+                "1",
+                "the group does not close all the way round from the start pose, or moves too sharply to be followed",
+                names,
+            )
+            for links, kind in groups.items()
+            if kind == "triad"
+        )
+        return (*margins, *fits, *(requirement_of_width(*width, names) for width in self.widths))
+
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad, with
         their limits."""
-        u = self.Inputs()
-        linkage = self.linkage(xp, p, u)
-        derived = getattr(p, "derived", ())
-        least: list[Any] = []
-        for q in self.places():
-            try:
-                margins = Mechanism(xp, linkage, q, derived).margins()
-            except (ArithmeticError, ValueError):
-                margins = [math.nan] * len(self.structure.groups)
-            signed = [margin * sign for margin, sign in zip(margins, self._signs, strict=True)]
-            least = signed if not least else [lesser(xp, *pair) for pair in zip(least, signed, strict=True)]
-        for margin in least:
-            yield margin, LEAST_MARGIN, math.inf
-        last = 0
-        for assur_group in linkage.groups:
-            last += assur_group.derived_count
-            if isinstance(assur_group, Triad):
-                yield derived[last - 2], -math.inf, MOST_MISFIT
+        if self.is_start(xp, p):
+            linkage, derived, course = self.at_start, self.start_derived, self.followed.margins
+        else:
+            linkage, derived = self.linkage(xp, p, self.Inputs()), getattr(p, "derived", ())
+            course = [
+                signed(self._margins(xp, linkage, derived, q), self.followed.signs) for q in self.way.places()
+            ]
+        for margins_of_group in zip(*course, strict=True):
+            yield reduce(partial(lesser, xp), margins_of_group), LEAST_MARGIN, math.inf
+        for _, misfit in misfits(linkage, derived):
+            yield misfit, -math.inf, MOST_MISFIT
         values = linkage.parts.geometry.values
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
 
-    @cached_property
-    def _signs(self) -> list[float]:
-        """The signs of the margins with the start values."""
-        m = Mechanism(MATH, self.at_start, self.places()[0], self.start_derived)
-        return [math.copysign(1.0, margin) for margin in m.margins()]
+    def _margins(self, xp: Any, linkage: DescribedLinkage, derived: Sequence[Any], q: float) -> list[Any]:
+        """The margins of the groups at a place; NaN if the linkage does not close."""
+        try:
+            return Mechanism(xp, linkage, q, derived).margins()
+        except (ArithmeticError, ValueError):
+            return [math.nan] * len(self.structure.groups)
 
     @property
     def notes(self) -> str:
-        """Words for the description of the FMU."""
+        """Paragraphs for the description of the FMU on frame, signs and limits, each after an empty line."""
+        driver, span = self.structure.driver, self.way.limits
+        if driver.linear:
+            effort, unit, counts = "force", "m", f"phi is the way of {driver.joint}"
+        else:
+            effort, unit = "torque", "deg"
+            counts = f"The angle of {driver.link} is phi/ratio and counts {self.angle_counts}"
+        if span:
+            low, high = span if driver.linear else map(math.degrees, span)
+            ends = f"from {low:g} {unit} to {high:g} {unit}"
+            counts += f", {ends}: beyond, the linkage was not checked and may not close"
         kinds = dict.fromkeys(joint.kind for joint in self.structure.joints.values())
         limits = "".join(f" {KINDS[kind].limits}" for kind in kinds if KINDS[kind].limits)
-        return notes_on(self.structure.driver, self.way.limits, self.angle_counts) + limits
+        return (
+            "\n\nFrame and signs: x points right, y up; the angle of a link counts counter-clockwise from the x "
+            f"axis. {counts}. The {effort} tau is the one that the machine needs. The reaction of a joint is the "
+            "force on the link that its description names first."
+            "\n\nLimits: links are rigid, and joints have no play; a joint pushes and pulls. Static friction is not "
+            "modelled. Lengths are fixed before the initialization, where lengths for which the linkage does not "
+            f"close are refused.{limits}"
+        )

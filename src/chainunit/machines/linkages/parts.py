@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...core.errors import InputError
 from ...core.planar import Vec2
 from ...groups.body import Bar, Mass
 from ...groups.driver import Crank, Cylinder, Driver, Ram
@@ -16,7 +14,7 @@ from ...groups.joints import Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
 from ...groups.triad import Pose, Triad
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
-from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry, RoughPoses
+from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry
 from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
 from .structure import CYLINDER
@@ -29,27 +27,22 @@ class LinkageParts:
     and link), with the sign that turns it into the force on the link that the description names first.
     """
 
-    def __init__(self, geometry: LinkGeometry, sides: Mapping[str, float] | None = None) -> None:
+    def __init__(self, geometry: LinkGeometry, sides: Mapping[str, float]) -> None:
         """
         Parameters
         ----------
-        sides : the assembly modes, of a triad the turns of its ternary link; None to find modes by the rough poses,
-            which takes numbers and `MATH`
+        sides : the assembly modes, of a triad the turns of its ternary link, by the first link of each group
         """
-        self.geometry, self.structure = geometry, geometry.structure
-        self._rough = RoughPoses(geometry)
-        self.sides: dict[str, float] = dict(sides or {})
-        self._known_sides = sides is not None
+        self.geometry, self.structure, self.sides = geometry, geometry.structure, sides
         self.frames: dict[str, LinkFrame] = {GROUND: OWN}
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
         self._carriers = {self.pin(GROUND, name): GROUND for name in self.structure.ground}
-        first, *rest = [*self.structure.groups, None]
-        cylinder = first is not None and first.kind == CYLINDER
-        self.driver = self._cylinder(first) if first is not None and cylinder else self._driver()
-        self.groups: tuple[Group, ...] = ()
-        for group in rest if cylinder else self.structure.groups:
-            if group is not None:
-                self.groups += (self._group(group),)
+        groups = list(self.structure.groups)
+        cylinder = groups.pop(0) if groups and groups[0].kind == CYLINDER else None
+        self.driver = self._driver() if cylinder is None else self._cylinder(cylinder)
+        self.groups: list[Group] = []
+        for group in groups:
+            self.groups.append(self._group(group))
 
     def pin(self, link: str, point: str) -> str:
         """The name of a point in the linkage."""
@@ -82,9 +75,9 @@ class LinkageParts:
             points[pin], self._carriers[pin] = (place.x, place.y), link
         return Bar(link, start, length, self.geometry.mass(entry, frame), points)
 
-    def hung(self, link: str, joint: JointEntry) -> Bar:
-        """The bar of a link that starts from the pin of a joint, along its own x axis."""
-        frame = LinkFrame(self.geometry.point(link, joint.at(link)), ALONG_X)
+    def hung(self, link: str, joint: JointEntry, along: Vec2 = ALONG_X) -> Bar:
+        """The bar of a link that starts from the pin of a joint with a link before it, in the direction `along`."""
+        frame = LinkFrame(self.geometry.point(link, joint.at(link)), along)
         return self.bar(link, frame, self.outer(joint, link))
 
     # joints
@@ -94,11 +87,8 @@ class LinkageParts:
         carrier = joint.other_link(link)
         frame = self.frames[carrier]
         place = frame.coordinates(self.geometry.line_through(joint, link, point))
-        return Rail(
-            None if carrier == GROUND else carrier,
-            place,
-            frame.components(self.geometry.direction(joint, carrier)),
-        )
+        along = frame.components(self.geometry.direction(joint, carrier))
+        return Rail(None if carrier == GROUND else carrier, place, along)
 
     def receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
@@ -136,38 +126,22 @@ class LinkageParts:
 
     def _cylinder(self, group: AssurGroup) -> Driver:
         barrel, rod, lever = group.links
-        slide = self.structure.joints[self.structure.driver.joint]
+        geometry, slide = self.geometry, self.structure.joints[self.structure.driver.joint]
         p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
         inner = self._inner(c, rod, lever)
         # from the barrel to the rod
-        along = {link: self.geometry.direction(slide, link) for link in (barrel, rod)}
-        if slide.on[0] == barrel:
-            along = {link: -v for link, v in along.items()}
-        frames = {
-            link: LinkFrame(self.geometry.point(link, joint.at(link)), along[link])
-            for link, joint in ((barrel, p), (rod, c))
-        }
-        (near, far) = (
-            frame.coordinates(self.geometry.point(link, slide.at(link))) for link, frame in frames.items()
+        in_barrel, in_rod = (
+            -line if slide.on[0] == barrel else line
+            for line in (geometry.direction(slide, barrel), geometry.direction(slide, rod))
         )
-        bars = self.bar(barrel, frames[barrel], self.outer(p, barrel)), self.bar(rod, frames[rod])
-        swung = self._rod(lever, q, c)
-
-        def turn() -> Any:
-            start, end = self._rough.place(GROUND, p), self._rough.place(GROUND, q)
-            return (end - start).cross(self._rough.place(lever, c) - start)
-
-        return Cylinder(
-            bars[0],
-            inner,
-            bars[1],
-            swung,
-            near.x - far.x,
-            near.y - far.y,
-            far.y,
-            self._guide(slide, rod),
-            self._side(barrel, turn),
+        barrel_bar = self.hung(barrel, p, in_barrel)
+        rod_bar = self.bar(rod, LinkFrame(geometry.point(rod, c.at(rod)), in_rod))
+        near, far = (
+            self.frames[link].coordinates(geometry.point(link, slide.at(link))) for link in (barrel, rod)
         )
+        swung, shift = self._rod(lever, q, c), near - far
+        guide, side = self._guide(slide, rod), self.sides[barrel]
+        return Cylinder(barrel_bar, inner, rod_bar, swung, shift.x, shift.y, far.y, guide, side)
 
     # joints by their letters: p and q join a link with those before, b and c are the pin between two links, g and h
     # are guides on links before, s is the slot between two links
@@ -190,13 +164,7 @@ class LinkageParts:
 
     def _rrr(self, first: str, second: str, p: JointEntry, b: JointEntry, q: JointEntry) -> Group:
         inner = self._inner(b, first, second)
-        bars = self._rod(first, p, b), self._rod(second, q, b)
-
-        def turn() -> Any:
-            start, end = self._rough.place(p.other_link(first), p), self._rough.place(q.other_link(second), q)
-            return (end - start).cross(self._rough.place(second, b) - start)
-
-        return Dyad(inner, *bars, self._side(first, turn))
+        return Dyad(inner, self._rod(first, p, b), self._rod(second, q, b), self.sides[first])
 
     def _inner(self, joint: JointEntry, first: str, second: str) -> str:
         """The pin between two links, which the second one carries."""
@@ -204,19 +172,6 @@ class LinkageParts:
         self._carriers[pin] = second
         self.receive(joint, pin, first)
         return pin
-
-    def _side(self, first: str, value: Callable[[], Any]) -> float:
-        """The assembly mode of a dyad, from the sign of a value of the rough poses."""
-        if not self._known_sides:
-            rough = float(value())
-            if abs(rough) < 1e-9:
-                raise InputError(
-                    f"the start pose does not tell how {first} is assembled: it stands in a dead position; give the "
-                    "start at another place of the driver",
-                    key="start",
-                )
-            self.sides[first] = math.copysign(1.0, rough)
-        return self.sides[first]
 
     def _slider(self, link: str, rail: JointEntry, start: str) -> tuple[Bar, Rail, str]:
         """A block whose frame starts at the point `start` on its rail."""
@@ -228,36 +183,16 @@ class LinkageParts:
     def _rrp(self, first: str, slider: str, p: JointEntry, c: JointEntry, g: JointEntry) -> Group:
         inner = self._inner(c, first, slider)
         rod = self._rod(first, p, c)
-        bar, rail, guide = self._slider(slider, g, c.at(slider))
-
-        def along() -> Any:
-            return (self._rough.place(slider, c) - self._rough.place(p.other_link(first), p)).dot(
-                self._rough.line(g)
-            )
-
-        return RRP(inner, rod, bar, rail, guide, self._side(first, along))
+        return RRP(inner, rod, *self._slider(slider, g, c.at(slider)), self.sides[first])
 
     def _rpr(self, first: str, second: str, p: JointEntry, g: JointEntry, q: JointEntry) -> Group:
-        frames = [
-            LinkFrame(self.geometry.point(link, j.at(link)), self.geometry.direction(g, link))
-            for link, j in ((first, p), (second, q))
-        ]
+        geometry = self.geometry
+        one = self.hung(first, p, geometry.direction(g, first))
+        other = self.hung(second, q, geometry.direction(g, second))
         block, line = (
-            frame.coordinates(self.geometry.point(link, g.at(link)))
-            for frame, link in zip(frames, (first, second), strict=True)
+            self.frames[link].coordinates(geometry.point(link, g.at(link))) for link in (first, second)
         )
-        starts = self.outer(p, first), self.outer(q, second)
-        bars = [
-            self.bar(link, frame, start)
-            for link, frame, start in zip((first, second), frames, starts, strict=True)
-        ]
-
-        def along() -> Any:
-            arm = self._rough.place(p.other_link(first), p) - self._rough.place(q.other_link(second), q)
-            return arm.dot(self._rough.line(g))
-
-        offset = line.y - block.y
-        return RPR(bars[0], bars[1], offset, self._guide(g, first), self._side(first, along))
+        return RPR(one, other, line.y - block.y, self._guide(g, first), self.sides[first])
 
     def _prp(self, first: str, second: str, g: JointEntry, c: JointEntry, h: JointEntry) -> Group:
         inner = self._inner(c, first, second)
@@ -266,16 +201,14 @@ class LinkageParts:
         return PRP(inner, one, other, one_rail, other_rail, (one_guide, other_guide))
 
     def _rpp(self, block: str, yoke: str, p: JointEntry, s: JointEntry, g: JointEntry) -> Group:
-        pin = self.geometry.point(block, p.at(block))
-        start = self.outer(p, block)
-        along = self.geometry.direction(g, yoke)
-        origin = self.geometry.line_through(s, block, pin)
+        geometry = self.geometry
+        along = geometry.direction(g, yoke)
+        origin = geometry.line_through(s, block, geometry.point(block, p.at(block)))
         rail = self._rail(g, yoke, origin)
-        frame = LinkFrame(origin, along)
-        slot = frame.components(self.geometry.direction(s, yoke))
-        in_block = self.geometry.across(s, along, yoke)
-        bars = self.bar(block, LinkFrame(pin, in_block), start), self.bar(yoke, frame)
-        return RPP(*bars, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
+        one = self.hung(block, p, geometry.across(s, along, yoke))
+        other = self.bar(yoke, LinkFrame(origin, along))
+        slot = self.frames[yoke].components(geometry.direction(s, yoke))
+        return RPP(one, other, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
 
     def _triad(
         self, ternary: str, legs: Sequence[str], outer: Sequence[JointEntry], inner: Sequence[JointEntry]
@@ -285,12 +218,16 @@ class LinkageParts:
         # before the legs: one that slides in it may do so at a point of it
         plate = self.bar(ternary, OWN)
         built = [self._leg(*ends, ternary) for ends in zip(legs, outer, inner, strict=True)]
-        x, y, angle = self.structure.poses[ternary]
-        mass = plate.mass or Mass(0.0, 0.0, 0.0, 0.0)
         first, second, third = built
-        pose = Pose(x, y, angle)
-        turns = self.sides.get(ternary, 0.0)
-        return Triad(ternary, mass, (first, second, third), plate.points, pose, self.structure.start, turns)
+        return Triad(
+            ternary,
+            plate.mass or Mass(0.0, 0.0, 0.0, 0.0),
+            (first, second, third),
+            plate.points,
+            Pose(*self.structure.poses[ternary]),
+            self.structure.start,
+            self.sides.get(ternary, 0.0),
+        )
 
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
         pin = self.pin(ternary, inner.at(ternary))
@@ -301,8 +238,6 @@ class LinkageParts:
                 return RodLeg(self._rod(link, outer, inner), pin, arm)
             bar, rail, guide = self._slider(link, outer, inner.at(link))
             return BlockLeg(bar, pin, arm, rail, guide)
-        point = self.geometry.point(link, outer.at(link))
-        start = self.outer(outer, link)
-        place = self.geometry.line_through(inner, link, point)
-        bar = self.bar(link, LinkFrame(point, self.geometry.direction(inner, link)), start)
+        place = self.geometry.line_through(inner, link, self.geometry.point(link, outer.at(link)))
+        bar = self.hung(link, outer, self.geometry.direction(inner, link))
         return SlotLeg(bar, place, self.geometry.direction(inner, ternary), self._guide(inner, link))

@@ -8,13 +8,14 @@ from typing import Any
 from ...mechanism.assur import GROUND, REVOLUTE, in_order_of_motion
 from .joint_kind import JointEntry
 from .joint_kinds import in_decomposition
+from .names import owners_of
 
 
 def shared_pins(
     points: Mapping[str, Iterable[str]], named: Sequence[Mapping[str, Any]], driver: Mapping[str, Any]
 ) -> tuple[list[dict[str, Any]], list[tuple[str, str]]]:
-    """A revolute joint for each further link in a point of the same name, where none is named; and clashes: names
-    that a joint has already, each with what is wrong.
+    """A revolute joint for each further link in a point of the same name, if none is named; and clashes: names that a
+    joint has already, each with what is wrong.
 
     Parameters
     ----------
@@ -22,47 +23,29 @@ def shared_pins(
     named : the joints that the file names
     driver : the table of the driver
     """
-    owners: dict[str, list[str]] = {}
-    for link, names in points.items():
-        for point in names:
-            owners.setdefault(point, []).append(link)
+    owners = owners_of(points)
     joined = {frozenset((tuple(j["on"]), tuple(j["by"]))) for j in named if j["type"] == REVOLUTE}
+    apart = {point for pair in joined for _, point in pair if len({name for _, name in pair}) == 1}
+    ordered = in_order_of_motion(
+        {point: links for point, links in owners.items() if len(links) > 1 and point not in apart},
+        [link for link in points if link != GROUND],
+        [in_decomposition(JointEntry.from_table(j)) for j in named if j["name"] != driver.get("joint")],
+        str(driver.get("link")),
+    )
+    # of three or more links that one stands first on which the others hang
+    owners |= {point: links for point, links in ordered.items() if len(links) > 2}
     taken = {joint["name"] for joint in named}
     joints: list[dict[str, Any]] = []
     clashes = []
-    for point, those in _ordered(points, owners, joined, named, driver).items():
-        for link in those[1:]:
-            if any(frozenset(((a, point), (link, point))) in joined for a in those if a != link):
+    for point, (first, *others) in owners.items():
+        for link in others:
+            if any(frozenset(((a, point), (link, point))) in joined for a in (first, *others) if a != link):
                 continue
-            name = point if len(those) == 2 else f"{point}_{link}"
+            name = point if len(others) == 1 else f"{point}_{link}"
             if name in taken:
-                message = (
-                    f"does not join the points {point} of {', '.join(those)}; rename the point or the joint"
-                )
+                meeting = ", ".join((first, *others))
+                message = f"does not join the points {point} of {meeting}; rename the point or the joint"
                 clashes.append((name, message))
                 continue
-            joints.append({"name": name, "type": REVOLUTE, "on": [link, point], "by": [those[0], point]})
+            joints.append({"name": name, "type": REVOLUTE, "on": [link, point], "by": [first, point]})
     return joints, clashes
-
-
-def _ordered(
-    points: Mapping[str, Iterable[str]],
-    owners: Mapping[str, list[str]],
-    joined: set[frozenset[tuple[str, ...]]],
-    named: Sequence[Mapping[str, Any]],
-    driver: Mapping[str, Any],
-) -> dict[str, list[str]]:
-    """The links of each point; of three or more that one first on which the others hang."""
-    apart = {point for pair in joined for _, point in pair if len({name for _, name in pair}) == 1}
-    shared = {point: those for point, those in owners.items() if len(those) > 1 and point not in apart}
-    seen = [
-        in_decomposition(JointEntry.from_table(joint))
-        for joint in named
-        if joint["name"] != driver.get("joint")
-    ]
-    links = [link for link in points if link != GROUND]
-    ordered = in_order_of_motion(shared, links, seen, str(driver.get("link")))
-    return {
-        point: ordered[point] if len(those) > 2 and point in ordered else those
-        for point, those in owners.items()
-    }

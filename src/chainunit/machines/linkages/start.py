@@ -2,20 +2,19 @@
 
 Where two points of a link are known, or one point and its angle, its pose is known, and so are all its points, the
 points that meet them in revolute joints, and the angles of links that slide on it. Rough values do: the pose only
-says in which of its modes each group is assembled.
+says in which of its modes each group is assembled. A point x, y is the complex number x + y j [m].
 """
 
 from __future__ import annotations
 
 import math
+from cmath import phase, rect
 from collections.abc import Mapping, Sequence
 
 from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from .joint_kind import JointEntry
-
-Point = tuple[float, float]
-Pose = tuple[float, float, float]
+from .names import LinkPoint
 
 
 class StartPose:
@@ -28,16 +27,18 @@ class StartPose:
     """
 
     def __init__(
-        self, points: Mapping[str, Mapping[str, Point]], joints: Sequence[tuple[JointEntry, float]]
+        self, points: Mapping[str, Mapping[str, complex]], joints: Sequence[tuple[JointEntry, float]]
     ) -> None:
         self.points, self.joints = points, joints
         self.slide: tuple[JointEntry, float] | None = None
-        self.poses: dict[str, Pose] = {GROUND: (0.0, 0.0, 0.0)}
-        self.places: dict[tuple[str, str], Point] = {}
+        """the joint in which the driver slides, and its way there [m]"""
+        self.poses: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
+        """the origin of the frame of a link, and its angle [rad]"""
+        self.places: dict[LinkPoint, complex] = {}
         self.angles: dict[str, float] = {GROUND: 0.0}
 
-    def complete(self) -> dict[str, Pose]:
-        """The poses of all links.
+    def complete(self) -> dict[str, tuple[float, float, float]]:
+        """The poses of all links: x, y [m] and angle [rad].
 
         Raises
         ------
@@ -48,17 +49,17 @@ class StartPose:
             pass
         lost = [link for link in self.points if link not in self.poses]
         if lost:
-            link = lost[0]
-            placed = [name for name in self.points[link] if (link, name) in self.places]
-            more = [name for name in self.points[link] if name not in placed]
-            wish = (
-                f"the angle of {link}, or a place of its point {more[0]}" if more else f"the angle of {link}"
-            )
+            more = [name for name in self.points[lost[0]] if (lost[0], name) not in self.places]
+            wish = f"the angle of {lost[0]}" + (f", or a place of its point {more[0]}" if more else "")
             raise InputError(
                 f"the start pose does not place the link{'s' * (len(lost) > 1)} {', '.join(lost)}: give {wish} in "
                 "[start]; a rough value does"
             )
-        return {link: pose for link, pose in self.poses.items() if link != GROUND}
+        return {
+            link: (origin.real, origin.imag, angle)
+            for link, (origin, angle) in self.poses.items()
+            if link != GROUND
+        }
 
     def _spread(self) -> bool:
         """Whether a round found anything new."""
@@ -67,21 +68,20 @@ class StartPose:
             if link not in self.poses:
                 self._pose(link, points)
             if link in self.poses:
-                x, y, angle = self.poses[link]
+                origin, angle = self.poses[link]
                 self.angles.setdefault(link, angle)
-                c, s = math.cos(angle), math.sin(angle)
-                for name, (px, py) in points.items():
-                    self.places.setdefault((link, name), (x + c * px - s * py, y + s * px + c * py))
+                for name, point in points.items():
+                    self.places.setdefault((link, name), origin + rect(1.0, angle) * point)
         self._slid()
         for joint, turn in self.joints:
-            (on, by), pair = (joint.on, joint.by), (joint.on[0], joint.by[0])
+            (on, _), (by, _) = joint.on, joint.by
             if joint.kind == PRISMATIC:
-                if pair[1] in self.angles:
-                    self.angles.setdefault(pair[0], self.angles[pair[1]] + turn)
-                if pair[0] in self.angles:
-                    self.angles.setdefault(pair[1], self.angles[pair[0]] - turn)
+                if by in self.angles:
+                    self.angles.setdefault(on, self.angles[by] + turn)
+                if on in self.angles:
+                    self.angles.setdefault(by, self.angles[on] - turn)
             elif joint.kind == REVOLUTE:
-                for one, other in ((on, by), (by, on)):
+                for one, other in ((joint.on, joint.by), (joint.by, joint.on)):
                     if one in self.places:
                         self.places.setdefault(other, self.places[one])
         return before != (len(self.poses), len(self.places), len(self.angles))
@@ -91,32 +91,27 @@ class StartPose:
         if self.slide is None:
             return
         joint, way = self.slide
-        (on, on_point), (by, by_point) = joint.on, joint.by
-        if by not in self.angles:
+        link, start = joint.by
+        if link not in self.angles:
             return
-        (ax, ay), (bx, by_y) = self.points[by][by_point], self.points[by][joint.toward]
-        angle = self.angles[by] + math.atan2(by_y - ay, bx - ax)
-        dx, dy = way * math.cos(angle), way * math.sin(angle)
-        if (by, by_point) in self.places:
-            x, y = self.places[by, by_point]
-            self.places.setdefault((on, on_point), (x + dx, y + dy))
-        elif (on, on_point) in self.places:
-            x, y = self.places[on, on_point]
-            self.places.setdefault((by, by_point), (x - dx, y - dy))
+        line = self.points[link][joint.toward] - self.points[link][start]
+        moved = rect(way, self.angles[link] + phase(line))
+        if joint.by in self.places:
+            self.places.setdefault(joint.on, self.places[joint.by] + moved)
+        elif joint.on in self.places:
+            self.places.setdefault(joint.by, self.places[joint.on] - moved)
 
-    def _pose(self, link: str, points: Mapping[str, Point]) -> None:
+    def _pose(self, link: str, points: Mapping[str, complex]) -> None:
+        """The pose of a link from its angle and a point, or from two points, if these are known."""
         placed = [name for name in points if (link, name) in self.places]
         if not placed:
             return
-        first = placed[0]
-        (px, py), (x, y) = points[first], self.places[link, first]
+        point, place = points[placed[0]], self.places[link, placed[0]]
         if link not in self.angles:
             # the pair of points that lie farthest apart tells the angle best
-            far = max(placed, key=lambda name: math.dist(points[name], points[first]))
-            (qx, qy), (u, v) = points[far], self.places[link, far]
-            if math.dist((px, py), (qx, qy)) == 0.0 or math.dist((x, y), (u, v)) == 0.0:
+            far = max(placed, key=lambda name: abs(points[name] - point))
+            arm, placed_arm = points[far] - point, self.places[link, far] - place
+            if arm == 0.0 or placed_arm == 0.0:
                 return
-            turn = math.atan2(v - y, u - x) - math.atan2(qy - py, qx - px)
-            self.angles[link] = math.remainder(turn, 2.0 * math.pi)
-        c, s = math.cos(self.angles[link]), math.sin(self.angles[link])
-        self.poses[link] = x - c * px + s * py, y - s * px - c * py, self.angles[link]
+            self.angles[link] = math.remainder(phase(placed_arm) - phase(arm), 2.0 * math.pi)
+        self.poses[link] = place - rect(1.0, self.angles[link]) * point, self.angles[link]

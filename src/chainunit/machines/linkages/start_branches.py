@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError
 from ...mechanism.assur import AssurGroup
-from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism
-from .geometry import LinkGeometry
+from .geometry import TWO_WAYS
 from .model import LinkageDescription
-from .parts import LinkageParts
-from .probes import description_axis
 from .structure import CYLINDER
 
-_TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER)
 _AS_FAR = 0.8
 """Share of its distance from the other way that a start may be away from the way that is taken."""
 _SAME = 1e-6
@@ -32,26 +30,37 @@ def check_start(described: LinkageDescription) -> None:
     InputError
         in one line, with both places of the pin, or both angles of the link, that the start may give.
     """
-    derived, geometry = described.start_derived, described.at_start.parts.geometry
-    for group in described.structure.groups:
-        if group.kind in _TWO_WAYS:
-            _check(described, geometry, derived, group)
+    structure = described.structure
+    here = described.followed.at(structure.start)
+    for group in structure.groups:
+        if group.kind in TWO_WAYS:
+            _check(described, group, [here, _other_way(described, group)])
 
 
-def _check(
-    described: LinkageDescription, geometry: LinkGeometry, derived: Sequence[float], group: AssurGroup
-) -> None:
-    structure, first = described.structure, group.links[0]
-    angles, pins, joint = [], [], structure.joints[group.joints[1].name]
-    for sense in (1.0, -1.0):
-        parts = LinkageParts(geometry, described.sides | {first: sense * described.sides[first]})
-        # a cylinder is the driver, and no group of the linkage
-        number = structure.groups.index(group) + 1 - (len(structure.groups) - len(parts.groups))
-        linkage = Linkage(parts.ground, parts.driver, parts.groups, {}).before(number)
-        m = Mechanism(MATH, linkage, structure.start, derived[: linkage.derived_count])
-        axes = (description_axis(m.links[link].u, parts.frames[link]) for link in group.links)
-        angles.append([math.atan2(axis.y, axis.x) for axis in axes])
-        pins.append(m.pins.get(parts.pin(*joint.by)))
+def _other_way(described: LinkageDescription, group: AssurGroup) -> Mechanism:
+    """The start of the linkage up to a dyad that is assembled in the other way."""
+    structure, linkage = described.structure, described.at_start
+    # a cylinder is the driver, and no group of the linkage
+    count = structure.groups.index(group) + 1 - (len(structure.groups) - len(linkage.groups))
+    part = linkage.before(count)
+    if group.kind == CYLINDER:
+        part = replace(part, driver=_turned(part.driver))
+    else:
+        part = replace(part, groups=(*part.groups[:-1], _turned(part.groups[-1])))
+    return Mechanism(MATH, part, structure.start, described.start_derived)
+
+
+def _turned(dyad: Any) -> Any:
+    """A dyad, or a cylinder, that is assembled in the other way."""
+    return replace(dyad, side=-dyad.side)
+
+
+def _check(described: LinkageDescription, group: AssurGroup, assembled: Sequence[Mechanism]) -> None:
+    """Refuse a start that does not tell in which of both ways a dyad is assembled."""
+    structure, linkage = described.structure, described.at_start
+    joint = structure.joints[group.joints[1].name]
+    angles = [[linkage.angle(link, m) for link in group.links] for m in assembled]
+    pins = [m.pins.get(linkage.parts.pin(*joint.by)) for m in assembled]
     rough = [structure.poses[link][2] for link in group.links]
     near, far = (
         sum(

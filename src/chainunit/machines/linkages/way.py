@@ -62,7 +62,7 @@ class DriverWay:
         return [*self.places(), self.start + WHOLE] if self.turns else self.places()
 
     def rate(self, angles: Sequence[float]) -> float:
-        """How often a link turns per turn of the driver, by its `angles` at the `closed_places` [rad]; 0 where it
+        """How often a link turns per turn of the driver, by its `angles` at the `closed_places` [rad]; 0 if it
         swings by less than a turn."""
         if self.linear or (self.swings and max(angles) - min(angles) < _SWINGS):
             return 0.0
@@ -78,8 +78,8 @@ class DriverWay:
         return f"{degrees:.4g} deg of {self.name}"
 
     def inside(self, q: float, sense: float) -> str:
-        """A place as a file has it, without its unit, rounded upward where `sense` is +1, downward where it is -1,
-        and to the nearest one where it is 0: an angle in degrees to four digits behind the point, a way in metres to
+        """A place as a file has it, without its unit, rounded upward if `sense` is +1, downward if it is -1,
+        and to the nearest one if it is 0: an angle in degrees to four digits after the point, a way in metres to
         six."""
         unit = 1e-6 if self.linear else 1e-4
         to = math.ceil if sense > 0.0 else math.floor if sense < 0.0 else round

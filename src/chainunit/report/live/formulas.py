@@ -22,6 +22,8 @@ class Formula:
     """A number, a name or an operation, as its `data`."""
 
     __slots__ = ("data",)
+    is_symbol = True
+    """it stands for a number that is known later"""
 
     def __init__(self, data: Data) -> None:
         self.data = data

@@ -1,0 +1,121 @@
+"""Files of the program Linkage (`.linkage2`): XML with connectors, links as lists of connectors, and actuators."""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element
+
+from ....core.errors import InputError, shown
+from ....core.inputs import xml_of
+from ....mechanism.assur import GROUND
+from .foreign import ForeignDriver, ForeignLinkage, ForeignSlot
+
+_MECHANISM = 16
+"""Bit of the layer of a mechanism; what has no layer is on it."""
+
+
+def read(data: bytes, name: str) -> ForeignLinkage:
+    """The linkage in the content of a file; `name` is that of the file.
+
+    Raises
+    ------
+    InputError
+        for what is no XML of this program; other faults are collected.
+    """
+    root = xml_of(data, name)
+    if root.tag != "linkage2":
+        raise InputError(f"{name}: begins with {shown(root.tag)}; a file of Linkage begins with <linkage2>")
+    return LinkageDrawing([node for node in root if _is_mechanism(node)])
+
+
+class LinkageDrawing(ForeignLinkage):
+    """The linkage of one file; connectors and links have `names` by their ids in it."""
+
+    def __init__(self, nodes: list[Element]) -> None:
+        super().__init__("Linkage", "mm")
+        self.names: dict[str, dict[str, str]] = {"connector": {}, "Link": {}}
+        connectors = [node for node in nodes if node.tag == "connector"]
+        links = [node for node in nodes if node.tag in ("Link", "element")]
+        for read, chosen in (
+            (self.connector, connectors), (self.body, links), (self.fasten, (*connectors, *links)),
+            (self.slide, connectors), (self.gears, [ratio for node in nodes for ratio in node.iterfind("ratio")]),
+        ):  # fmt: skip
+            for node in chosen:
+                read(_title(node), node)
+
+    def connector(self, title: str, node: Element) -> None:
+        """A connector: a pin, which may be fixed, and may be the input."""
+        if _id(node) in self.names["connector"]:
+            self.fault(title, "stands there twice; give each connector an id of its own")
+            return
+        place = self.numbers(title, [node.get("x", ""), node.get("y", "")])
+        pin = self.pin(f"C{_id(node)}", place, *[GROUND] * (node.get("anchor") == "true"))
+        self.names["connector"][_id(node)] = pin
+        if node.get("input") == "true":
+            self.drivers.append(ForeignDriver(title, (pin,)))
+            speed = abs(self.numbers(title, [node.get("rpm", "15")])[0])
+            self.remarks.append(f"the drawing turns {pin} at {speed:g} rev/min; give --speed for it")
+
+    def body(self, title: str, node: Element) -> None:
+        """A link, or an actuator."""
+        pins = self.pins(title, [end for end in node if end.tag in ("connector", "fastenconnector")])
+        if node.get("actuator") != "true":
+            name = self.link(f"L{_id(node)}")
+            self.names["Link"].setdefault(_id(node), name)
+            self.links[name].pins += pins
+            return
+        (throw,) = self.numbers(title, [node.get("throw", "")])
+        if len(pins) != 2 or throw <= 0.0:
+            self.fault(title, "is an actuator; it must have two connectors and a throw > 0")
+        way = -throw if node.get("cpm", "").startswith("-") else throw
+        self.drivers.append(ForeignDriver(title, tuple(pins), throw=way))
+
+    def pins(self, title: str, ends: list[Element]) -> list[str]:
+        """The pins of connectors; those that are missing are faults."""
+        names = {_id(end): self.names["connector"].get(_id(end), "") for end in ends}
+        for missing in (end for end, name in names.items() if not name):
+            self.fault(title, f"names connector {missing}, which is not in the file")
+        return [name for name in names.values() if name]
+
+    def fasten(self, title: str, node: Element) -> None:
+        """What is fastened to a link."""
+        link = self.names["Link"].get(node.get("fastenlink") or node.get("fasten") or "")
+        name = self.names[node.tag if node.tag == "connector" else "Link"].get(_id(node))
+        if link and name and node.tag == "connector":
+            self.links[link].pins.append(name)
+        elif link and name:
+            self.fastened.append((name, link))
+        elif node.get("fastenlink") or node.get("fasten") or node.get("fastenconnector"):
+            self.fault(title, "is fastened, but not to a link of the file; fasten it to one")
+
+    def slide(self, title: str, node: Element) -> None:
+        """A connector that slides between two others of one link."""
+        line = self.pins(title, node.findall("slidelimit")[:2])
+        if len(line) < 2 or node.get("slider") != "true":
+            return
+        tracks = [name for name, link in self.links.items() if {*line} <= {*link.pins}]
+        if not tracks or self.numbers(title, [node.get("slideradius", "0")])[0] > 0.0:
+            wrong = "along an arc" if tracks else "between two connectors that share no link"
+            self.fault(title, f"slides {wrong}; only a straight slot of one link is carried over")
+            return
+        pin = self.names["connector"][_id(node)]
+        self.slots.append(ForeignSlot(title, pin, tracks[-1], (line[0], line[1])))
+
+    def gears(self, _: str, node: Element) -> None:
+        """Gears or a chain."""
+        ends = " and ".join(f"Link {_id(end)}" for end in node)
+        wheels = "gears" if node.get("type") == "gears" else "a chain"
+        self.fault(ends, f"are joined by {wheels}; only pins, slots and cylinders are carried over")
+
+
+def _is_mechanism(node: Element) -> bool:
+    layer = node.get("layer", "0")[:9]
+    on_layer = not layer.isdecimal() or int(layer) == 0 or bool(int(layer) & _MECHANISM)
+    return on_layer and node.get("measurementelement") != "true"
+
+
+def _id(node: Element) -> str:
+    return node.get("id", "0").strip()[:20]
+
+
+def _title(node: Element) -> str:
+    return f"{'connector' if node.tag == 'connector' else 'Link'} {_id(node)}"
