@@ -233,7 +233,7 @@ def toml_of(result):
     def text(value):
         return json.dumps(value["value"] if isinstance(value, dict) else value)
 
-    def at(name):
+    def entry_of(name):
         table, _, inner = name.partition(".")
         for place in (name, f"{table}.asked.{inner}"):
             with contextlib.suppress(KeyError):
@@ -241,7 +241,7 @@ def toml_of(result):
         raise KeyError(name)
 
     lines += [
-        f"{name} = {at(name)}"
+        f"{name} = {entry_of(name)}"
         for name, origin in result["origins"].items()
         if origin in ("file", "example") and name not in NOT_OF_A_FILE and not name.startswith("event.")
     ]
