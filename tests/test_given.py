@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from records import record_of
-from reports import report_of
+from reports import at, report_of
 from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
