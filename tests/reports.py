@@ -14,8 +14,14 @@ from rich.console import Console
 from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import files, html, motion, page_figures, series, terminal
 from chainunit.report import study as study_report
+from chainunit.report.blocks import found_at
 from chainunit.report.packing import unpacked
 from chainunit.study.result import as_dict
+
+
+def at(result, path):
+    """The entry of a result at the dotted path."""
+    return found_at(result, path)[1]
 
 
 def report_of(study):

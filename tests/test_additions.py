@@ -66,7 +66,7 @@ WARNED = """    if (found := study.answers.get(STEADY)) is not None and (found.b
 FIGURE = '''
 
 @PICTURES.declare(lambda study: "machine.angle" in study.runs.get("start_up", ()), "output_angle.png")
-def _output_angle(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _output_angle(study: StudyRecord) -> fig.Figure:
     """The angle of the output link over time."""
     run = study.runs["start_up"]
     curve = fig.Curve("output link", run["time"].values, run["machine.angle"].values)

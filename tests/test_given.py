@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from records import record_of
-from reports import report_of
+from reports import at, report_of
 from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
@@ -233,15 +233,15 @@ def toml_of(result):
     def text(value):
         return json.dumps(value["value"] if isinstance(value, dict) else value)
 
-    def at(name):
+    def entry_of(name):
         table, _, inner = name.partition(".")
         for place in (name, f"{table}.asked.{inner}"):
             with contextlib.suppress(KeyError):
-                return text(blocks.at(result, place))
+                return text(at(result, place))
         raise KeyError(name)
 
     lines += [
-        f"{name} = {at(name)}"
+        f"{name} = {entry_of(name)}"
         for name, origin in result["origins"].items()
         if origin in ("file", "example") and name not in NOT_OF_A_FILE and not name.startswith("event.")
     ]

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from reports import plotly_figure, screen_of
+from reports import at, plotly_figure, screen_of
 from rich.console import Console
 
 import chainunit.report
@@ -25,7 +25,6 @@ from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
 from chainunit.report.result_figures import ResultFigure
-from chainunit.study.config import Run
 
 RESULT = {
     "speed": {"value": 314.159, "unit": "rad/s", "kind": "speed"},
@@ -42,9 +41,12 @@ RESULT = {
         "crank_speed": {"value": 3.0, "unit": "rad/s", "kind": "speed"},
         "turns": {"value": 2.0, "unit": "1"},
     },
-    "origins": {"run.crank_speed": "file", "run.ramp": "tuned"},
 }
 S = b.Source(RESULT)
+VALUES = tuple(
+    b.GivenValue(f"run.{name}", name, S.number(f"run.{name}", as_given=True), origin)
+    for name, origin in (("crank_speed", "file"), ("turns", "declared"))
+)
 
 
 def curve(name="a line", **more):
@@ -58,25 +60,25 @@ def a_figure(*items, **more):
 
 
 def a_report(units=DEFAULT_UNITS):
-    share = b.Share(S.number("used", over=True), S.line("{power} of {power}"))
+    share = b.Share(S.number("used", over=True), line(S.number("power"), " of ", S.number("power")))
     blocks = (
-        b.Judgement("partly", S.line("It turns at {speed}.")),
+        b.Judgement("partly", line("It turns at ", S.number("speed"), ".")),
         b.Judgement("remark", Strong("Was this meant?"), items=(S.words("words"),)),
-        b.Cards((b.Card("power", ((S.number("power"), "peak"),), (S.line("also {speed}"),)),)),
+        b.Cards((b.Card("power", ((S.number("power"), "peak"),), (line("also ", S.number("speed")),)),)),
         b.Table(
             (
                 b.TableRow(("first", S.number("torque", 0), share), note="because"),
                 b.TableRow(("second", S.number("torque", 1, none="none"), ""), form="long"),
             ),
             (b.Column("row"), b.Column("a long head", "short"), b.Column("used", form="long")),
-            title=S.line("At {=speed}"),
+            title=line("At ", S.number("speed", as_given=True)),
             note_title="why",
         ),
-        b.Text(S.estimate("band")),
-        *(b.Judgement("warning", each) for each in S.lines("warnings")),
-        *(b.Text(each, "note") for each in S.lines("notes")),
+        b.Text(line(S.number("band"), Aside(line(S.number("band_from"), " to ", S.number("band_to"))))),
+        *(b.Judgement("warning", S.words(f"warnings.{place}")) for place in ("0", "1.text")),
+        b.Text(S.words("notes.0"), "note"),
         b.Text("fine", "fine", "long"),
-        b.Given((("Run", tuple(S.given_values(Run, "run"))),)),
+        b.Given((("Run", VALUES),)),
         a_figure(),
     )
     sections = (b.Section("answer", "The answer", blocks), b.Section("none", "Empty", ()))
@@ -126,16 +128,11 @@ def test_each_number_of_a_page_names_its_place():
     places = re.findall(r'data-path="([^"]*)" value="([^"]*)"', page)
     assert {path for path, _ in places} >= {"speed", "power", "torque.value.0", "torque.value.1", "band_from"}
     for path, value in places:
-        node = b.at(RESULT, path)
+        node = at(RESULT, path)
         assert json.loads(value) == (node["value"] if isinstance(node, dict) else node)
 
 
 def test_what_the_file_does_not_give_is_marked():
-    values = list(S.given_values(Run, "run"))
-    assert [(value.name, value.origin) for value in values] == [
-        ("run.crank_speed", "file"),
-        ("run.turns", "declared"),
-    ]
     page, document = html.render(a_report()), markdown(a_report(), [])
     assert page.count('<abbr class="from" title="the program&#x27;s default">d</abbr>') == 1
     assert "Not in the study file: d: the program's default." in page and "t: tuned" not in page
@@ -313,13 +310,11 @@ def test_what_moves_is_played_as_it_is():
 def test_lines():
     assert line("a", ("b", "c"), Aside("d")) == ("a", "b", "c", Aside("d"))
     assert join(["a", ("b", "c")], "; ") == ("a", "; ", "b", "c") and join([]) == ()
-    assert S.line("at {=speed} {who}", who="!") == (
-        "at ",
-        Number(314.159, "rad/s", "speed", "speed", as_given=True),
-        " ",
-        "!",
-    )
-    assert S.line("{power:5}")[0].digits == 5 and S.line("{words}") == (Words("the *motor* <b>", "words"),)
+    speed = S.number("speed", as_given=True)
+    assert speed == Number(314.159, "rad/s", "speed", "speed", as_given=True)
+    assert S.number("power", digits=5).digits == 5
+    words = S.words("words")
+    assert words == "the *motor* <b>" and isinstance(words, Words) and words.path == "words"
 
 
 RENDERERS = (
@@ -469,8 +464,7 @@ def test_the_worst_overload_is_without_a_limiter_only_if_there_is_none(monkeypat
         answers={"surge": SimpleNamespace(crank_torque_peak=1891.0)},
     )
     monkeypatch.setattr(runs.run_names, "title", lambda study, run: study.titles[run])
-    source = b.Source({"answers": {"surge": {"crank_torque_peak": {"value": 1891.0, "unit": "N.m"}}}})
     table = b.Table((b.TableRow(("peak", "1", "2")),), b.heads("", "steady", "surge"))
-    title = runs._beside_the_worst(source, study, table).title
+    title = runs._beside_the_worst(study, table).title
     bare = " (without torque limiter)" if coupling is None else ""
     assert title == f"Steady running beside the worst overload{bare}: rock rises"

@@ -9,7 +9,7 @@ import pytest
 from records import record_of
 from scipy.linalg import eigh
 
-from chainunit.report import blocks, shaft
+from chainunit.report import shaft
 from chainunit.report.terminal import plain_line
 from chainunit.study import config
 from chainunit.study.choice import choose
@@ -72,7 +72,7 @@ def test_on_both_sides_of_ten(place):
             "ratio": {"value": line.ratio, "unit": "1"},
             "holds": holds,
         }
-        shown = shaft._rigid(blocks.Source(data, "crank"))
+        shown = shaft._rigid(study, line)
         words = plain_line(shown.line)
         assert shown.severity == ("good" if holds else "partly")
         assert words.startswith(

@@ -210,7 +210,7 @@ def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
         event=study.event | dict.fromkeys(names, study.event["jam_left"]),
         runs=study.runs | dict.fromkeys(names, study.runs["jam_left"]),
     )
-    drawn = _driveline(None, more)
+    drawn = _driveline(more)
     panels = list(drawn.all_panels())
     assert len(panels) == 2 * 7 and max(c for _, c, _ in panels) == 2
     # torque above cycles, each with the labels of its own axes

@@ -292,7 +292,7 @@ def test_a_sentence_puts_a_torque_where_it_is(study, report):
     result = report.result
     for piece in pieces_of(tuple(report.blocks("long"))):
         if isinstance(piece, Words):
-            for torque, where in SAID.findall(piece.text):
+            for torque, where in SAID.findall(piece):
                 protection = result["sizing"]["protection"]
                 of = "running_torque" if where == "steady running" else "start_torque"
                 assert torque == number(protection[of]["value"], "N.m")

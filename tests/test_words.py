@@ -13,11 +13,11 @@ from command import chainunit
 from event_tables import event_line
 from reports import report_of, said_of
 
+from chainunit.core.descriptions import of_driver
 from chainunit.core.quantities import Quantity
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.text import chosen_units, number, shown_in
-from chainunit.report.blocks import Source
-from chainunit.report.lines import Words
+from chainunit.report.lines import Words, filled
 from chainunit.report.markdown import markdown
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
@@ -78,8 +78,8 @@ def test_a_text_has_slots_for_the_driver():
     speed = Quantity("rad/s", "{driver} speed over {a driver} turn")
     assert speed.description == "crank speed over a crank turn"
     assert speed.described("eccentric") == "eccentric speed over an eccentric turn"
-    source = Source({"title": "Crank shaper"}, "gear")
-    assert source.line("The {driver} of the {title}") == ("The gear of the ", Words("Crank shaper", "title"))
+    title = Words("{driver}", "title")
+    assert filled(of_driver("The {driver} of the {}", "gear"), title) == ("The gear of the ", title)
 
 
 def test_the_units_of_words_end_where_they_are_written():
@@ -184,7 +184,7 @@ def test_a_text_from_outside_is_no_template(tmp_path):
 
 OUTSIDE = {"title", "titles", "title_of", "description", "designation", "noun", "source", "label"}
 """Names of attributes and variables that hold texts of a user or of a foreign FMU."""
-TEMPLATES = {"line": 0, "warn": 1, "note": 1, "of": 2}
+TEMPLATES = {"line": 0, "filled": 0, "warn": 1, "note": 1, "of": 2}
 """By method that fills a template, the place of the template among its arguments."""
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,8 @@ _SAME = 1e-9
 class Equilibrium:
     """An equilibrium of a machine under its loads; in units of a driver that turns."""
 
+    AT_DRIVER: ClassVar = ("place", "end", "holding", "stiffness", "inertia", "friction")
+
     kind: str = part(
         "stable (the potential has a minimum), unstable (a maximum), saddle (the machine leaves it to one side and "
         "comes back from the other), indifferent (no torque over a range), stop (the driver rests on its end stop)"
@@ -78,6 +80,8 @@ class Equilibrium:
 @declaration
 class Holding:
     """The torque that holds a machine at rest over the way of its driver."""
+
+    AT_DRIVER: ClassVar = ("peak", "peak_at", "friction")
 
     peak: Value = quantity("N.m", "largest in size")
     peak_at: Value = quantity("rad", "at")

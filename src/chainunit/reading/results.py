@@ -149,42 +149,63 @@ def parts(result_type: Any) -> tuple[ResultPart, ...]:
     return (*listed, *(x.part for x in members.values() if isinstance(x, _Derived)))
 
 
-def as_data(x: Any, *, titled: bool = False, driver: str = USUAL_DRIVER) -> Any:
+UnitOf = Callable[[str], str]
+"""The unit of a quantity at the driver, by its unit on a driver that turns."""
+
+
+class _Form(NamedTuple):
+    """How data are written, see `as_data`."""
+
+    titled: bool
+    driver: str
+    unit_of: UnitOf
+
+
+def as_data(x: Any, *, titled: bool = False, driver: str = USUAL_DRIVER, unit_of: UnitOf = str) -> Any:
     """A result, or a mapping or sequence of results, as a file in JSON has it: each number as an entry with its unit.
 
     Parameters
     ----------
     titled : whether each declared number has its description as its title
     driver : the noun of the link that the motor turns, for titles
+    unit_of : the unit of a quantity at the driver, see `part_unit`
 
     Raises
     ------
     TypeError
         for a number without a unit, and for a value that is no result.
     """
-    return _data(x, "", "", titled, driver)
+    return _data(x, "", "", _Form(titled, driver, unit_of))
 
 
-def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
-    """The data of a value, a number in this unit or, without a unit, a result."""
+def part_unit(x: Any, declared: ResultPart, unit_of: UnitOf) -> tuple[str, str]:
+    """Unit and kind of a part of `x`. The class of `x` may name parts at the driver, `AT_DRIVER`; their unit is
+    declared as of a driver that turns."""
+    if declared.unit == OWN:
+        return x.unit, getattr(x, "kind", "")
+    is_at_driver = declared.attribute in getattr(type(x), "AT_DRIVER", ())
+    return unit_of(declared.unit) if is_at_driver else declared.unit, declared.kind
+
+
+def _data(x: Any, unit: str, kind: str, form: _Form) -> Any:
     if isinstance(x, InUnit):
         return _number(x.value, x.unit, x.kind) | ({"title": x.title} if x.title else {})
     if isinstance(x, Estimate):
         ends = {end: entry(getattr(x, end), x.unit, x.kind) for end in ("low", "high")}
         return entry(x.value, x.unit, x.kind) | ends
     if isinstance(x, Mapping):
-        return {str(key): _data(element, unit, kind, titled, driver) for key, element in x.items()}
+        return {str(key): _data(element, unit, kind, form) for key, element in x.items()}
     if unit == GIVEN:
         return list(x) if isinstance(x, tuple) else x
     if unit:
         return _number(x, unit, kind)
     # a machine may have no inputs: a table without entries
     if dataclasses.is_dataclass(x) and (parts(type(x)) or not dataclasses.fields(x)):  # type: ignore[arg-type]
-        return _table(x, titled, driver)
+        return _table(x, form)
     if hasattr(x, "tolist"):
         x = x.tolist()
     if isinstance(x, list | tuple | frozenset):
-        return [_data(element, "", "", titled, driver) for element in x]
+        return [_data(element, "", "", form) for element in x]
     if isinstance(x, Path):
         return str(x)
     if x is None or isinstance(x, str | bool | int):
@@ -192,7 +213,7 @@ def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
     raise TypeError(f"{x!r} has no declared unit, and no declared parts")
 
 
-def _table(x: Any, titled: bool, driver: str) -> dict[str, Any]:
+def _table(x: Any, form: _Form) -> dict[str, Any]:
     """The data of a result: its parts by name."""
     data: dict[str, Any] = {}
     result_type: Any = type(x)
@@ -202,13 +223,14 @@ def _table(x: Any, titled: bool, driver: str) -> dict[str, Any]:
             value = getattr(value, attribute)
         if value is None and member.optional:
             continue
-        unit, kind = (x.unit, getattr(x, "kind", "")) if member.unit == OWN else (member.unit, member.kind)
-        content = _data(value, unit, kind, titled or member.titled, driver)
+        unit, kind = part_unit(x, member, form.unit_of)
+        is_titled = form.titled or member.titled
+        content = _data(value, unit, kind, form._replace(titled=is_titled))
         if member.inline:
             data |= content
         else:
-            if titled and unit and "value" in content and "title" not in content:
-                content = content | {"title": of_driver(member.description, driver)}
+            if form.titled and unit and "value" in content and "title" not in content:
+                content = content | {"title": of_driver(member.description, form.driver)}
             data[member.name] = content
     return data
 

@@ -6,52 +6,57 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 
 from ..core.descriptions import of_driver
-from ..core.quantities import finite
-from ..study.measures import MEASURES
+from ..core.quantities import Layout, finite
+from ..study.judgement import motor_verdict
+from ..study.measures import MEASURES, Answers
 from ..study.record import StudyRecord
 from ..study.remark import Remark
+from ..study.result import Verdicts
 from . import blocks as b
 from . import run_names
 from .capability import capabilities
-from .lines import Line, Number, Strong, capital, join, line
+from .cited import cited
+from .given_numbers import asked_speed
+from .lines import Line, Number, Strong, capital, filled, join, line
 from .runs import number
 
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The drive where it was chosen, first in a sentence; the verdicts, the cards and the warnings."""
-    yield from sentence(s)
-    parts = [part.answer(s, study) for part in capabilities()]
+    yield from sentence(study)
+    parts = [part.answer(study) for part in capabilities()]
     yield from chain.from_iterable(part.head for part in parts)
-    for subject in ("model", "motor"):
-        verdict = s.result["verdict"][subject]
+    verdicts = cited(Verdicts(study.verdict, motor_verdict(study)), "verdict")
+    for verdict in (verdicts.model, verdicts.motor):
         if verdict is not None:
-            yield b.Judgement(_HOLDS[verdict["holds"]], s.words(f"verdict.{subject}.text"))
-    if slips := s.result["slips"]:
-        items = tuple(s.words(f"slips.{i}.said") for i in range(len(slips)))
+            yield b.Judgement(_HOLDS[verdict.holds], verdict.text)
+    if slips := cited(study.config.file.slips, "slips"):
+        items = tuple(slip.said for slip in slips)
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
     yield from chain.from_iterable(part.judgements for part in parts)
-    answers = s.result["answers"]
-    if answers:
-        reference = "steady" if "steady" in answers else next(iter(answers))
+    if study.answers:
+        reference = "steady" if "steady" in study.answers else next(iter(study.answers))
         worst = " Then the overload with the largest value." if study.overloads else ""
-        speed = _speed(s, study, reference)
+        speed = _speed(study, reference)
         lead = line(
             f"First the values of {run_names.title(study, reference)}, the {study.driver_noun} at ",
             speed,
             f".{worst}",
         )
         yield b.Text(lead, "lead", "long")
-        yield b.Cards(tuple(_cards(s, study, reference)))
+        yield b.Cards(tuple(_cards(study, reference)))
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
     yield from chain.from_iterable(part.end for part in parts)
-    warnings: list[b.Block] = [b.Judgement("warning", warning) for warning in s.lines("warnings")]
+    warnings: list[b.Block] = [
+        b.Judgement("warning", warning.text) for warning in cited(study.warnings, "warnings")
+    ]
     warnings += chain.from_iterable(part.warnings for part in parts)
     yield from warnings
     yield from remark_tables(study.warnings, "warnings")
-    if answers and not warnings:
+    if study.answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
 
 
@@ -69,38 +74,38 @@ def remark_tables(remarks: Sequence[Remark], path: str) -> Iterator[b.Table]:
             yield b.Table(rows, title=capital(remark.code.replace("-", " ")))
 
 
-def sentence(s: b.Source) -> Iterator[b.Block]:
+def sentence(study: StudyRecord) -> Iterator[b.Block]:
     """The sentence on the drive where it was chosen."""
-    if "sentence" in s.result:
-        yield b.Text(s.words("sentence"), central=True)
+    if study.proposal is not None:
+        yield b.Text(cited(study.proposal.sentence(study), "sentence"), central=True)
 
 
-def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:
+def _speed(study: StudyRecord, run: str) -> Line:
     """The mean speed of the crank in a run, marked where the motor misses the speed asked for."""
-    mean_speed = s.line(f"{{answers.{run}.speed_mean}}")
+    mean_speed = number(study, run, "speed_mean")
     if run != "steady" or study.reaches:
         return mean_speed
-    return line(Strong(line("▲ ", mean_speed)), s.line(", not the {=run.crank_speed:4} asked for"))
+    return filled("{}, not the {} asked for", Strong(line("▲ ", mean_speed)), asked_speed(study))
 
 
-def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:
+def _cards(study: StudyRecord, run: str) -> Iterator[b.Card]:
     """A card for each family of answers: its first two numbers in the run `run`, and the worst overload."""
     families: dict[str, list[str]] = {}
-    for name in s.result["answers"][run]:
+    for name in Layout(Answers).names:
         families.setdefault(MEASURES[name].of, []).append(name)
     for family, names in families.items():
         if MEASURES[names[0]].card:
-            numbers = [(MEASURES[name].words, number(s, study, run, name)) for name in names]
+            numbers = [(MEASURES[name].words, number(study, run, name)) for name in names]
             lines = [join(line(f"{title} ", size) for title, size in numbers[2:])] if numbers[2:] else []
             cards = tuple((size, title) for title, size in numbers[:2])
-            yield b.Card(of_driver(family, study.driver_noun), cards, (*lines, *_worst(s, study, names[0])))
+            yield b.Card(of_driver(family, study.driver_noun), cards, (*lines, *_worst(study, names[0])))
 
 
-def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:
+def _worst(study: StudyRecord, name: str) -> Iterator[Line]:
     """The answer `name` in the overload in which it is largest; nothing where there is no overload."""
     sizes = {run: finite(getattr(study.answers[run], name)) for run in study.overloads}
     magnitudes = {run: abs(size) for run, size in sizes.items() if size is not None}
     if magnitudes:
         run = max(magnitudes, key=lambda run: magnitudes[run])
-        peak = Strong(number(s, study, run, name))
+        peak = Strong(number(study, run, name))
         yield line(f"overload: {MEASURES[name].words} ", peak, f", {run_names.title(study, run)}")

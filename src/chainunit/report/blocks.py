@@ -8,24 +8,21 @@ of the form ``screen``; if there are none, all of the short form.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from ..core.descriptions import USUAL_DRIVER, of_driver
-from ..core.quantities import Layout
 from ..reading.result_entries import PARTS
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
-from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
+from .lines import Line, Number, Words
 from .live_block import Live
 from .motion import Animation
 
 Form = Literal["both", "short", "long", "sheet", "screen"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
-Content: TypeAlias = "Number | Words | str"
-"""The content of a given value: a number, words of the result, or the text of a switch or a list."""
+Content: TypeAlias = "Number | str"
+"""The content of a given value: a number, or the text of a choice, a switch or a list."""
 
 
 @dataclass(frozen=True)
@@ -241,11 +238,6 @@ def found_at(result: Any, path: str) -> tuple[str, Any]:
     raise KeyError(path)
 
 
-def at(result: Any, path: str) -> Any:
-    """The entry of a result at the dotted `path`, see `found_at`."""
-    return found_at(result, path)[1]
-
-
 def _matches(node: Any, path: str) -> Iterator[Any]:
     keys: Mapping[str, Any] = {}
     if isinstance(node, Mapping):
@@ -261,11 +253,9 @@ def _matches(node: Any, path: str) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Source:
-    """Makes numbers, words and lines for a report from the entries of a `result`, on a machine with the noun `driver`
-    for the link that the motor turns."""
+    """Makes numbers and words for a report from the entries of a `result` whose places are data themselves."""
 
     result: Mapping[str, Any]
-    driver: str = USUAL_DRIVER
 
     def number(self, path: str, *items: int, **more: Any) -> Number:
         """The number at `path`; where an array stands there, the number at the places `items` in it. `more` are
@@ -276,110 +266,7 @@ class Source:
             value, place = value[item], f"{place}{'.' if i else '.value.'}{item}"
         return Number(value, node["unit"], **{"kind": node.get("kind", ""), "path": place, **more})
 
-    def value(self, path: str) -> float | None:
-        """The value of the number at `path`, without its unit."""
-        value: float | None = at(self.result, path)["value"]
-        return value
-
-    def line(self, template: str, **parts: Line) -> tuple[Piece, ...]:
-        """A line from a template. A path in braces stands for the entry of the result at that path: ``{run.turns}``
-        shows it as a result, ``{=run.turns}`` as a given value, ``{ratio:4}`` with 4 digits. A name of `parts` in
-        braces stands for that part, ``{driver}`` for the noun of the driver, see `of_driver`."""
-        text: tuple[Piece, ...] = ()
-        for i, part in enumerate(re.split(r"\{([^}]*)\}", of_driver(template, self.driver))):
-            if i % 2 == 0:
-                text += (part,) if part else ()
-            elif part in parts:
-                text += pieces(parts[part])
-            else:
-                path, _, digits = part.removeprefix("=").partition(":")
-                as_given = part.startswith("=")
-                node = at(self.result, path)
-                is_text = isinstance(node, str)
-                text += (
-                    self.words(path)
-                    if is_text
-                    else self.number(path, as_given=as_given, digits=int(digits or 0)),
-                )
-        return text
-
-    def estimate(
-        self,
-        path: str,
-        low: str = "_from",
-        high: str = "_to",
-        *,
-        unknown: str = "starts differ",
-        certain: float | None = None,
-    ) -> Line:
-        """The number at `path` and, where the result has one, its interval, whose ends stand at `path` + `low` and
-        `path` + `high`; the number alone where the interval is no wider than the share `certain` of it. Where the
-        starts or runs differ too much for an interval, the line is `unknown`."""
-        try:
-            least, most = self.value(path + low), self.value(path + high)
-        except KeyError:
-            return self.number(path)
-        if least is None or most is None:
-            return unknown
-        if certain is not None and most - least <= certain * abs(self.value(path) or 0.0):
-            return self.number(path)
-        ends = line(self.number(path + low), " to ", self.number(path + high))
-        return line(self.number(path), Aside(ends))
-
     def words(self, path: str) -> Words:
         """The words at `path`."""
         place, node = found_at(self.result, path)
         return Words(str(node), place)
-
-    def source_line(self) -> Line:
-        """Project, author, date and revision, where the file gives them; the study file, and the version."""
-        labels = [
-            self.line(f"{capital(name)}: {{report.{name}}} · ") for name in self.result.get("report", ())
-        ]
-        return line(*labels, self.line("Study file: {source} · chainunit {chainunit}"))
-
-    def lines(self, path: str) -> list[Words]:
-        """The sentences of the list at `path`; an item that is a mapping has its sentence at the key ``text``."""
-        items = enumerate(at(self.result, path))
-        return [self.words(f"{path}.{i}.text" if isinstance(x, Mapping) else f"{path}.{i}") for i, x in items]
-
-    def rows(self, declaration: type, path: str, only: str = "", **more: Any) -> tuple[TableRow, ...]:
-        """A row (description, number) for each declared quantity that the result has at `path`, or for `only` one."""
-        entries = at(self.result, path)
-        return tuple(
-            TableRow((v.described(self.driver), self.number(f"{path}.{v.name}", **more)))
-            for v in Layout(declaration).variables
-            if v.name in entries and only in ("", v.name)
-        )
-
-    def given_values(self, declaration: Any, name: str, path: str = "") -> Iterator[GivenValue]:
-        """Given values: the quantities that an instance or class declares and the result has at `path` (by default
-        at `name`). A range gives two values, its ends."""
-        path = path or name
-        # findings may have the name of the table to which they belong, and the numbers that follow from its values
-        entries = at(self.result, f"{PARTS[0]}.{path}" if PARTS[0] in self.result else path)
-        cls = declaration if isinstance(declaration, type) else type(declaration)
-        for v in Layout(cls).variables:
-            if v.name in entries:
-                full = f"{name}.{v.name}"
-                origin = self.origin(full), self.place(full)
-                description = v.described(self.driver)
-                if isinstance(entries[v.name]["value"], list):
-                    for i, end in enumerate(("least", "most")):
-                        value = self.number(f"{path}.{v.name}", i, as_given=True)
-                        yield GivenValue(full, f"{description}, {end}", value, *origin)
-                else:
-                    value = self.number(f"{path}.{v.name}", as_given=True, none="none")
-                    yield GivenValue(full, description, value, *origin)
-
-    def origin(self, path: str) -> str:
-        """The origin of the given value at `path`; empty where the result has no origins."""
-        if "origins" not in self.result:
-            return ""
-        origin: str = self.result["origins"].get(path, "declared")
-        return origin
-
-    def place(self, path: str) -> str:
-        """File and line of the given value at `path`; empty where no file gives it."""
-        place: str = self.result.get("places", {}).get(path, "")
-        return place

@@ -67,7 +67,7 @@ class Capability(StudyCapability):
         """The sections of a study's report on its findings, by name: that of the analysis."""
         return {}
 
-    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+    def answer(self, study: StudyRecord) -> AnswerBlocks:
         """Its part of the answer of a study."""
         return AnswerBlocks()
 

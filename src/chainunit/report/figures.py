@@ -11,16 +11,19 @@ import numpy as np
 
 from ..core.descriptions import of_driver
 from ..core.engines import numpy_
-from ..reading.text import forms, number
+from ..reading.text import forms
+from ..reading.text import number as number_words
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
 from ..study.readings import crank_speed, crank_torque, has_turn
 from ..study.record import StudyRecord
-from . import blocks as b
+from ..study.result import assumed_ranges
 from . import figure as fig
 from . import linkage_loads, load_figures, run_names
-from .lines import capital
+from .cited import cited, number
+from .given_numbers import asked_speed
+from .lines import Line, capital, filled, join, line
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
 from .study_motion import machine_state
@@ -34,7 +37,7 @@ _CURRENT = fig.Axis("motor current", "A")
 @PICTURES.declare(
     lambda study: run_names.motor_runs(study) and study.drive.foreign is None, "torque_speed.png"
 )
-def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _torque_speed(study: StudyRecord) -> fig.Figure:
     """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
     names, panels = run_names.motor_runs(study), []
     # an event that is a start of its own would squeeze the loops of the others
@@ -65,7 +68,7 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
         x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
         limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
-        items = (*curves, limit, *_duty(s, study))
+        items = (*curves, limit, *_duty(study))
         panels.append(fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group)))
     return fig.Figure(
         "torque-speed",
@@ -78,7 +81,7 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     )
 
 
-def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
+def _duty(study: StudyRecord) -> Iterator[fig.Item]:
     """The speed of normal running and, where the motor has a nameplate, its rated point and the rated torque, which
     it may give without a limit of time (S1)."""
     if "steady" in study.answers:
@@ -99,7 +102,7 @@ def _group_title(study: StudyRecord, runs: list[str]) -> str:
 
 
 @PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
-def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _turn(study: StudyRecord) -> fig.Figure:
     driver = study.driver_noun
     torques: dict[str, Callable[[Cycle], Any]] = {driver: lambda c: c.crank_torque}
     organs = bool(study.drive.machine.model.sides)
@@ -116,8 +119,10 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
         of_driver("Torque over {a driver} turn at constant speed", driver),
         f"{' and '.join(torques).capitalize()} torque over the {driver} angle: {', '.join(study.statics.cycles)}.",
         fig.stacked(angle_axis(study), items.items()),
-        s.line(
-            f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed:4}} of the {driver}, without a motor."
+        line(
+            f"Inverse dynamics{' of two bars' * organs} at ",
+            asked_speed(study),
+            f" of the {driver}, without a motor.",
         ),
     )
 
@@ -127,19 +132,19 @@ def _is_steady(study: StudyRecord) -> bool:
 
 
 @PICTURES.declare(_is_steady, "power_turn.png")
-def _power(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _power(study: StudyRecord) -> fig.Figure:
     return load_figures.power_over_turn(study.drive, study.steady, angle_axis(study))
 
 
 @PICTURES.declare(_is_steady, "load_histogram.png")
-def _histogram(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _histogram(study: StudyRecord) -> fig.Figure:
     return load_figures.load_histogram(study.drive, study.steady)
 
 
 @PICTURES.declare(
     lambda study: _is_steady(study) and not study.drive.foreign_machine, "force_over_stroke.png"
 )
-def _stroke(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
+def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
     names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
     parts = {"steady": study.steady} | {
         name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in names
@@ -149,7 +154,7 @@ def _stroke(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
 
 
 @PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")
-def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _speed_loop(study: StudyRecord) -> fig.Figure:
     loops = list(enumerate(study.statics.loops.items()))
     ends = [loop.frequency[k] for _, (_, loop) in loops for k in (0, -1)]
     frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
@@ -175,7 +180,9 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
             yield fig.Mark(narrowest.crossover, "crossover", look="mark")
         if ordinate == "phase":
             margin = narrowest.phase_margin
-            yield fig.Label(narrowest.crossover, -180.0 + margin, f"margin {number(margin, 'deg')}", "left")
+            yield fig.Label(
+                narrowest.crossover, -180.0 + margin, f"margin {number_words(margin, 'deg')}", "left"
+            )
 
     return fig.Figure(
         "speed-loop",
@@ -195,20 +202,20 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 
 @PICTURES.declare(lambda study: "start_up" in study.runs, "start_up.png")
-def _start_up(s: b.Source, study: StudyRecord) -> fig.Figure:
-    return _transient(s, study, "start_up")
+def _start_up(study: StudyRecord) -> fig.Figure:
+    return _transient(study, "start_up")
 
 
 @PICTURES.declare(run_names.motor_runs)
-def _others(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
-    return (_transient(s, study, name) for name in run_names.motor_runs(study) if name != "start_up")
+def _others(study: StudyRecord) -> Iterator[fig.Figure]:
+    return (_transient(study, name) for name in run_names.motor_runs(study) if name != "start_up")
 
 
 @PICTURES.declare(lambda study: run_names.groups(study, study.overloads), "overload_time.png")
-def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _overloads(study: StudyRecord) -> fig.Figure:
     """The overloads beside each other, for print: a band of rows for each side, and the same scales in all panels."""
     groups = [
-        [_transient(s, study, name) for name in group] for group in run_names.groups(study, study.overloads)
+        [_transient(study, name) for name in group] for group in run_names.groups(study, study.overloads)
     ]
     rows: list[list[fig.Panel | None]] = []
     for group in groups:
@@ -228,7 +235,7 @@ def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
     )
 
 
-def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
+def _transient(study: StudyRecord, name: str) -> fig.Figure:
     """Torque, speed and current of a run over time."""
     run, drive, event = study.runs[name], study.drive, run_names.event_time(study, name)
     time = run["time"].values - (event or 0.0)
@@ -268,7 +275,7 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
             ((axis, (*curves, *marks(axis is of_torque))) for axis, curves in items.items()),
         ),
-        s.line(_after(s, study, name)) if event is not None else (),
+        _after(study, name) if event is not None else (),
         half=True,
     )
 
@@ -316,43 +323,45 @@ def _load_change(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
     return float(time[places[0]]), float(time[places[-1] + 1])
 
 
-def _after(s: b.Source, study: StudyRecord, run: str) -> str:
-    """The sentence on the speed after the event, as a template."""
-    caption = "Upright, dashed: the event. Shaded: the loads change."
-    if run not in s.result["answers"]:
+def _after(study: StudyRecord, run: str) -> Line:
+    """The sentence on the speed after the event."""
+    caption: Line = "Upright, dashed: the event. Shaded: the loads change."
+    if run not in study.answers:
         return caption
-    least, dip, back = (f"answers.{run}.{name}" for name in ("speed_least", "speed_dip", "recovery_time"))
-    share, recovery = s.value(dip), s.value(back)
-    if share is None or share <= 0.0:
-        caption += f" The least speed is {{{least}}}"
-    elif not forms(share, "1", "dip")[0][1]:
+    answers = cited(study.answers[run], f"runs.answers.{run}")
+    least, dip, recovery = map(number, (answers.speed_least, answers.speed_dip, answers.recovery_time))
+    if dip.value is None or dip.value <= 0.0:
+        caption = filled("{} The least speed is {}", caption, least)
+    elif not forms(dip.value, "1", "dip")[0][1]:
         # a dip so large is shown as words in place of a number
-        caption += f" The {{driver}} {{{dip}}}"
+        caption = filled(f"{{}} The {study.driver_noun} {{}}", caption, dip)
     else:
-        caption += f" The speed dips by {{{dip}}}"
+        caption = filled("{} The speed dips by {}", caption, dip)
     if not study.returns:
-        caption += "; the motor does not reach the speed asked for, so that there is no band to return to."
-    elif recovery is None:
-        caption += "; it does not return to its steady band within the time followed."
-    elif recovery == 0.0:
-        caption += "; it does not leave its steady band."
+        back: Line = "; the motor does not reach the speed asked for, so that there is no band to return to."
+    elif recovery.value is None:
+        back = "; it does not return to its steady band within the time followed."
+    elif recovery.value == 0.0:
+        back = "; it does not leave its steady band."
     else:
-        caption += f"; it is back in its steady band after {{{back}}}."
-    if run in s.result["block_peaks"]:
-        path, ends = f"block_peaks.{run}", s.result["block_peaks"][run]
-        names = [name.removesuffix("_low") for name in ends if name.endswith("_low")]
-        ranges = {name: f"{{{path}.{name}_low}} to {{{path}.{name}_high}}" for name in names}
-        assumptions = (
-            f"{name} {ranges[name]}" for name in names if ends[f"{name}_low"].get("kind") == "assumed"
-        )
-        caption += (
-            f" Assumed: {', '.join(assumptions)}; the {{driver}} torque peaks at {ranges['crank_torque']}."
-        )
-    return caption
+        back = filled("; it is back in its steady band after {}.", recovery)
+    return line(caption, back, _assumed(study, run) if run in study.spreads else ())
+
+
+def _assumed(study: StudyRecord, run: str) -> Line:
+    """The ranges that an event assumes, and the torque of the driver over them."""
+    sizes = cited(assumed_ranges(study, run), f"runs.block_peaks.{run}")
+    ranges = {
+        name: filled("{} to {}", *(number(sizes[f"{name}_{end}"]) for end in ("low", "high")))
+        for name in (*study.spreads[run].ranges, *study.spreads[run].peaks)
+    }
+    assumptions = join(filled("{} {}", name, ranges[name]) for name in study.spreads[run].ranges)
+    peaks = f" Assumed: {{}}; the {study.driver_noun} torque peaks at {{}}."
+    return filled(peaks, assumptions, ranges["crank_torque"])
 
 
 @PICTURES.declare(lambda study: study.pins, "reactions.png")
-def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _reactions(study: StudyRecord) -> fig.Figure:
     reference = "steady" if "steady" in study.pins else next(iter(study.pins))
     steady, pins = study.pins[reference], list(study.pins[reference])
     largest = {pin: hardest_run(study.pins, pin) for pin in pins}
@@ -378,8 +387,6 @@ def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Forces in the pins",
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
         ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
-        s.line(
-            f"RMS is taken over whole {{driver}} turns of {of_run}. Beside a bar: the run of the largest peak."
-        ),
+        f"RMS is taken over whole {study.driver_noun} turns of {of_run}. Beside a bar: the run of the largest peak.",
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

@@ -219,7 +219,7 @@ class Page:
             case Number():
                 return self.number(piece)
             case Words():
-                return f'<span class="t" data-path="{escape(piece.path)}">{escape(piece.text)}</span>'
+                return f'<span class="t" data-path="{escape(piece.path)}">{escape(piece)}</span>'
             case Name():
                 return f'<span class="as-is">{escape(piece.text)}</span>'
             case Strong():

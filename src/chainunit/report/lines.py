@@ -24,12 +24,16 @@ class Number:
     """whether the number exceeds its limit"""
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(str):
     """A text of the result, at `path`."""
 
-    text: str
     path: str
+
+    def __new__(cls, text: str, path: str) -> Words:
+        """The text with its path."""
+        words = super().__new__(cls, text)
+        words.path = path
+        return words
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ class Aside:
     line: Line
 
 
-Piece: TypeAlias = "str | Number | Words | Name | Strong | Aside"
+Piece: TypeAlias = "str | Number | Name | Strong | Aside"
 Line: TypeAlias = "Piece | tuple[Piece, ...]"
 
 
@@ -65,6 +69,13 @@ def pieces(line: Line) -> tuple[Piece, ...]:
 def line(*parts: Line) -> tuple[Piece, ...]:
     """One line from several parts."""
     return tuple(piece for part in parts for piece in pieces(part))
+
+
+def filled(template: str, *parts: Line) -> tuple[Piece, ...]:
+    """One line from a template, with a part in place of each ``{}``."""
+    texts = template.split("{}")
+    pairs = zip(texts, (*parts, ""), strict=True)
+    return tuple(piece for pair in pairs for piece in line(*pair) if piece)
 
 
 def join(lines: Iterable[Line], between: str = ", ") -> tuple[Piece, ...]:

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from .. import __version__
-from ..core.quantities import Layout
 from ..machines.linkages.joint_kinds import KINDS
 from ..machines.machine import Machine
 from ..mechanism.machine import MachineState
-from ..reading.tables import UnusualValue, slips_of
-from ..reading.text import array_entry
-from ..study.linkage_turn import GroupTurn, JointTurn, LinkageFindings, linkage_findings
+from ..reading.results import as_data
+from ..reading.tables import UnusualValue
+from ..study.linkage_result import LinkageData, linkage_data
+from ..study.linkage_turn import LinkageFindings, Stroke, Swing, linkage_findings
 from . import blocks as b
 from . import figure as fig
 from . import linkage, linkage_loads, linkage_rest
+from .cited import cited, exact, number, quantity_rows, table
 from .drawing import drawing
-from .lines import Line, Name, Number, Strong, capital, join, line
+from .lines import Line, Name, Number, Strong, capital, filled, join, line
 from .live_block import Live, LiveMachine
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
@@ -53,24 +53,22 @@ def linkage_report(
 ) -> b.Report:
     """The report on a linkage from the file `source`, which has these values of an unusual size, and on which there
     are `remarks`."""
-    slips = [str(value) for value in slips_of(unusual)]
-    notes = [value.sentence for value in unusual if value.with_unit]
-    drawn = [f"{capital(remark)}." for remark in remarks]
-    result = _result(findings, source) | {"slips": slips, "notes": notes, "drawn": drawn}
-    s = b.Source(result)
+    data = linkage_data(findings, source, unusual, remarks)
+    unit = findings.machine.model.driver_port.unit
+    x = cited(data, unit_of=unit)
     return b.Report(
-        result["title"],
+        data.title,
         "Linkage",
-        result,
-        tuple(_opening(s, findings)),
+        as_data(data, unit_of=unit),
+        tuple(_opening(findings, x)),
         (
-            b.Section("motion", "Motion", tuple(_motion(s, findings))),
+            b.Section("motion", "Motion", tuple(_motion(findings, x))),
             b.Section("live", "Try it", tuple(_live(findings, source))),
-            b.Section("forces", "Effort, inertia and reactions", tuple(_forces(s, findings))),
-            b.Section("rest", "At rest", tuple(linkage_rest.at_rest(s, findings, PICTURES[4]))),
+            b.Section("forces", "Effort, inertia and reactions", tuple(_forces(findings, x))),
+            b.Section("rest", "At rest", tuple(linkage_rest.at_rest(findings, x.rest, PICTURES[4]))),
             b.Section("outputs", "Parameters, inputs and outputs", tuple(_variables(findings))),
         ),
-        source=s.line("Linkage file: {source} · chainunit {chainunit}"),
+        source=filled("Linkage file: {} · chainunit {}", x.source, x.chainunit),
         opening_title="The linkage",
     )
 
@@ -85,92 +83,27 @@ def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
     yield Live(make, "the file")
 
 
-def _entry(value: Any, unit: str) -> dict[str, Any]:
-    return {"value": value, "unit": unit}
-
-
-def _of(f: LinkageFindings, instance: Any, at_driver: Collection[str]) -> dict[str, Any]:
-    """The values of an instance; those with a name in `at_driver` are in the units of the driver."""
-    layout, unit = Layout(type(instance)), f.machine.model.driver_port.unit
-    return {
-        v.name: _entry(x, unit(v.unit) if v.name in at_driver else v.unit)
-        for v, x in zip(layout.variables, layout.values(instance), strict=True)
-    }
-
-
-def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
-    description, unit = f.description, f.machine.model.driver_port.unit
-    points = {
-        f"{link}.{point}": {
-            axis: _entry(list(f.limits[f"{description.variable('link', link)}.{point}.{axis}"]), "m")
-            for axis in ("x", "y")
-        }
-        for link, entry in description.structure.links.items()
-        for point in entry.points
-    }
-    angles = {
-        link: _entry(list(f.limits[f"{description.variable('link', link)}.angle"]), "rad")
-        for link in description.structure.links
-    }
-    at_driver = ("least_at", "largest_at", "forth")
-    return {
-        "chainunit": __version__,
-        "source": source,
-        "title": f.machine.model.description,
-        "groups_in_words": f.sentence,
-        "degrees_of_freedom": 1,
-        "speed": _entry(f.speed, unit("rad/s")),
-        **_forces_of(f),
-        "groups": {name: _of(f, group, ("margin_at",)) for name, group in f.groups.items()},
-        "strokes": {name: _of(f, stroke, at_driver) for name, stroke in f.strokes.items()},
-        "swings": {name: _of(f, swing, at_driver) for name, swing in f.swings.items()},
-        "dead_centres": {name: _entry(places, unit("rad")) for name, places in f.dead_centres.items()},
-        "angles": angles,
-        "points": points,
-        "over_the_way": {"driver": array_entry(f.q, unit("rad")), **_over_the_way(f)},
-        "rest": linkage_rest.rest_data(f),
-        **({"back": _forces_of(f.back) | {"over_the_way": _over_the_way(f.back)}} if f.back else {}),
-    }
-
-
-def _forces_of(f: LinkageFindings) -> dict[str, Any]:
-    """Effort at the driver, and reactions."""
-    return {
-        "turn": _of(f, f.turn, Layout(type(f.turn)).names),
-        "joints": {name: _of(f, joint, ("peak_at",)) for name, joint in f.joints.items()},
-    }
-
-
-def _over_the_way(f: LinkageFindings) -> dict[str, Any]:
-    """Effort and inertia at each place."""
-    unit = f.machine.model.driver_port.unit
-    return {
-        name: array_entry(f.outputs[name], unit(rotary_unit))
-        for name, rotary_unit in (("tau", "N.m"), ("J", "kg.m2"))
-    }
-
-
-def _opening(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
-    yield b.Text(s.line("The driver gives one degree of freedom: {groups_in_words}."), central=True)
-    yield from (b.Text(s.words(f"drawn.{i}"), central=True) for i in range(len(s.result["drawn"])))
-    if slips := s.result["slips"]:
-        items = tuple(s.words(f"slips.{i}") for i in range(len(slips)))
-        yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
-    yield from (b.Text(s.words(f"notes.{i}"), "note") for i in range(len(s.result["notes"])))
+def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
+    yield b.Text(line("The driver gives one degree of freedom: ", x.sentence, "."), central=True)
+    yield from (b.Text(remark, central=True) for remark in x.drawn)
+    if x.slips:
+        yield b.Judgement("remark", Strong("Is this what was meant?"), items=tuple(x.slips))
+    yield from (b.Text(note, "note") for note in x.notes)
     yield b.Drawing(
         drawing(f.machine), "The linkage: its pins, links and dimensions", PICTURES[0],
         "A pair of hatched lines is a guide in the ground; a box is a block.",
     )  # fmt: skip
 
 
-def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
-    for path, motions, nouns in (
-        ("strokes", f.strokes, ("sliding joint", "stroke", "way")),
-        ("swings", f.swings, ("link", "swing", "angle")),
-    ):
-        if motions:
-            yield _ends(s, f, path, *nouns)
-            yield from _reversals(s, f, path)
+def _motion(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
+    if f.strokes:
+        strokes = {name: (_along(f, name), stroke) for name, stroke in x.strokes.items()}
+        yield _ends(f, strokes.values(), "sliding joint", "stroke", "way")
+        yield from _reversals(f, x, {name: f.description.variable("joint", name) for name in strokes})
+    if f.swings:
+        swings = [(Name(name), swing) for name, swing in x.swings.items()]
+        yield _ends(f, swings, "link", "swing", "angle")
+        yield from _reversals(f, x, {name: f.description.variable("link", name) for name in x.swings})
     if f.machine.model.turns and (f.strokes or f.swings):
         yield b.Text(
             "Forth: the angle of the driver from the least to the largest. Time ratio: slow stroke over quick "
@@ -186,49 +119,50 @@ def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     ):
         if links:
             yield b.Text(line(join(map(Name, links)), f" {phrases[len(links) > 1]}."))
-    names = Layout(GroupTurn).names
-    rows = (
-        b.TableRow((join(map(Name, name.split(", "))), *(s.number(f"groups.{name}.{key}") for key in names)))
-        for name in f.groups
+    yield from table(
+        x.groups.items(),
+        ("group", lambda row: join(map(Name, row[0].split(", ")))),
+        ("least margin", lambda row: number(row[1].margin)),
+        ("at", lambda row: number(row[1].margin_at)),
+        title="Margins: the sine of the transmission angle, or its like; 0 is a dead position",
     )
-    if f.groups:
-        yield b.Table(
-            tuple(rows),
-            b.heads("group", "least margin", "at"),
-            title="Margins: the sine of the transmission angle, or its like; 0 is a dead position",
-        )
     rows = (
-        b.TableRow((Name(name), *(s.number(f"points.{name}.{axis}", k) for axis in "xy" for k in (0, 1))))
-        for name in s.result["points"]
+        b.TableRow((Name(name), *map(number, cast("list[Number]", [*limits["x"], *limits["y"]]))))
+        for name, limits in x.points.items()
     )
     heads = b.heads("point", "x from", "x to", "y from", "y to")
     yield b.Table(tuple(rows), heads, title="Limits of motion, points", form="long")
     yield _animation(f)
 
 
-def _ends(s: b.Source, f: LinkageFindings, path: str, head: str, whole: str, way: str) -> b.Table:
+def _ends(
+    f: LinkageFindings, motions: Iterable[tuple[Line, Stroke | Swing]], head: str, whole: str, way: str
+) -> b.Table:
     """The table of the ends between which sliding joints or links move."""
-    turns = f.machine.model.turns
-    columns = (
-        (f"least {way}", "least"), ("at", "least_at"), (f"largest {way}", "largest"), ("at", "largest_at"),
-        (whole, "range"), *((("forth over", "forth"), ("time ratio", "time_ratio")) if turns else ()),
-    )  # fmt: skip
-    rows = tuple(
-        b.TableRow((_along(f, name) if path == "strokes" else Name(name),
-                    *(s.number(f"{path}.{name}.{key}") for _, key in columns)))
-        for name in s.result[path]
-    )  # fmt: skip
-    heads = [b.Column(title, form="long" if key == "forth" else "both") for title, key in columns]
-    return b.Table(rows, (b.Column(head), *heads), title=f"{capital(whole)}{' and dead centres' * turns}")
+    columns: list[tuple[Line | b.Column, Callable[[tuple[Line, Stroke | Swing]], b.Cell]]] = [
+        (head, lambda row: row[0]),
+        (f"least {way}", lambda row: number(row[1].least)),
+        ("at", lambda row: number(row[1].least_at)),
+        (f"largest {way}", lambda row: number(row[1].largest)),
+        ("at", lambda row: number(row[1].largest_at)),
+        (whole, lambda row: number(row[1].range)),
+    ]
+    if turns := f.machine.model.turns:
+        columns += [
+            (b.Column("forth over", form="long"), lambda row: number(row[1].forth)),
+            ("time ratio", lambda row: number(row[1].time_ratio)),
+        ]
+    (ends,) = table(motions, *columns, title=f"{capital(whole)}{' and dead centres' * turns}")
+    return ends
 
 
-def _reversals(s: b.Source, f: LinkageFindings, path: str) -> Iterator[b.Block]:
-    """A sentence for each sliding joint or link that turns back more than twice in a turn."""
-    for name in s.result[path]:
-        variable = f.description.variable("joint" if path == "strokes" else "link", name)
+def _reversals(f: LinkageFindings, x: LinkageData, variables: Mapping[str, str]) -> Iterator[b.Block]:
+    """A sentence for each sliding joint or link, by its name and its variable, that turns back more than twice in a
+    turn."""
+    for name, variable in variables.items():
         count = len(f.dead_centres[variable])
         if f.machine.model.turns and count > 2:
-            places = join(s.number(f"dead_centres.{variable}", k) for k in range(count))
+            places = join(map(number, cast("list[Number]", x.dead_centres[variable])))
             yield b.Text(line(Name(name), f" turns back {count} times in a turn: at ", places, "."))
 
 
@@ -291,26 +225,26 @@ def _ways(f: LinkageFindings) -> dict[str, LinkageFindings]:
     return {"forth": f, "back": f.back} if f.back else {"": f}
 
 
-def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
+def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     there = ", there and back over its range" if f.back else ""
-    yield b.Text(
-        s.line(f"Inverse dynamics at {{=speed:4}} of the driver{there}, with the loads of normal running."),
-        "lead",
-        central=True,
-    )
+    lead = f"Inverse dynamics at {{}} of the driver{there}, with the loads of normal running."
+    yield b.Text(filled(lead, exact(x.speed, 4)), "lead", central=True)
     slides = f.machine.model.slides
     effort, inertia_word = ("force", "mass") if slides else ("torque", "inertia")
-    names = Layout(JointTurn).names
-    for way in _ways(f):
-        path, on = "back." if way == "back" else "", f", on the way {way}" if way else ""
+    for way, forces in {"forth": x.forces, "back": x.back.forces}.items() if x.back else (("", x.forces),):
+        on = f", on the way {way}" if way else ""
         title = f"{capital(effort)}, power and {inertia_word} at the driver{on}"
-        yield b.Table(s.rows(type(f.turn), f"{path}turn"), title=title, central=True)
-        rows = (
-            b.TableRow((_title(f, name), *(s.number(f"{path}joints.{name}.{key}") for key in names)))
-            for name in f.joints
+        yield b.Table(quantity_rows(forces.turn), title=title, central=True)
+        yield from table(
+            forces.joints.items(),
+            ("joint", lambda row: _title(f, row[0])),
+            ("largest force", lambda row: number(row[1].peak)),
+            ("at", lambda row: number(row[1].peak_at)),
+            ("RMS", lambda row: number(row[1].rms)),
+            ("largest moment", lambda row: number(row[1].moment)),
+            title=f"Reactions{on}",
+            central=True,
         )
-        heads = b.heads("joint", "largest force", "at", "RMS", "largest moment")
-        yield b.Table(tuple(rows), heads, title=f"Reactions{on}", central=True)
     yield from _figures(f, effort, inertia_word)
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from ..machines.equilibria import INDIFFERENT, SADDLE, STABLE, STOP, UNSTABLE, Holding
-from ..machines.linkages.loads import loads_by_speed
-from ..reading.results import as_data
-from ..reading.text import array_entry
+from ..machines.equilibria import INDIFFERENT, SADDLE, STABLE, STOP, UNSTABLE, Equilibrium
+from ..study.linkage_result import LinkageAtRest
 from ..study.linkage_turn import LinkageFindings
 from . import blocks as b
 from . import figure as fig
-from .lines import Line, Name, join, line
+from .cited import as_name, number, quantity_rows, table
+from .lines import Line, filled, join, line
 
 _KINDS = {
     STABLE: "stable",
@@ -24,40 +23,9 @@ _KINDS = {
     STOP: "rests on its stop",
 }
 _MARKERS = {STABLE: "o", STOP: "s", UNSTABLE: "x", SADDLE: "+"}
-_AT_DRIVER = frozenset(("place", "end", "holding", "stiffness", "inertia", "friction", "peak", "peak_at"))
-"""The quantities in the units of the driver."""
 
 
-def rest_data(f: LinkageFindings) -> dict[str, Any]:
-    """The data of a linkage at rest."""
-    equilibria, unit = f.rest, f.machine.model.driver_port.unit
-
-    def data(x: Any) -> dict[str, Any]:
-        return {
-            name: entry | {"unit": unit(entry["unit"])} if name in _AT_DRIVER else entry
-            for name, entry in as_data(x).items()
-        }
-
-    rest = equilibria.rest
-    columns = (
-        ("driver", rest.q, "rad"),
-        ("holding", rest.holding, "N.m"),
-        ("friction", rest.friction, "N.m"),
-    )
-    potential = {} if rest.potential is None else {"potential": array_entry(rest.potential, "J")}
-    return {
-        "equilibria": [data(equilibrium) for equilibrium in equilibria.places],
-        "summary": data(equilibria.summary),
-        "indifferent": equilibria.indifferent,
-        "repeats": equilibria.repeats,
-        "without_potential": [name.removeprefix("loads.") for name in equilibria.driven],
-        "by_speed": loads_by_speed(f.description.data["loads"]),
-        "over_the_way": {name: array_entry(x, unit(rotary_unit)) for name, x, rotary_unit in columns}
-        | potential,
-    }
-
-
-def at_rest(s: b.Source, f: LinkageFindings, file: str) -> Iterator[b.Block]:
+def at_rest(f: LinkageFindings, x: LinkageAtRest, file: str) -> Iterator[b.Block]:
     """The section of the report; `file` is the name of its picture."""
     equilibria = f.rest
     effort = "force" if f.machine.model.slides else "torque"
@@ -65,10 +33,9 @@ def at_rest(s: b.Source, f: LinkageFindings, file: str) -> Iterator[b.Block]:
         yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
         return
     if bool(np.all(np.abs(equilibria.rest.holding) <= equilibria.rest.friction)):
-        text = "At rest the machine stays wherever it is: friction of pins and guides holds more, at most {most}, "
-        text += f"than the holding {effort}, at most {{holding}}."
-        most = {"most": s.number("rest.summary.friction"), "holding": s.number("rest.summary.peak")}
-        yield b.Text(s.line(text, **most))
+        text = "At rest the machine stays wherever it is: friction of pins and guides holds more, at most {}, than "
+        text += f"the holding {effort}, at most {{}}."
+        yield b.Text(filled(text, number(x.summary.friction), number(x.summary.peak)))
         return
     yield b.Text(
         f"Where the holding {effort} is zero, the machine is in equilibrium. It is stable where the potential has a "
@@ -76,59 +43,54 @@ def at_rest(s: b.Source, f: LinkageFindings, file: str) -> Iterator[b.Block]:
         "lead",
         "long",
     )
-    yield _table(s, f, effort)
-    yield b.Table(s.rows(Holding, "rest.summary"), title=f"Holding {effort} over the way of the driver")
-    yield from _notes(s, f, effort)
+    yield from _table(f, x, effort)
+    yield b.Table(quantity_rows(x.summary), title=f"Holding {effort} over the way of the driver")
+    yield from _notes(f, x, effort)
     yield _figure(f, effort, file)
 
 
-def _table(s: b.Source, f: LinkageFindings, effort: str) -> b.Table:
-    rows = []
-    for k, equilibrium in enumerate(f.rest.places):
-        path = f"rest.equilibria.{k}"
-        place: Line = s.number(f"{path}.place")
-        if equilibrium.kind == INDIFFERENT:
-            place = line(place, " to ", s.number(f"{path}.end"))
-        keys = ("stiffness", "natural_frequency", "inertia", "potential", "friction")
-        name = f"{k + 1}: {_KINDS[equilibrium.kind]}"
-        rows.append(b.TableRow((name, place, *(s.number(f"{path}.{key}") for key in keys))))
-    columns = (
-        *b.heads("equilibrium", "at", "stiffness", "natural frequency"),
-        b.Column("mass" if f.machine.model.slides else "inertia", form="long"),
-        b.Column("potential"),
-        b.Column(f"friction holds a {effort} of", form="long"),
+def _table(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Table]:
+    def place(equilibrium: Equilibrium) -> Line:
+        begin = number(equilibrium.place)
+        is_range = equilibrium.kind == INDIFFERENT
+        return filled("{} to {}", begin, number(equilibrium.end)) if is_range else begin
+
+    inertia = "mass" if f.machine.model.slides else "inertia"
+    return table(
+        enumerate(x.equilibria, 1),
+        ("equilibrium", lambda row: f"{row[0]}: {_KINDS[row[1].kind]}"),
+        ("at", lambda row: place(row[1])),
+        ("stiffness", lambda row: number(row[1].stiffness)),
+        ("natural frequency", lambda row: number(row[1].natural_frequency)),
+        (b.Column(inertia, form="long"), lambda row: number(row[1].inertia)),
+        ("potential", lambda row: number(row[1].potential)),
+        (b.Column(f"friction holds a {effort} of", form="long"), lambda row: number(row[1].friction)),
+        title="Equilibria",
     )
-    return b.Table(tuple(rows), columns, title="Equilibria")
 
 
-def _names(names: Collection[str]) -> Line:
-    return join(map(Name, names))
-
-
-def _notes(s: b.Source, f: LinkageFindings, effort: str) -> Iterator[b.Block]:
+def _notes(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Block]:
     """What the numbers do not say by themselves."""
-    data, equilibria = s.result["rest"], f.rest
-    for k, equilibrium in enumerate(equilibria.places):
+    equilibria = f.rest
+    for equilibrium in x.equilibria:
         if equilibrium.kind == STOP:
-            path = f"rest.equilibria.{k}"
-            yield b.Text(
-                s.line(f"On its stop at {{{path}.place}} the driver rests with {{{path}.holding}} on it.")
-            )
-    if data["by_speed"]:
-        depend = "depends" if len(data["by_speed"]) == 1 else "depend"
+            stop = "On its stop at {} the driver rests with {} on it."
+            yield b.Text(filled(stop, number(equilibrium.place), number(equilibrium.holding)))
+    if x.by_speed:
+        depend = "depends" if len(x.by_speed) == 1 else "depend"
         yield b.Text(
             line(
-                _names(data["by_speed"]),
+                join(map(as_name, x.by_speed)),
                 f" {depend} on the speed: here with the value at the speed 0; a step by the speed has half its size "
                 "there.",
             ),
             "note",
         )
-    if data["without_potential"]:
+    if x.without_potential:
         yield b.Text(
             line(
                 "The potential is the energy of weights and springs and, of ",
-                _names(data["without_potential"]),
+                join(map(as_name, x.without_potential)),
                 f", the integral of the holding {effort} over the way.",
             ),
             "note",
@@ -141,17 +103,19 @@ def _notes(s: b.Source, f: LinkageFindings, effort: str) -> Iterator[b.Block]:
         )
     elif equilibria.rest.potential is None:
         yield b.Text(
-            s.line(
-                "A turn takes {rest.summary.work} from the driver, without friction: no potential belongs to a place."
+            filled(
+                "A turn takes {} from the driver, without friction: no potential belongs to a place.",
+                number(x.summary.work),
             ),
             "note",
         )
     if equilibria.summary.friction:
         yield b.Text(
-            s.line(
+            filled(
                 f"The holding {effort} is without friction. Where friction of pins and guides holds more, at most "
-                "{rest.summary.friction}, the machine stands still, too. The smoothed friction of the models is zero "
-                "at rest and holds nothing."
+                "{}, the machine stands still, too. The smoothed friction of the models is zero at rest and holds "
+                "nothing.",
+                number(x.summary.friction),
             ),
             "note",
             "long",

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from ..study.record import StudyRecord
-from .blocks import Source
 from .figure import Figure
 
-Draw: TypeAlias = "Callable[[Source, StudyRecord], Figure | Iterable[Figure]]"
+Draw: TypeAlias = "Callable[[StudyRecord], Figure | Iterable[Figure]]"
 
 
 @dataclass(frozen=True)
@@ -34,11 +33,11 @@ class Pictures:
         """The names of the pictures that these figures may write."""
         return tuple(file for _, _, file in self._declarations if file)
 
-    def figures(self, s: Source, study: StudyRecord) -> Iterator[Figure]:
+    def figures(self, study: StudyRecord) -> Iterator[Figure]:
         """The figures of which the study has the data."""
         for draw, needs, file in self._declarations:
             if needs(study):
-                figures = draw(s, study)
+                figures = draw(study)
                 yield from (
                     replace(figure, file=file)
                     for figure in ([figures] if isinstance(figures, Figure) else figures)

@@ -6,66 +6,57 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from ..core.quantities import Layout
+from ..core.quantities import Layout, finite
 from ..study.bearings import hardest_run
 from ..study.measures import MEASURES, STARTED, Answers, measures_of
 from ..study.record import StudyRecord
 from ..study.window import Phase
 from . import blocks as b
 from . import run_names
-from .cited import cited
+from .cited import cited, numbers
 from .cited import number as cited_number
-from .lines import Number, capital, join, line, spoken
+from .given_numbers import asked_speed
+from .lines import Line, Number, capital, filled, join, line, spoken
 from .terminal import plain_line
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Tables of the answers of every run, the forces in the bearings and the speed loop."""
-    if s.result["answers"]:
-        whole = table_of_runs(s, study)
+    if study.answers:
+        whole = table_of_runs(study)
         yield whole
-        yield _beside_the_worst(s, study, whole)
-    for run, phase in (("start_up", Phase.START_UP), ("settling", Phase.SETTLING)):
-        if s.result.get(run):
-            yield from _begin(s, study, run, phase)
-    if s.result["pins"]:
+        yield _beside_the_worst(study, whole)
+    if study.start is not None:
+        yield from _begin(study, "start_up", study.start, Phase.START_UP)
+    if study.settling is not None:
+        yield from _begin(study, "settling", study.settling, Phase.SETTLING)
+    if study.pins:
         yield _pins(study)
         yield _largest_pin(study)
-    if loops := s.result.get("speed_loop"):
+    if loops := cited(study.statics.loops, "findings.speed_loop"):
         title = "The linearised speed loop; deviation and settling are those after a step of the load torque"
-        rows = {loop: spoken(loop) if len(loops) > 1 else "constant inertia" for loop in loops}
-        yield matrix(s, "speed_loop", rows, title, first="")
+        rows = {
+            spoken(loop) if len(loops) > 1 else "constant inertia": numbers(x) for loop, x in loops.items()
+        }
+        yield matrix(rows, title, first="")
 
 
-def _begin(s: b.Source, study: StudyRecord, run: str, phase: Phase) -> Iterator[b.Block]:
+def _begin(study: StudyRecord, run: str, answers: Answers, phase: Phase) -> Iterator[b.Block]:
     """The demands of a phase before the steady turns: the start-up, or the settling."""
-    title = study.title_of(run)
-    numbers = [(v, s.number(f"{run}.{v.name}")) for v in measures_of(phase)]
-    rows = [(v.described(study.driver_noun), size) for v, size in numbers if size.value is not None]
-    sizes = join((line(f"{description} ", size) for description, size in rows), "; ")
-    yield b.Text(line(f"{capital(title)}: ", sizes, "."), form="short")
+    title, x = study.title_of(run), numbers(cited(answers, f"runs.{run}"))
+    sizes = [(v.described(study.driver_noun), x[v.name]) for v in measures_of(phase)]
+    rows = [row for row in sizes if row[1].value is not None]
+    said = join((line(f"{description} ", size) for description, size in rows), "; ")
+    yield b.Text(line(f"{capital(title)}: ", said, "."), form="short")
     end = f", and of the end of the start-up, from {100.0 * STARTED:g} % of the speed on"
     head = f"Demands of the {title} on the drive{end if phase is Phase.SETTLING else ''}"
     yield b.Table(tuple(map(b.TableRow, rows)), title=head, form="long")
 
 
-def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: str, **more: Any) -> b.Table:
-    """A table of the numbers below `path`: a row for each entry that has a title in `rows`, a column for each name of
-    a number in these entries."""
-    sections = b.at(s.result, path)
-    names = list(dict.fromkeys(name for section in rows for name in sections[section]))
-    cells = (
-        b.TableRow(
-            (
-                row_title,
-                *(
-                    s.number(f"{path}.{section}.{name}") if name in sections[section] else ""
-                    for name in names
-                ),
-            )
-        )
-        for section, row_title in rows.items()
-    )
+def matrix(rows: Mapping[str, Mapping[str, Number]], title: str, first: str, **more: Any) -> b.Table:
+    """A table of numbers by the title of their row and by their name, which is that of the column."""
+    names = list(dict.fromkeys(name for sizes in rows.values() for name in sizes))
+    cells = (b.TableRow((head, *(sizes.get(name, "") for name in names))) for head, sizes in rows.items())
     return b.Table(tuple(cells), b.heads(first, *map(spoken, names)), title=title, **more)
 
 
@@ -85,35 +76,37 @@ def over_runs(
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 
 
-def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
+def table_of_runs(study: StudyRecord) -> b.Table:
     """The table of all answers, with a column for each run."""
-    answers, unknown_names = s.result["answers"], study.not_known
+    answers, unknown_names = study.answers, study.not_known
     runs = by_side(study, answers)
     rows = (
         b.TableRow(
-            (v.described(study.driver_noun), *(number(s, study, run, v.name) for run in runs)),
+            (v.described(study.driver_noun), *(number(study, run, v.name) for run in runs)),
             form="long" if MEASURES[v.name].minor else "both",
         )
         for v in Layout(Answers).variables
         # a coupling that is absent or stayed shut has no row; an answer that the motor does not give has dashes
         if v.name in unknown_names
-        or any(answers[run][v.name]["value"] is not None for run in runs)
+        or any(finite(getattr(answers[run], v.name)) is not None for run in runs)
         or (v.name == "recovery_time" and study.returns and study.overloads)
     )
-    head = "{driver} at {answers.steady.speed_mean}" if "steady" in answers else ""
+    head: Line = ()
+    if "steady" in answers:
+        head = line(study.driver_noun, " at ", number(study, "steady", "speed_mean"))
     if not study.reaches:
-        head += "; {=run.crank_speed:4} NOT reached"
+        head = filled("{}; {} NOT reached", head, asked_speed(study))
     title = f"Demands of each run on the drive{_doubt(study)}"
-    return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
+    return over_runs(study, runs, rows, title, plain_line(head, study.config.units))
 
 
 def _doubt(study: StudyRecord) -> str:
     return "; the motor is insufficient" if study.insufficient else ""
 
 
-def _beside_the_worst(s: b.Source, study: StudyRecord, whole: b.Table) -> b.Table:
+def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
     """Of the table of all runs, steady running beside the overload with the largest crank torque, for one screen."""
-    runs = by_side(study, s.result["answers"])
+    runs = by_side(study, study.answers)
     shown = [run for run in ("steady",) if run in runs] or runs[:1]
     peaks = {run: study.answers[run].crank_torque_peak for run in study.overloads if run in runs}
     title = whole.title
@@ -173,7 +166,7 @@ def _pins(study: StudyRecord) -> b.Table:
     )
 
 
-def number(s: b.Source, study: StudyRecord, run: str, name: str) -> Number:
+def number(study: StudyRecord, run: str, name: str) -> Number:
     """The answer `name` of a run."""
     back = name == "recovery_time" and run != "steady" and study.returns
     answers = cited(study.answers[run], f"runs.answers.{run}")

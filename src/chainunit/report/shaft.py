@@ -7,14 +7,15 @@ from typing import Any
 
 from ..core.quantities import Layout
 from ..study.analysis import is_examined
-from ..study.line.rigid_line import HOLDS_FROM
-from ..study.line.shaft import CLASSES, RIGID, LineModes, ShaftAnswers
+from ..study.line.rigid_line import HOLDS_FROM, RigidLine
+from ..study.line.shaft import CLASSES, RIGID, ShaftAnswers
 from ..study.line.shaft_runs import shaft_findings
 from ..study.record import StudyRecord
 from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
-from .cited import cited, number
+from .cited import cited, number, quantity_rows
+from .lines import filled
 from .pictures import Pictures
 from .runs import by_side, over_runs
 
@@ -30,21 +31,23 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         return
     yield _shaft(study)
     if not is_examined("driveline", study.findings):
-        yield b.Table(s.rows(LineModes, "driveline"), title="The driveline's torsion")
-    yield _rigid(s)
-    yield from PICTURES.figures(s, study)
+        modes = quantity_rows(cited(study.statics.modes, "findings.driveline"), study.driver_noun)
+        yield b.Table(modes, title="The driveline's torsion")
+    if study.statics.rigid_line is not None:
+        yield _rigid(study, study.statics.rigid_line)
+    yield from PICTURES.figures(study)
 
 
-def _rigid(s: b.Source) -> b.Judgement:
+def _rigid(study: StudyRecord, rigid: RigidLine) -> b.Judgement:
     """The verdict on a rigid model of the drive, with its two numbers."""
-    holds = s.result["rigid_line"]["holds"]
-    verdict = f"In steady running a rigid model of the drive {'holds' if holds else 'does not hold'}"
-    text = s.line(
-        f"{verdict} (VDI 2149: from {HOLDS_FROM:g} times on): the lowest natural frequency of the line, "
-        "{rigid_line.natural_frequency}, is {rigid_line.ratio} times the frequency of the {driver}'s turns, "
-        "{rigid_line.driver_frequency}."
+    x = cited(rigid, "findings.rigid_line")
+    verdict = (
+        f"In steady running a rigid model of the drive {'holds' if rigid.holds else 'does not hold'} (VDI 2149: from "
+        f"{HOLDS_FROM:g} times on): the lowest natural frequency of the line, {{}}, is {{}} times the frequency of "
+        f"the {study.driver_noun}'s turns, {{}}."
     )
-    return b.Judgement("good" if holds else "partly", text)
+    sizes = map(number, (x.natural_frequency, x.ratio, x.driver_frequency))
+    return b.Judgement("good" if rigid.holds else "partly", filled(verdict, *sizes))
 
 
 def _shaft(study: StudyRecord) -> b.Table:
@@ -59,7 +62,7 @@ def _shaft(study: StudyRecord) -> b.Table:
 
 
 @PICTURES.declare(lambda study: shaft_findings(study).answers, "driveline.png")
-def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _driveline(study: StudyRecord) -> fig.Figure:
     """The torque in the driveline beside that in a rigid one, and its rainflow cycles."""
     shaft = shaft_findings(study)
     largest = max(answers.range_largest for answers in shaft.answers.values())

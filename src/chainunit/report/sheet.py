@@ -8,11 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from .. import __version__
 from ..study.record import StudyRecord
 from . import blocks as b
 from .capability import capabilities
 from .figure import Figure
-from .lines import Line, Number, capital, line
+from .given_numbers import asked_speed
+from .lines import Line, Number, capital, filled, line
 from .pdf import Sheet
 from .study import basis, software
 
@@ -30,7 +32,6 @@ _LABELS = ("project", "author", "date", "revision")
 
 def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     """The sheet of a study with this report."""
-    s = b.Source(report.result, study.driver_noun)
     report_sections = {section.name: section for section in report.sections}
     sheets = [name for part in capabilities() for name in part.on_sheet() if name in report_sections]
     sections = [
@@ -39,7 +40,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
         b.Section(
             "assumptions", "Assumptions: values that no file gives", tuple(_assumed(report_sections, study))
         ),
-        *([_basis(s, study)] if "basis" in report_sections else []),
+        *([_basis(study)] if "basis" in report_sections else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
     # what was not checked, and what is assumed, stand on the sheet
@@ -49,7 +50,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     if "given" in report_sections:
         annex.append(_not_assumed(report_sections["given"], study))
     if "basis" in report_sections:
-        annex.append(b.Section("software", "Models and software", (software(s),)))
+        annex.append(b.Section("software", "Models and software", (software(study),)))
     return Sheet(
         report.title or capital(report.kind),
         _title_block(study, report),
@@ -73,17 +74,17 @@ def _without_figures(section: b.Section) -> b.Section:
     return replace(section, blocks=tuple(block for block in section.blocks if not isinstance(block, Figure)))
 
 
-def _basis(s: b.Source, study: StudyRecord) -> b.Section:
+def _basis(study: StudyRecord) -> b.Section:
     """Basis and validity, with the speed up to which the numbers hold at its head."""
-    head = [block for part in capabilities() for block in part.answer(s, study).validity]
-    return b.Section("basis", "Basis and validity", (*_speed(s, study), *head, *basis(s, study)))
+    head = [block for part in capabilities() for block in part.answer(study).validity]
+    return b.Section("basis", "Basis and validity", (*_speed(study), *head, *basis(study)))
 
 
-def _speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def _speed(study: StudyRecord) -> Iterator[b.Block]:
     """The speed of the runs, and the reach of rigid links."""
-    if not s.result["answers"]:
+    if not study.answers:
         return
-    text = f"The runs ask for a speed of the {study.driver_noun} of {{=run.crank_speed:4}}."
+    text = f"The runs ask for a speed of the {study.driver_noun} of {{}}."
     if study.drive.foreign_machine or not study.drive.machine.model.sides:
         text += " No highest speed was computed up to which the numbers hold"
         text += (
@@ -91,7 +92,7 @@ def _speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             if study.drive.foreign_machine
             else ": rigid links set none. Another speed asks for another study."
         )
-    yield b.Text(s.line(text), "note", "long")
+    yield b.Text(filled(text, asked_speed(study)), "note", "long")
 
 
 def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
@@ -100,8 +101,8 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
     return {
         **{capital(name): str(value) for name, value in labels.items()},
         "Machine": machine,
-        "Study file": Path(str(report.result.get("source", ""))).name,
-        "Computed by": f"chainunit {report.result['chainunit']}",
+        "Study file": Path(study.config.file.source).name,
+        "Computed by": f"chainunit {__version__}",
         "Status": report.status if not report.failure else "stopped early",
     }
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..core.descriptions import of_driver
 from ..study.event_torques import running_words
 from ..study.record import StudyRecord
 from ..study.starts import StartFindings, transient_words
 from . import blocks as b
 from .cited import cited, number, table
+from .lines import filled
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -17,17 +19,22 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if findings is None:
         return
     place = "output of the gear" if study.drive.is_geared else study.driver_noun
-    worst = (
-        f"Start: load and acceleration load the {place} with up to {{starts.worst.quasi_static}}, from "
-        "{a driver} angle of {starts.worst.angle}: {starts.over_running} times {running}, {starts.running}."
+    x = cited(findings, "findings.starts")
+    worst = of_driver(
+        f"Start: load and acceleration load the {place} with up to {{}}, from {{a driver}} angle of {{}}: {{}} times "
+        "{}, {}.",
+        study.driver_noun,
     )
-    running = running_words(study, findings.running_in)
-    transient = "" if study.drive.follows else f" The {transient_words(study)}: {{starts.transient}}."
-    yield b.Text(s.line(worst + transient, running=running))
+    running = running_words(study, findings.running_in), number(x.running)
+    sizes = number(x.worst.quasi_static), number(x.worst.angle), number(x.over_running)
+    text = filled(worst, *sizes, *running)
+    if not study.drive.follows:
+        text += filled(" The {}: {}.", transient_words(study), number(x.transient))
+    yield b.Text(text)
     at_gear = "torque at the gear" if study.drive.is_geared else f"torque at the {study.driver_noun}"
     in_star = ("speed at the change to delta", lambda start: number(start.star_speed))
     yield from table(
-        cited(findings, "findings.starts").starts,
+        x.starts,
         (f"{study.driver_noun} angle", lambda start: number(start.angle)),
         (at_gear, lambda start: number(start.quasi_static, none="not reached")),
         ("with the transient", lambda start: number(start.gear_torque, none="not reached")),

@@ -9,17 +9,26 @@ from functools import cache
 from importlib import metadata
 from typing import Any
 
+from .. import __version__
+from ..core.descriptions import of_driver
+from ..core.quantities import finite, variables
+from ..reading.results import InUnit
 from ..reading.text import shown_in
 from ..study.event_table import random_runs
 from ..study.given import GivenSection, description, given_sections
+from ..study.heading import Heading
+from ..study.origins import origin_of, place_of
 from ..study.record import StudyRecord
+from ..study.result import speed_control
 from ..study.transients import DIFFERENCE
 from . import answer, figures, run_names, runs, shaft
 from . import blocks as b
 from .analyses import analysis_sections
 from .capability import Contents, capabilities
+from .cited import cited, exact, numbers, quantity_rows, source_line
 from .drawing import drawing
-from .lines import Line, capital, join, line, spoken
+from .given_numbers import asked_speed, ratio, run_settings
+from .lines import Line, Number, capital, filled, join, line, spoken
 from .live.runs import stand_in, whole_of
 from .live.study import of_study
 from .live_block import Live
@@ -27,14 +36,14 @@ from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
 _DRAWING_CAPTION = (
-    "Pins and links, and dimensions by their names in a study file. φ is the {driver} angle, {counts}."
+    "Pins and links, and dimensions by their names in a study file. φ is the {driver} angle, {}."
 )
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 
 def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """The report on a study; `result` has its numbers, as `chainunit.study.result.as_dict` gives them."""
-    s = b.Source(result, study.driver_noun)
+    s = b.Source(result)
     with shown_in(study.config.units):
         sections = [
             b.Section(name, contents.heading, tuple(contents.blocks(s, study)), beside=name == QUESTION)
@@ -48,35 +57,38 @@ def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
         return b.Report(
             study.config.title,
             study.kind,
-            s.result,
+            result,
             (),
             tuple(sections),
-            source=s.source_line(),
-            failure=s.words("failure") if study.failure is not None else (),
+            source=source_line(cited(Heading.of(study.config.title, study.config.file))),
+            failure=_failure(study),
             units=study.config.units,
         )
 
 
 def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
-    s = b.Source(result, study.driver_noun)
-    blocks: list[b.Block] = list(answer.sentence(s))
+    blocks: list[b.Block] = list(answer.sentence(study))
     with shown_in(study.config.units):
-        for block in answer.blocks(s, study):
+        for block in answer.blocks(study):
             if isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
                 blocks.append(replace(block, form="both"))
-        if s.result["answers"]:
-            table = runs.table_of_runs(s, study)
+        if study.answers:
+            table = runs.table_of_runs(study)
             blocks.append(replace(table, rows=tuple(row for row in table.rows if row.form != "long")))
         return b.Report(
             study.config.title,
             study.kind,
-            s.result,
+            result,
             (),
             (b.Section("summary", "Summary", tuple(blocks)),),
-            failure=s.words("failure") if study.failure is not None else (),
+            failure=_failure(study),
             units=study.config.units,
         )
+
+
+def _failure(study: StudyRecord) -> Line:
+    return () if study.failure is None else cited(str(study.failure), "failure")
 
 
 def _motion(study: StudyRecord) -> list[b.Block]:
@@ -88,47 +100,52 @@ def _motion(study: StudyRecord) -> list[b.Block]:
 
 
 _GIVEN_DRIVE = (
-    "What does the motor of {noun} have to give? It turns the {driver} through a gear of ratio {=machine.ratio}, in "
-    "normal running at {=run.crank_speed:4}."
+    "What does the motor of {} have to give? It turns the {driver} through a gear of ratio {}, in normal running "
+    "at {}."
 )
 
 
 def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     # a linkage has its title in place of a noun
     noun = f"this {study.noun}" if study.noun[:1].islower() else f'the machine "{study.noun}"'
-    question = s.line(_GIVEN_DRIVE if study.proposal is None else study.proposal.question, noun=noun)
+    if study.proposal is None:
+        question = filled(
+            of_driver(_GIVEN_DRIVE, study.driver_noun), noun, exact(ratio(study)), asked_speed(study)
+        )
+    else:
+        question = filled(of_driver(study.proposal.question, study.driver_noun), noun, asked_speed(study))
+    run = run_settings(study)
     if study.answers:
-        question += s.line(
-            " The machine starts from rest{ramp} and is evaluated over {=run.turns} {turns} when steady.",
-            ramp=s.line(" in {=run.ramp}") if study.drive.follows else "",
-            turns="turn" if study.config.run.turns == 1.0 else "turns",
+        question += filled(
+            " The machine starts from rest{} and is evaluated over {} {} when steady.",
+            line(" in ", exact(run.ramp)) if study.drive.follows else "",
+            exact(run.turns),
+            "turn" if study.config.run.turns == 1.0 else "turns",
         )
     if names := study.overloads:
         titles = "; ".join(run_names.title(study, name) for name in names)
         question += line(f" Then come overloads, each by itself: {titles}.")
     for plan in random_runs(study.config.plans):
         if plan.table in study.findings:
-            sentence = f" Then come {{={plan.table}.runs}} overloads at random, each by itself: {{event}}."
-            question += s.line(sentence, event=plan.event.title)
+            sentence = " Then come {} overloads at random, each by itself: {}."
+            counted = exact(cited(InUnit(plan.runs, "1"), f"findings.{plan.table}.runs"))
+            question += filled(sentence, counted, plan.event.title)
     yield b.Text(question, form="long")
     is_chosen, feed = study.proposal is not None, study.config.feed
-    parts = {"machine": study.drive.machine.p, "run": study.config.run}
-    given_names = [("run", "crank_speed"), *([] if is_chosen else [("machine", "ratio")])]
-    rows = [
-        *([] if is_chosen else [b.TableRow(("motor", s.words("motor.title")))]),
-        *(
-            row
-            for table, name in given_names
-            for row in s.rows(type(parts[table]), table, only=name, as_given=True)
-        ),
-        *s.rows(type(feed), "feed", as_given=True),
-    ]
+    rows: list[b.TableRow] = []
+    if not is_chosen:
+        components = study.drive.graph.components
+        motor = components["motor"].title if study.plate is None else study.plate.designation
+        rows.append(b.TableRow(("motor", cited(motor, "given.motor.title"))))
+    driver, machine = study.driver_noun, cited(study.drive.machine.p, "given.machine")
+    rows += quantity_rows(run, driver, only="crank_speed", as_given=True)
+    rows += () if is_chosen else quantity_rows(machine, driver, only="ratio", as_given=True)
+    rows += quantity_rows(cited(feed, "given.feed"), driver, as_given=True)
     yield b.Table(tuple(rows), title="In short", form="long")
     if not study.drive.foreign_machine:
         alt, model = f"{capital(noun)}: its pins, links and dimensions", study.drive.machine.model
-        yield b.Drawing(
-            drawing(study.drive.machine), alt, DRAWING, s.line(_DRAWING_CAPTION, counts=model.angle_counts)
-        )
+        caption = filled(of_driver(_DRAWING_CAPTION, study.driver_noun), model.angle_counts)
+        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, caption)
 
 
 def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -141,18 +158,36 @@ def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         for name in part.unused_values(study.config.machine, study.config.plans[part.name])
     ]
     yield b.Given(
-        tuple((section.title, tuple(_values(s, section, unused_names))) for section in given_sections(study))
+        tuple(
+            (section.title, tuple(_values(s, study, section, unused_names)))
+            for section in given_sections(study)
+        )
     )
 
 
-def _values(s: b.Source, section: GivenSection, unused_names: Iterable[str]) -> Iterator[b.GivenValue]:
-    """The quantities and choices of a section as given values, except those with a name in `unused_names`."""
-    if section.values is not None:
-        for value in s.given_values(section.values, section.name, section.place):
-            if value.name not in unused_names:
-                yield value
+def _values(
+    s: b.Source, study: StudyRecord, section: GivenSection, unused_names: Iterable[str]
+) -> Iterator[b.GivenValue]:
+    """The quantities and choices of a section as given values, except those with a name in `unused_names`. A range
+    gives two values, its ends."""
+    for name, text, content in _contents(s, study, section):
+        full = f"{section.name}.{name}".removeprefix(".")
+        if full not in unused_names:
+            yield b.GivenValue(full, text, content, origin_of(study, full), place_of(study, full))
+
+
+def _contents(s: b.Source, study: StudyRecord, section: GivenSection) -> Iterator[tuple[str, str, b.Content]]:
+    """Name, description and content of each value of a section. A finding of the same place is what the study uses
+    in place of the value."""
+    for v in () if section.values is None else variables(type(section.values)):
+        place, text = f"{section.place}.{v.name}", v.described(study.driver_noun)
+        if v.name in section.ranges:
+            for k, end in enumerate(("least", "most")):
+                yield v.name, f"{text}, {end}", s.number(place, k, as_given=True)
+        elif v.name not in section.unused_names:
+            yield v.name, text, s.number(place, as_given=True, none="none")
     for key, choice in section.choices.items():
-        name, place = (".".join(filter(None, (prefix, key))) for prefix in (section.name, section.place))
+        place = f"{section.place}.{key}".removeprefix(".")
         if isinstance(choice, str):
             content: b.Content = s.words(place)
         elif isinstance(choice, bool):
@@ -161,7 +196,7 @@ def _values(s: b.Source, section: GivenSection, unused_names: Iterable[str]) -> 
             content = s.number(place, as_given=True)
         else:
             content = ", ".join(x if isinstance(x, str) else f"{x:g}" for x in choice)
-        yield b.GivenValue(name, description(name), content, s.origin(name), s.place(name))
+        yield key, description(f"{section.name}.{key}".removeprefix(".")), content
 
 
 def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -179,8 +214,8 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    yield from basis(s, study)
-    yield software(s)
+    yield from basis(study)
+    yield software(study)
     hint = (
         "Every number in the text of this page comes from result.json, which the page contains whole. Point at a "
         "number to see its place in result.json and more digits."
@@ -188,54 +223,63 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield b.Text(hint, "hint", "long")
 
 
-def basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def basis(study: StudyRecord) -> Iterator[b.Block]:
     """The notes on a study, and its energy certificate."""
-    yield from (b.Text(note, "note") for note in s.lines("notes"))
+    yield from (b.Text(note.text, "note") for note in cited(study.notes, "notes"))
     yield from answer.remark_tables(study.notes, "notes")
-    if s.result["certificate"]:
-        yield from _certificate(s, study, s.result["certificate"])
+    if study.certificate:
+        yield from _certificate(study)
 
 
-def software(s: b.Source) -> b.Table:
+def software(study: StudyRecord) -> b.Table:
     """The FMUs, the control of the speed, and the versions of a study."""
-    gains = s.result["control"]
+    gains = cited(speed_control(study.drive), "findings.control")
     control: Line = (
-        join(s.line(f"{spoken(name)} {{control.{name}}}") for name in gains)
-        if isinstance(gains, Mapping)
-        else s.words("control")
+        gains
+        if isinstance(gains, str)
+        else join(filled("{} {}", spoken(name), gain) for name, gain in numbers(gains).items())
     )
     versions = {"Python": platform.python_version()} | {name: _version(name) for name in _VERSIONS}
-    libraries = "".join(f", {name} {version}" for name, version in versions.items())
+    libraries = (f", {name} {version}" for name, version in versions.items())
     rows = (
-        *(b.TableRow((f"{name} FMU", s.words(f"fmus.{name}"))) for name in s.result["fmus"]),
+        *(
+            b.TableRow((f"{name} FMU", origin))
+            for name, origin in cited({name: str(x) for name, x in study.fmus.items()}, "runs.fmus").items()
+        ),
         b.TableRow(("speed control", control)),
-        b.TableRow(("versions", s.line("chainunit {chainunit}{libraries}", libraries=libraries))),
+        b.TableRow(("versions", line("chainunit ", cited(__version__, "chainunit"), *libraries))),
     )
     return b.Table(rows, title="Models and software", numeric=False, form="long")
 
 
-def _certificate(
-    s: b.Source, study: StudyRecord, certificate: Mapping[str, Mapping[str, Any]]
-) -> Iterator[b.Block]:
+def _certificate(study: StudyRecord) -> Iterator[b.Block]:
+    shares = {
+        run: {
+            name: Number(finite(share), "1", path=f"runs.certificate.{run}.{name}")
+            for name, share in entries.items()
+        }
+        for run, entries in study.certificate.items()
+    }
     method = (
         "The energy that the motor gave to the shaft, computed in the motor, is compared with the energy that the "
         "machine stored and dissipated, computed in the machine. The table shows the missing share of the energy "
         "moved."
     )
     yield b.Text(method, "note", "long")
-    titles = {run: study.title_of(run) for run in certificate}
-    yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
-    for name in dict.fromkeys(name for shares in certificate.values() for name in shares):
-        compared_runs = [run for run, shares in certificate.items() if name in shares]
+    rows = {study.title_of(run): sizes for run, sizes in shares.items()}
+    yield runs.matrix(rows, "Energy certificate", "run", form="long")
+    for name in dict.fromkeys(name for sizes in shares.values() for name in sizes):
+        compared_runs = [run for run, sizes in shares.items() if name in sizes]
         run = max(compared_runs, key=lambda run: study.certificate[run][name])
-        most = f"{{certificate.{run}.{name}}}"
-        text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {most} of the energy moved."
+        text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {{}} of the energy moved."
+        parts: tuple[Line, ...] = (shares[run][name],)
         if name.endswith(DIFFERENCE):
             text = (
                 f"Difference of {name.removesuffix(DIFFERENCE)} to the monolithic solution, in parts of its "
-                f"peak: at most {most} ({{title}}); runs compared: {len(compared_runs)}."
+                f"peak: at most {{}} ({{}}); runs compared: {len(compared_runs)}."
             )
-        yield b.Text(s.line(text, title=titles[run]), form="short")
+            parts += (study.title_of(run),)
+        yield b.Text(filled(text, *parts), form="short")
 
 
 @cache
@@ -250,14 +294,14 @@ def _version(name: str) -> str:
 def _sections() -> Mapping[str, Contents]:
     """By name, all sections that a report may have."""
     return {
-        "answer": Contents("The answer", answer.blocks),
+        "answer": Contents("The answer", lambda s, study: answer.blocks(study)),
         QUESTION: Contents("The question", _question),
         "live": Contents("Try it", _live),
         **{name: contents for name, contents in analysis_sections().items() if contents.before == "runs"},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
         **analysis_sections(),
-        "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
+        "plots": Contents("Plots", lambda s, study: figures.PICTURES.figures(study), figures.PICTURES.files),
         "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),
         "basis": Contents("Basis of the results", _basis),
         "given": Contents("Given values", _given),

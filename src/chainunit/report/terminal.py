@@ -16,7 +16,7 @@ from rich.text import Text as Styled
 from ..core.unit_table import UNITS
 from ..reading.text import DEFAULT_UNITS, Units, number
 from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
-from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
+from .lines import Aside, Line, Name, Number, Piece, Strong, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
 _BRACKETS = re.compile(r" ?\([^()]*\)")
@@ -44,7 +44,7 @@ def _plain(piece: Piece, units: Units) -> str:
                 none=piece.none,
                 units=units,
             )
-        case Words() | Name():
+        case Name():
             return piece.text
         case Strong():
             return plain_line(piece.line, units)

@@ -10,10 +10,12 @@ import numpy as np
 
 from ..reading.text import number as number_words
 from ..study.record import StudyRecord
-from ..study.turn import Turn, TurnFindings
+from ..study.turn import TurnFindings
 from . import blocks as b
 from . import figure as fig
-from .cited import cited, number, table
+from .cited import cited, number, quantity_rows, table
+from .given_numbers import asked_speed
+from .lines import filled
 
 PICTURE = "turn.png"
 
@@ -37,14 +39,16 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
     turn = TurnFindings.of_study(study)
     bars = f", of {substitute}" if (substitute := study.drive.machine.in_place) else ""
-    lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the {driver}, without a motor" + bars + ".")
-    yield b.Text(lead, "lead", "long")
-    yield b.Table(
-        s.rows(Turn, "constant_speed", none="none"), title=f"A turn at constant speed{bars}", form="long"
+    lead = filled(
+        f"Inverse dynamics at {{}} of the {study.driver_noun}, without a motor{bars}.", asked_speed(study)
     )
+    yield b.Text(lead, "lead", "long")
+    x = cited(turn, "findings.constant_speed")
+    rows = quantity_rows(x.numbers, study.driver_noun, none="none")
+    yield b.Table(rows, title=f"A turn at constant speed{bars}", form="long")
     if turn.pins:
         yield from table(
-            cited(turn, "findings.constant_speed").pins.items(),
+            x.pins.items(),
             ("pin", lambda row: row[0]),
             ("peak, with feed", lambda row: number(row[1].peak)),
             ("at", lambda row: number(row[1].angle)),

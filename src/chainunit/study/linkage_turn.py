@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -42,6 +42,8 @@ _ROUNDING = 1e-12
 class LinkageTurn:
     """A linkage over the way of its driver at constant speed."""
 
+    AT_DRIVER: ClassVar = ("torque_peak", "torque_rms", "torque_mean", "inertia_least", "inertia_largest")
+
     torque_peak: Value = quantity("N.m", "largest in size")
     torque_rms: Value = quantity("N.m", "RMS")
     torque_mean: Value = quantity("N.m", "mean")
@@ -55,6 +57,8 @@ class LinkageTurn:
 class GroupTurn:
     """A group over the way of the driver."""
 
+    AT_DRIVER: ClassVar = ("margin_at",)
+
     margin: Value = quantity("1", "least margin; 0 is a dead position")
     margin_at: Value = quantity("rad", "angle of the driver where it is least")
 
@@ -62,6 +66,8 @@ class GroupTurn:
 @declaration
 class JointTurn:
     """A joint over the way of the driver."""
+
+    AT_DRIVER: ClassVar = ("peak_at",)
 
     peak: Value = quantity("N", "largest force")
     peak_at: Value = quantity("rad", "angle of the driver where it is largest")
@@ -72,6 +78,8 @@ class JointTurn:
 @declaration
 class Stroke:
     """The motion of a sliding joint between its two ends."""
+
+    AT_DRIVER: ClassVar = ("least_at", "largest_at", "forth")
 
     least: Value = quantity("m", "least way of the block along its line")
     least_at: Value = quantity("rad", "place of the driver there")
@@ -85,6 +93,8 @@ class Stroke:
 @declaration
 class Swing:
     """The motion of a link that swings between two ends."""
+
+    AT_DRIVER: ClassVar = ("least_at", "largest_at", "forth")
 
     least: Value = quantity("rad", "least angle")
     least_at: Value = quantity("rad", "place of the driver there")

@@ -76,7 +76,7 @@ class DriveProposal:
     tables: DriveTables
     """the tables of the study, with the values that follow from the drive"""
     question: str
-    """the question that it answers about the machine {noun}"""
+    """the question that it answers, with slots for the machine and for its speed"""
     reason: str
     """the choice and its reason, in words"""
     sentence: Callable[[Any], str]

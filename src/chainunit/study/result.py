@@ -12,6 +12,7 @@ from ..reading.result_entries import ResultEntries
 from ..reading.results import InUnit, as_data, part, result
 from ..reading.tables import UnusualValue
 from ..reading.text import entries, entry, shown_in
+from .drive import Drive
 from .given import given_sections
 from .heading import Heading
 from .judgement import MotorVerdict, motor_verdict
@@ -141,14 +142,16 @@ def _data(study: StudyRecord) -> StudyData:
         findings=DriveFindings(
             study.statics.loops,
             study.statics.rigid_line,
-            drive.tuning
-            or (
-                drive.motor.control
-                if drive.follows
-                else "none: the motor takes the speed that its supply and the load give"
-            ),
+            speed_control(drive),
         ),
     )
+
+
+def speed_control(drive: Drive) -> Tuning | str:
+    """The tuned gains of the speed control, or words on it."""
+    if drive.tuning or drive.follows:
+        return drive.tuning or drive.motor.control
+    return "none: the motor takes the speed that its supply and the load give"
 
 
 def _given_values(study: StudyRecord) -> dict[str, Any]:
@@ -196,12 +199,12 @@ def _runs(study: StudyRecord) -> RunData:
         settling=begin(Phase.SETTLING, study.settling),
         pins=study.pins,
         certificate=study.certificate,
-        block_peaks={name: _spread(study, name) for name in study.spreads},
+        block_peaks={name: assumed_ranges(study, name) for name in study.spreads},
         fmus={name: str(origin) for name, origin in study.fmus.items()},
     )
 
 
-def _spread(study: StudyRecord, name: str) -> dict[str, InUnit]:
+def assumed_ranges(study: StudyRecord, name: str) -> dict[str, InUnit]:
     """The range of the assumed quantities of an event, and the peaks over it."""
     spread = study.spreads[name]
     units = {v.name: v.unit for v in variables(study.config.events[name].Parameters)}

@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from chainunit.report import blocks as b
+from chainunit.report.cited import cited, exact, quantity_rows
+from chainunit.report.lines import filled
 from chainunit.study.record import StudyRecord
 
-from .analysis import LifeNumbers
+from .analysis import PinLife
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table of the life."""
-    title = s.line("Rating life of a bearing at the pin {pin_life.pin}; wanted are {=pin_life.wanted}")
-    yield b.Table(s.rows(LifeNumbers, "pin_life"), title=title)
+    yield life_table(PinLife.of_study(study), "findings.pin_life")
+
+
+def life_table(findings: PinLife, path: str) -> b.Table:
+    """The life of a pin, which stands at `path` of the result."""
+    x = cited(findings, path)
+    title = filled("Rating life of a bearing at the pin {}; wanted are {}", x.pin, exact(x.wanted))
+    return b.Table(quantity_rows(x.numbers), title=title)

@@ -10,13 +10,16 @@ from chainunit.core.errors import InputError
 from chainunit.reading.text import shown_in
 from chainunit.report import blocks as b
 from chainunit.report import study_task
+from chainunit.report.cited import cited, source_line
 from chainunit.report.task import Task
 from chainunit.study.config import Config
+from chainunit.study.heading import Heading
 from chainunit.study.record import StudyRecord
 from chainunit.study.result import as_dict
 from chainunit.work.progress import TaskProgress
 
 from . import page
+from .analysis import PinLife
 
 _HEAD = ("chainunit", "title", "source", "status", "pin_life")
 
@@ -26,16 +29,18 @@ def _report(study: StudyRecord) -> b.Report:
     result = {name: result[name] for name in _HEAD if name in result} | {
         "warnings": [each for each in result["warnings"] if each["code"] == "pin-life"],
     }
-    s = b.Source(result)
+    warnings = [warning for warning in study.warnings if warning.code == "pin-life"]
+    heading = cited(Heading.of(study.config.title, study.config.file))
+    life = PinLife.found_in(study)
     with shown_in(study.config.units):
-        found = page.blocks(s, study) if "pin_life" in study.findings else ()
+        found = () if life is None else (page.life_table(life, "pin_life"),)
         return b.Report(
             study.config.title,
             "Rating life of a pin",
             result,
-            (*found, *(b.Judgement("warning", each) for each in s.lines("warnings"))),
+            (*found, *(b.Judgement("warning", warning.text) for warning in cited(warnings, "warnings"))),
             (),
-            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            source=source_line(heading),
             units=study.config.units,
             opening_title="The answer",
         )

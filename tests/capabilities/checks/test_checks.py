@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from reports import at
 
 from chainunit.capabilities.checks import bearings
 from chainunit.capabilities.checks.row import CheckRow, Checks
@@ -20,7 +21,6 @@ from chainunit.core.errors import InputError
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.tables import instance
 from chainunit.reading.text import number
-from chainunit.report.blocks import at
 from chainunit.study.config import parse
 
 pytestmark = pytest.mark.second

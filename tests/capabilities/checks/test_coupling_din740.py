@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from reports import at
 
 from chainunit.capabilities.checks.coupling import (
     CouplingDuty,
@@ -26,7 +27,6 @@ from chainunit.capabilities.checks.row import Checks
 from chainunit.capabilities.checks.tables import FlexibleCouplingTable
 from chainunit.core.errors import InputError
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.report.blocks import at
 from chainunit.study.config import parse
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from reports import at
 
 from chainunit.capabilities.checks.gear import (
     _PULLEY,
@@ -29,7 +30,6 @@ from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.drives.gearing import Transmission
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.report.blocks import at
 from chainunit.study import event_torques
 from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from event_tables import event_line
+from reports import at
 
 from chainunit.capabilities.checks.relay import RelaySetting, check_relay, relay_findings, stall_heat
 from chainunit.capabilities.checks.row import Checks
 from chainunit.core.errors import InputError
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.report.blocks import at
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
 from chainunit.study.measures import read_measure

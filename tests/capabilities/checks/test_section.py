@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from reports import at
 
 from chainunit.capabilities.checks.plan import SectionPlan
 from chainunit.capabilities.checks.row import Checks
@@ -30,7 +31,6 @@ from chainunit.capabilities.checks.tables import STEELS, SectionTable
 from chainunit.core.errors import InputError
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.tables import instance
-from chainunit.report.blocks import at
 from chainunit.study.config import parse
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")

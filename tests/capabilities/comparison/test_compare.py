@@ -137,7 +137,7 @@ def test_warnings_are_compared_by_their_codes_and_runs(folder, tmp_path):
         (tmp_path / name).mkdir()
         (tmp_path / name / "result.json").write_text(json.dumps(data))
         results.append(read_result(tmp_path / name))
-    alone = compare(*results)["warnings"]
+    alone = compare(*results).warnings
     assert alone == {"a": ["Speed 3.1 rad/s, too high: 1"], "b": ["Hot", "Hot"]}
 
 
@@ -209,7 +209,7 @@ def test_numbers_have_the_noun_of_a_common_driver(folder, tmp_path):
         for file, data in zip(files, (one, other), strict=True):
             file.write_text(json.dumps(data))
         found = compare(*map(read_result, files))
-        titles = {each["title"] for run in found["runs"].values() for each in run["measures"].values()}
+        titles = {each.title for run in found.runs.values() for each in run.measures.values()}
         assert f"{noun} torque, peak" in titles and not any("crank torque" in title for title in titles)
 
 
@@ -236,11 +236,11 @@ def test_a_measure_of_one_alone_and_other_units(folder, tmp_path):
     data["title"], data["status"] = "bad \x1b[31m title", "failed: it broke"
     file.write_text(json.dumps(data))
     result = compare(read_result(file), read_result(folder / "a"))
-    measures = result["runs"]["answers.steady"]["measures"]
-    assert result["only"]["a"]["measures"] == ["steady running: mystery number"]
-    assert result["only"]["b"]["measures"] == ["steady running: speed dip"]
-    assert measures["current_rms"]["difference"]["value"] is None
-    assert measures["current_rms"]["a"]["unit"] == "kA" and measures["current_rms"]["b"]["unit"] == "A"
+    measures = result.runs["answers.steady"].measures
+    assert result.only["a"].measures == ["steady running: mystery number"]
+    assert result.only["b"].measures == ["steady running: speed dip"]
+    current = measures["current_rms"]
+    assert current.difference.value is None and (current.a.unit, current.b.unit) == ("kA", "A")
     done = chainunit("compare", "old", folder / "a", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0 and "A: failed: it broke." in done.stdout and "\x1b[31m" not in done.stdout
 

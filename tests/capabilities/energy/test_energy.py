@@ -24,13 +24,15 @@ from chainunit.capabilities.energy.efficiency_class import (
 )
 from chainunit.capabilities.energy.motor_class import MotorClass, MotorClassAnalysis, words_of
 from chainunit.capabilities.energy.other_motor import other_motor
-from chainunit.capabilities.energy.page import verdict_words
+from chainunit.capabilities.energy.page import verdict
 from chainunit.capabilities.energy.running import PLACES, Losses, scale_faults, scaled, warm
 from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout, declaration, quantity
 from chainunit.drives.catalogue import catalogue
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.reading.result_entries import ResultEntries
+from chainunit.report.cited import cited
+from chainunit.report.lines import Number, pieces
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
 from chainunit.system import CompiledSimulation, Profile
@@ -417,7 +419,8 @@ def test_the_life_decides_whether_a_motor_pays(study, price, words):
     else:
         assert comparison.life_saving == pytest.approx(250.0 - (price - 400.0))
         assert (comparison.pays_after < 10.0) == (comparison.life_saving > 0.0)
-    assert words in verdict_words(comparison)
+    said = verdict(comparison, cited(comparison), Number(10.0, "1"))
+    assert words in "".join(str(getattr(piece, "text", piece)) for piece in pieces(said))
 
 
 def test_shares_of_a_third_are_complete():

@@ -35,7 +35,6 @@ from chainunit.reading.results import as_data
 from chainunit.recordings import fit as fitting
 from chainunit.recordings.measurands import MEASURANDS
 from chainunit.recordings.unknown import Unknown
-from chainunit.report import blocks
 from chainunit.report.cited import cited
 from chainunit.report.console import Forecast, carry_out
 from chainunit.study import config as study_files
@@ -311,9 +310,7 @@ def test_further_runs_beside_numbers_that_are_all_determined():
             "combinations": [],
             "proposals": (Proposal("empty", 1.2, 2),),
         }
-        numbers = {name: {"value": parts[name], "unit": "1"} for name in ("told", "sought", "told_at_start")}
-        source = blocks.Source(numbers | {"blind": []})
-        return str(list(report._limits(source, cited(IdentificationSummary(**parts)))))
+        return str(list(report._limits(cited(IdentificationSummary(**parts)))))
 
     assert "None of these runs determines one more number" in shown(2.0) and "without one" in shown(2.0)
     assert "None of these runs" not in shown(3.0) and "would make the numbers sharper" in shown(3.0)

@@ -29,6 +29,7 @@ from chainunit.capabilities.random_overloads import page
 from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.core.errors import RunError
 from chainunit.core.native.compilers import compiler
+from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
@@ -473,9 +474,11 @@ def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
     assert dataclasses.replace(task, cosimulated=True).method == key
     monkeypatch.setattr(monte_carlo, "can_run", lambda: False)
     # without quantiles there is no table, and the line stands alone
-    entries = {"runs": {"value": 4, "unit": "1"}, "confidence": {"value": 0.95, "unit": "1"}}
-    entries |= {"quantiles": {}, "sides": {}, "method": task.method}
-    (block,) = page.blocks(Source({"monte_carlo": entries}), None)
+    no_runs = xr.Dataset(
+        {"side": ("run", [])} | {v.name: ("run", []) for v in Layout(monte_carlo.Sample).variables}
+    )
+    findings = monte_carlo.MonteCarloResult(no_runs, Path("runs.nc"), task.method)
+    (block,) = page.blocks(Source({}), SimpleNamespace(findings={"monte_carlo": findings}))
     assert plain_line(block.line) == f"The random overloads were run {words}."
 
 

@@ -43,8 +43,8 @@ from chainunit.drives.motor import T_RATED
 from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
 from chainunit.reading.results import InUnit, as_data
-from chainunit.reading.text import entry, number
-from chainunit.report import blocks, terminal
+from chainunit.reading.text import number
+from chainunit.report import terminal
 from chainunit.report.cited import cited
 from chainunit.study import config, run
 from chainunit.study.analyses import all_analyses
@@ -63,7 +63,7 @@ from chainunit.study.relay import CLASSES, MULTIPLE, class_holding, relay_trip, 
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import _with_class_of_all_starts, run_study
-from chainunit.study.sections import Coupling
+from chainunit.study.sections import Coupling, Run, SoftStart, StarDelta, Starter
 from chainunit.study.start_runs import StartNumbers, from_angle
 from chainunit.study.starts import StartAnalysis, StartFindings
 from chainunit.study.torques import quasi_static_peak
@@ -908,27 +908,28 @@ def test_a_relay_of_a_star_delta_starter_has_its_place():
 
 def test_the_order_names_the_starter():
     """The least rated current of an inverter stood in a note only, and a soft starter nowhere."""
-    starter = {
-        "inverter.boost": entry(0.05, "1", "percent"),
-        "soft_start.voltage": entry(0.5, "1", "percent"),
-        "soft_start.time": entry(1.0, "s"),
-        "star_delta.time": entry(3.0, "s"),
-    }
+    starter = Starter(
+        inverter=dataclasses.replace(Starter().inverter, boost=0.05),
+        soft_start=SoftStart(voltage=0.5, time=1.0),
+        star_delta=StarDelta(time=3.0),
+    )
     numbers = {"inverter_current": 45.4, "frequency": 50.3, "speed": 156.8}
-    result = {"run": {"ramp": entry(2.0, "s")}, "starter": starter}
+    study = SimpleNamespace(plate=None)
     order = SizedDrive(
         None, False, "crank", None, False, inverter=OrderedInverter(InUnit(49.1, "A"), "a start")
     )
 
     def said(start):
         of_drive = DriveNumbers(**dict.fromkeys(Layout(DriveNumbers).names) | numbers)
-        lines = _starter(blocks.Source(result | {"start": start}), order, cited(order), cited(of_drive))
+        drive = SimpleNamespace(start=start, starter=starter)
+        study.config = SimpleNamespace(drive=drive, run=Run(crank_speed=3.0, ramp=2.0))
+        lines = _starter(study, order, cited(order), cited(of_drive))
         return "; ".join(map(terminal.plain_line, lines))
 
     assert said("soft") == "soft starter, 50 % voltage, 1 s"
     # delta is for the voltage of the supply; the order did not name the winding
     for voltage, winding, other in ((400.0, "400/690 V", "230/400 V"), (480.0, "480/830 V", "280/480 V")):
-        result["motor"] = {"rated_voltage": entry(voltage, "V")}
+        study.plate = SimpleNamespace(nameplate=SimpleNamespace(voltage=voltage))
         assert said("star-delta").startswith(
             f"star-delta starter, 3 s in star; motor winding {winding}, in delta at the {voltage:g} V of the supply "
             f"(one of {other}, "
@@ -945,7 +946,6 @@ def test_the_order_names_the_starter():
     assert said("inverter") == inverter
     numbers["inverter_current"] = None
     assert said("inverter") == "inverter, boost 5 %, ramp 2 s"
-    del result["starter"]
     assert said("direct") == ""
 
 

@@ -12,7 +12,6 @@ from chainunit.capabilities.static_inertia import CAPABILITY, StaticInertiaAnaly
 from chainunit.machines.api import ChainUnitMachine
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.machine import Machine
-from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
@@ -57,9 +56,8 @@ def test_a_machine_that_turns_slowly_has_the_same_torque(name):
 
 
 def said(findings):
-    study = SimpleNamespace(findings={"static_inertia": findings})
-    values = {name: {"value": getattr(findings, name), "unit": "N.m"} for name in ("machine", "static")}
-    blocks = CAPABILITY.answer(Source({"static_inertia": values}), study).end
+    study = SimpleNamespace(findings={"static_inertia": findings}, driver_noun="crank")
+    blocks = CAPABILITY.answer(study).end
     return [plain_line(block.line) for block in blocks]
 
 

@@ -13,11 +13,12 @@ from ...reading.text import number
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report import linkage
+from ...report.cited import cited, quantity_rows
 from ...report.motion import DrawnLink
 from ...report.turn import angle_axis
 from ...study.arrays import stretches
 from ...study.record import StudyRecord
-from .analysis import BladeFindings, Cutting
+from .analysis import BladeFindings
 from .motion import ENDS, edge
 
 PICTURE = "blade_path.png"
@@ -26,8 +27,10 @@ _EDGE = DrawnLink("edge", ENDS, "heavy")
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the blade."""
-    yield b.Table(s.rows(Cutting, "blade", digits=4), title="The blade over a turn at constant speed")
-    yield _figure(study, BladeFindings.of_study(study))
+    findings = BladeFindings.of_study(study)
+    rows = quantity_rows(cited(findings, "findings.blade").numbers, study.driver_noun, digits=4)
+    yield b.Table(rows, title="The blade over a turn at constant speed")
+    yield _figure(study, findings)
 
 
 def _polyline(links: tuple[DrawnLink, ...], places: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:

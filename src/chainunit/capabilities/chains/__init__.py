@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from ...report.blocks import Source
 from ...report.capability import AnswerBlocks, Capability, Contents
 from ...study.analysis import Analysis
 from ...study.record import StudyRecord
@@ -42,11 +41,11 @@ class ChainsCapability(Capability):
         title = "Chains and two bars"
         return {"chains": Contents(title, page.blocks, page.PICTURES.files, "chain", "constant_speed")}
 
-    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+    def answer(self, study: StudyRecord) -> AnswerBlocks:
         """The speeds to avoid."""
         from .page import speeds_to_avoid
 
-        return AnswerBlocks(warnings=speeds_to_avoid(s))
+        return AnswerBlocks(warnings=speeds_to_avoid(study))
 
 
 CAPABILITY = ChainsCapability()

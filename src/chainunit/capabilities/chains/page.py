@@ -5,20 +5,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.cited import cited, number
-from ...report.lines import Line, join, line
+from ...report.cited import cited, exact, number
+from ...report.lines import Aside, Line, Number, filled, join, line
 from ...report.pictures import Pictures
 from ...report.style import WIDE
 from ...study.quantiles import HIGH
 from ...study.record import StudyRecord
-from .result import ChainResult
+from .result import ChainResult, CriticalSpeed, SpeedNumbers
 
 PICTURES = Pictures()
 CERTAIN = 0.02
@@ -46,54 +46,68 @@ _ORDERS = (
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Text, tables and figure."""
-    chain = s.result["chain"]
+    chain = ChainResult.of_study(study)
+    x = cited(chain, "findings.chain")
     lead = (
-        "The organs are chains of {=chain.rods_of_wall} rods in the wall and {=chain.rods_of_web} in the web. The "
-        "crank turns at constant speed. {=chain.starts} runs start at different crank angles and last "
-        "{=chain.turns} turns each. Where rods go slack, the motion may be chaotic, and no single peak is a "
-        "prediction. Each turn of each run has one peak; the tables show the median and a quantile of these peaks."
+        "The organs are chains of {} rods in the wall and {} in the web. The crank turns at constant speed. {} runs "
+        "start at different crank angles and last {} turns each. Where rods go slack, the motion may be chaotic, and "
+        "no single peak is a prediction. Each turn of each run has one peak; the tables show the median and a "
+        "quantile of these peaks."
     )
-    yield b.Text(s.line(lead), "lead", "long")
-    if not chain["avoid"] and len(chain["sweep"]) > 1:
-        ends = f"{{chain.sweep.0.speed}} to {{chain.sweep.{len(chain['sweep']) - 1}.speed}}"
-        yield b.Text(s.line(f"No speed to avoid from {ends}."), "fine")
-    x = cited(ChainResult.of_study(study), "findings.chain")
-    yield _own_speed(s, x)
+    yield b.Text(filled(lead, *map(exact, (x.walls, x.webs, x.starts, x.turns))), "lead", "long")
+    if not chain.avoid and len(chain.speeds) > 1:
+        ends = number(x.speeds[0].speed), number(x.speeds[-1].speed)
+        yield b.Text(filled("No speed to avoid from {} to {}.", *ends), "fine")
+    yield _own_speed(x)
     slack = {
         side: join(
-            s.line(f"{{chain.slack_by_rod.{side}.{k}.rod}}: {{chain.slack_by_rod.{side}.{k}}}")
-            for k, rod in enumerate(rods)
-            if rod["value"] > 0.0
+            filled("{}: {}", rod.rod, number(rod.share))
+            for rod in rods
+            if (number(rod.share).value or 0.0) > 0.0
         )
-        for side, rods in chain["slack_by_rod"].items()
+        for side, rods in x.slack_by_rod.items()
     }
     if any(slack.values()):
         rows = tuple(b.TableRow((side, slack_rods or "none")) for side, slack_rods in slack.items())
         yield b.Table(rows, title="Rods that go slack, share of the time", numeric=False)
-    if len(chain["sweep"]) > 1:
-        yield _sweep(s, x)
-    if chain["critical_speeds"]:
-        yield from _critical(s, chain, study)
-    yield from PICTURES.figures(s, study)
+    if len(chain.speeds) > 1:
+        yield _sweep(x)
+    if chain.critical:
+        yield from _critical(chain, x)
+    yield from PICTURES.figures(study)
 
 
-def speeds_to_avoid(s: b.Source) -> Iterator[b.Judgement]:
+def speeds_to_avoid(study: StudyRecord) -> Iterator[b.Judgement]:
     """A warning for each range of speeds that the crank should avoid; none without chains."""
-    chain = s.result.get("chain", {})
-    sweep = chain.get("sweep", ())
-    for i, band in enumerate(chain.get("avoid", ())):
-        path = f"chain.avoid.{i}"
-        end = f" to {{{path}.to}}" if band["to"] != band["from"] else ""
-        ends = ", where the sweep begins" if band["from"] == sweep[0]["speed"] else ""
-        ends += ", where the sweep ends" if end and band["to"] == sweep[-1]["speed"] else ""
-        yield b.Judgement("warning", s.line(f"Avoid {{{path}.from}}{end}{ends}: {{{path}.why}}."))
+    chain = ChainResult.found_in(study)
+    if chain is None:
+        return
+    for band, x in zip(chain.avoid, cited(chain, "findings.chain").avoid, strict=True):
+        speeds = number(x.low) if band.low == band.high else filled("{} to {}", number(x.low), number(x.high))
+        ends = ", where the sweep begins" if band.low == chain.speeds[0].speed else ""
+        is_last = band.high == chain.speeds[-1].speed and band.high != band.low
+        ends += ", where the sweep ends" if is_last else ""
+        yield b.Judgement("warning", filled("Avoid {}{}: {}.", speeds, ends, x.why))
 
 
-def _own_speed(s: b.Source, x: ChainResult) -> b.Table:
-    def cell(name: str) -> Line:
-        return s.estimate(f"chain.own_speed.{name}", certain=CERTAIN) if name else ""
+def _estimate(x: SpeedNumbers, name: str, unknown: str = "starts differ") -> Line:
+    """A number and its interval, unless that is narrow; `unknown` if the starts differ too much for an interval."""
+    size: Number = number(getattr(x, name))
+    if not hasattr(x, f"{name}_from"):
+        return size
+    least, most = (number(getattr(x, f"{name}_{end}")) for end in ("from", "to"))
+    if least.value is None or most.value is None:
+        return unknown
+    if most.value - least.value <= CERTAIN * abs(size.value or 0.0):
+        return size
+    return line(size, Aside(filled("{} to {}", least, most)))
 
-    rows = [b.TableRow((title, *map(cell, names))) for title, names in _OWN]
+
+def _own_speed(x: ChainResult) -> b.Table:
+    rows = [
+        b.TableRow((title, *(_estimate(x.own, name) if name else "" for name in names)))
+        for title, names in _OWN
+    ]
     if number(x.resonance).value is not None:
         rows += [
             b.TableRow(("resonance of an organ, crank speed", number(x.resonance), "", "")),
@@ -101,78 +115,70 @@ def _own_speed(s: b.Source, x: ChainResult) -> b.Table:
                 ("relative distance of the speed from it (negative: below)", number(x.distance), "", "")
             ),
         ]
-    title = (
-        "Chains and two bars at constant {=chain.own_speed.speed}, {=chain.starts} starts of {=chain.turns} turns; "
-        "in brackets: the interval of {=chain.confidence} confidence"
-    )
-    quantile = s.line("chains, {=chain.quantile} of turns")
+    title = "Chains and two bars at constant {}, {} starts of {} turns; in brackets: the interval of {} confidence"
+    sizes = map(exact, (x.own.speed, x.starts, x.turns, x.confidence))
+    quantile = filled("chains, {} of turns", exact(x.quantile))
     heads = b.heads("peaks of single turns", "chains, median", quantile, "two bars")
-    return b.Table(tuple(rows), heads, title=s.line(title))
+    return b.Table(tuple(rows), heads, title=filled(title, *sizes))
 
 
-def _sweep(s: b.Source, x: ChainResult) -> b.Table:
-    columns = {
+def _sweep(x: ChainResult) -> b.Table:
+    quantile = exact(x.quantile)
+    columns: dict[str, Line] = {
         "crank_torque_median": "crank torque: median",
-        "crank_torque_high": "crank torque: {=chain.quantile} quantile",
+        "crank_torque_high": filled("crank torque: {} quantile", quantile),
         "two_bar_crank_torque": "crank torque: two bars",
         "rocker_torque_median": "rocker torque: median",
-        "rocker_torque_high": "rocker torque: {=chain.quantile} quantile",
+        "rocker_torque_high": filled("rocker torque: {} quantile", quantile),
         "two_bar_rocker_torque": "rocker torque: two bars",
         "snatch_median": "snatch: median",
-        "snatch_high": "snatch: {=chain.quantile} quantile",
+        "snatch_high": filled("snatch: {} quantile", quantile),
         "slack_time": "share of the time with a slack rod",
     }
-
-    def cell(i: int, name: str) -> Line:
-        return s.estimate(f"chain.sweep.{i}.{name}", unknown="-", certain=CERTAIN)
-
     rows = (
-        b.TableRow((number(numbers.speed), *(cell(i, name) for name in columns)))
-        for i, numbers in enumerate(x.speeds)
+        b.TableRow((number(numbers.speed), *(_estimate(numbers, name, "-") for name in columns)))
+        for numbers in x.speeds
     )
     title = (
-        "Chains and two bars over the crank speed; in brackets, where the starts differ: the interval of "
-        "{=chain.confidence} confidence; -: they differ too much for one"
+        "Chains and two bars over the crank speed; in brackets, where the starts differ: the interval of {} "
+        "confidence; -: they differ too much for one"
     )
-    return b.Table(
-        tuple(rows), b.heads("crank speed", *map(s.line, columns.values())), title=s.line(title), form="long"
-    )
+    heads = b.heads("crank speed", *columns.values())
+    return b.Table(tuple(rows), heads, title=filled(title, exact(x.confidence)), form="long")
 
 
-def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iterator[b.Block]:
+def _critical(chain: ChainResult, x: ChainResult) -> Iterator[b.Block]:
     """Critical crank speeds: all of them in a table, those within the sweep in a sentence."""
-    path = "chain.critical_speeds"
-    places: dict[float, dict[float, int]] = {}
-    for i, entry in enumerate(chain["critical_speeds"]):
-        places.setdefault(entry["mode"]["value"], {})[entry["order"]["value"]] = i
+    modes: dict[int, dict[int, CriticalSpeed]] = {}
+    for speed, shown in zip(chain.critical, x.critical, strict=True):
+        modes.setdefault(speed.mode, {})[speed.order] = shown
     rows = (
         b.TableRow(
             (
-                s.line(f"mode {{={path}.{next(iter(by_order.values()))}.mode}}"),
-                *(s.number(f"{path}.{i}.speed") for i in by_order.values()),
+                filled("mode {}", exact(next(iter(by_order.values())).mode)),
+                *(number(shown.speed) for shown in by_order.values()),
             )
         )
-        for by_order in places.values()
+        for by_order in modes.values()
     )
-    orders = (s.line(f"order {{={path}.{i}.order}}") for i in next(iter(places.values())).values())
+    orders = (filled("order {}", exact(shown.order)) for shown in next(iter(modes.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
-    result = ChainResult.of_study(study)
     inside = [
-        s.line(f"{{{path}.{places[speed.mode][speed.order]}.speed}} (mode {speed.mode}, order {speed.order})")
-        for speed in sorted(result.within_speeds(), key=lambda speed: speed.speed)
+        line(number(modes[speed.mode][speed.order].speed), f" (mode {speed.mode}, order {speed.order})")
+        for speed in sorted(chain.within_speeds(), key=lambda speed: speed.speed)
     ]
     if inside:
         yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
 
 
 @PICTURES.declare(lambda study: len(ChainResult.of_study(study).speeds) > 1, "chain_sweep.png")
-def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _over_speed(study: StudyRecord) -> fig.Figure:
     """Torques of chains and two bars, and the share of the time with a slack rod, over the crank speed."""
     result = ChainResult.of_study(study)
-    rows = result.speeds
+    x, rows = cited(result, "findings.chain"), result.speeds
     speed = np.array([n.speed for n in rows])
-    x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
+    over = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
     # the least distance of 5 % keeps labels apart on a narrow screen, too
     labels: list[fig.Item] = [
         fig.Mark(
@@ -212,11 +218,13 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Chains and two bars over the crank speed",
         "Peaks of rocker torque and crank torque in a turn over the crank speed, chains and two bars, and below the "
         "share of the time in which a rod is slack; speeds to avoid are shaded, critical speeds are lines.",
-        fig.stacked(x, panels),
-        s.line(
-            "The crank turns at constant speed; {=chain.starts} starts of {=chain.turns} turns each. Shaded: speeds "
-            f"to avoid; dash-dotted: the speed of normal running; thin lines: critical speeds. {_ORDERS} Two bars do "
-            "not go slack: their curve shows the share of the time in which the mean pull of a bar is negative."
+        fig.stacked(over, panels),
+        filled(
+            "The crank turns at constant speed; {} starts of {} turns each. Shaded: speeds to avoid; dash-dotted: "
+            f"the speed of normal running; thin lines: critical speeds. {_ORDERS} Two bars do not go slack: their "
+            "curve shows the share of the time in which the mean pull of a bar is negative.",
+            exact(x.starts),
+            exact(x.turns),
         ),
         heights=(1.1, 1.1, 0.65),
     )

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from ...reading.text import number
+from ...reading.text import number as number_words
 from ...report import blocks as b
-from ...report.lines import Line, join, line
+from ...report.cited import cited, exact, number, table
+from ...report.lines import Line, filled, join, line
 from ...study.record import StudyRecord
 from ...study.relay import TRIPS_AT
 from .analysis import CheckFindings
 from .coupling import CHOSEN, CouplingCandidate
 from .row import CheckRow
 
-_COUPLINGS = "checks.flexible_coupling.candidates"
+PATH = "findings.checks"
+"""Place of the checks in the result of a study."""
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -25,7 +27,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if not rows:
         return
     if coupling is not None and coupling.candidates:
-        yield _coupling_to_order(s, coupling.candidates)
+        x = cited(coupling, f"{PATH}.flexible_coupling").candidates
+        yield _coupling_to_order(coupling.candidates, x[0])
     lead = (
         "Each row is a check by the clause or source {place}: the value of the run, the limit, and the share "
         "of the limit that is used. A check passes at 100 % use at most. docs/checks.md has each formula "
@@ -40,70 +43,64 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield b.Text(lead.format(place="whose number stands behind it"), "lead", "sheet")
     heads = b.heads("check", "value", "limit", "used")
     title = "Checks by clause"
-    noted = tuple(b.TableRow(_cells(s, row, k), _note(s, row, k)) for k, row in enumerate(rows))
+    pairs = list(zip(rows, cited(findings, PATH).rows, strict=True))
+    noted = tuple(b.TableRow(_cells(s, row, x), _note(s, row, x)) for row, x in pairs)
     yield b.Table(noted, heads, title=title, note_title="clause, formula, numbers", form="long")
     laws = dict.fromkeys((row.clause, row.formula) for row in rows)
     places = {law: f"[{place}]" for place, law in enumerate(laws, 1)}
-    by_place = tuple(
-        b.TableRow((*_cells(s, row, k), places[row.clause, row.formula])) for k, row in enumerate(rows)
-    )
+    by_place = tuple(b.TableRow((*_cells(s, row, x), places[row.clause, row.formula])) for row, x in pairs)
     used = b.Column("used", of_text=True)
     yield b.Table(by_place, (*heads[:3], used, *b.heads("by")), title=title, form="sheet")
     for (clause, formula), place in places.items():
         yield b.Text(f"{place} {clause}. {formula}", "note", "sheet")
     if coupling is not None and coupling.candidates:
-        yield _tried_couplings(s, coupling.candidates)
-    short = tuple(b.TableRow(_cells(s, row, k)) for k, row in enumerate(rows))
+        x = cited(coupling, f"{PATH}.flexible_coupling").candidates
+        yield _tried_couplings(coupling.candidates, x)
+    short = tuple(b.TableRow(_cells(s, row, x)) for row, x in pairs)
     yield b.Table(short, heads, title=title, form="short")
 
 
-def _cells(s: b.Source, row: CheckRow, k: int) -> tuple[b.Cell, ...]:
-    """A check in a line: its title, its value, its limit and the used share."""
-    path = f"checks.rows.{k}"
-    title = line(s.words(f"{path}.of"), ": ", s.words(f"{path}.title"))
-    limit = line("at least " if row.at_least else "at most ", s.number(f"{path}.limit"))
+def _cells(s: b.Source, row: CheckRow, x: CheckRow) -> tuple[b.Cell, ...]:
+    """A check, cited as `x`, in a line: its title, its value, its limit and the used share."""
+    limit = line("at least " if row.at_least else "at most ", number(x.limit))
     # of a check that fails, a number that the result does not have is not finite
-    value, used = ("-", "-") if row.holds else ("never", number(math.inf, "1", "used"))
-    share = b.Share(s.number(f"{path}.utilisation", over=not row.holds, none=used))
-    return title, s.number(row.number, none=value), limit, share
+    value, used = ("-", "-") if row.holds else ("never", number_words(math.inf, "1", "used"))
+    share = b.Share(number(x.utilisation, over=not row.holds, none=used))
+    return line(x.of, ": ", x.title), s.number(row.number, none=value), limit, share
 
 
-def _note(s: b.Source, row: CheckRow, k: int) -> Line:
+def _note(s: b.Source, row: CheckRow, x: CheckRow) -> Line:
     """Clause, formula, and the numbers of the formula."""
-    numbers = join([line(f"{symbol} = ", s.number(path)) for symbol, path in row.numbers.items()])
-    path = f"checks.rows.{k}"
-    law = (s.words(f"{path}.clause"), ". ", s.words(f"{path}.formula"))
-    return line(*law, " (", *numbers, ")") if numbers else line(*law)
+    numbers = join([line(f"{symbol} = ", s.number(place)) for symbol, place in row.numbers.items()])
+    law = filled("{}. {}", x.clause, x.formula)
+    return line(law, " (", numbers, ")") if numbers else law
 
 
-def _coupling_to_order(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Text:
-    """The flexible coupling of the catalogues that is checked."""
+def _coupling_to_order(candidates: Sequence[CouplingCandidate], x: CouplingCandidate) -> b.Text:
+    """The flexible coupling of the catalogues that is checked, cited as `x`."""
     best = candidates[0]
-    phrases = {
-        "{#.designation}": True,
-        "order number {#.order_number}": bool(best.order_number),
-        "price {=#.price:10}": best.price is not None,
-        "TKN {=#.rated_torque}, CTdyn {=#.stiffness}, psi {=#.damping}": True,
-    }
+    data = map(exact, (x.rated_torque, x.stiffness, x.damping))
+    parts = [
+        line(x.designation),
+        *([line("order number ", x.order_number)] if best.order_number else []),
+        *([line("price ", exact(x.price, 10))] if best.price is not None else []),
+        filled("TKN {}, CTdyn {}, psi {}", *data),
+    ]
     begin = "Flexible coupling to order" if best.verdict == CHOSEN else "Flexible coupling that does not fit"
-    count = f"{sum(x.fits for x in candidates)} of the {len(candidates)} of the catalogues fit"
-    text = ", ".join(phrase for phrase, is_said in phrases.items() if is_said)
-    return b.Text(s.line(f"{begin}: {text}: {{#.reason}} ({count}).".replace("#", f"{_COUPLINGS}.0")))
+    count = (
+        f"{sum(candidate.fits for candidate in candidates)} of the {len(candidates)} of the catalogues fit"
+    )
+    return b.Text(filled(f"{begin}: {{}}: {{}} ({count}).", join(parts), x.reason))
 
 
-def _tried_couplings(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Table:
-    """The flexible couplings of the catalogues."""
+def _tried_couplings(candidates: Sequence[CouplingCandidate], x: Sequence[CouplingCandidate]) -> b.Table:
+    """The flexible couplings of the catalogues, cited as `x`."""
     rows = []
-    for k, candidate in enumerate(candidates):
-        path = f"{_COUPLINGS}.{k}"
-        name, verdict, order, why = (
-            s.words(f"{path}.{x}") for x in ("designation", "verdict", "order_number", "reason")
-        )
-        price = s.number(f"{path}.price", as_given=True, none="-")
-        share = s.number(
-            f"{path}.checks.{candidate.checks.index(candidate.hardest)}.utilisation", over=not candidate.fits
-        )
-        rows.append(b.TableRow((name, verdict, share, price, order, why)))
+    for candidate, shown in zip(candidates, x, strict=True):
+        hardest = shown.checks[candidate.checks.index(candidate.hardest)]
+        share, price = number(hardest.utilisation, over=not candidate.fits), exact(shown.price, none="-")
+        texts = shown.order_number, shown.reason
+        rows.append(b.TableRow((shown.designation, shown.verdict, share, price, *texts)))
     heads = b.heads("flexible coupling", "verdict", "largest share", "price", "order number", "reason")
     title = "Flexible couplings of the catalogues"
     return b.Table(tuple(rows), heads, numeric=False, title=title, form="long")
@@ -111,12 +108,13 @@ def _tried_couplings(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.
 
 def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """What was not checked, and why."""
-    rows = tuple(
-        b.TableRow((s.words(f"checks.not_checked.{k}.what"), s.words(f"checks.not_checked.{k}.why")))
-        for k in range(len(CheckFindings.of_study(study).not_checked))
+    return table(
+        cited(CheckFindings.of_study(study), PATH).not_checked,
+        ("not checked", lambda row: row.what),
+        ("why", lambda row: row.why),
+        numeric=False,
+        form="long",
     )
-    if rows:
-        yield b.Table(rows, b.heads("not checked", "why"), numeric=False, form="long")
 
 
 def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -125,19 +123,23 @@ def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if relay is None:
         return
     never = "trips in running" if relay.before >= TRIPS_AT * relay.setting else "never"
-    rows = []
-    for name in relay.classes:
-        path, suits = f"checks.relay.classes.{name}", "yes" if name in relay.suitable else "no"
-        trip = s.number(f"{path}.stall_trip", none=never)
-        rows.append(b.TableRow((name, s.number(f"{path}.shortest"), trip, suits)))
-    lead = s.line(
-        "The start heats a relay as much as 7.2 times its setting of {checks.relay.setting} does in "
-        "{checks.relay.start_seconds}; the rotor may be locked for {checks.relay.stall_time}. A cold relay surely "
-        "holds up to the least trip time of its class, and the slowest relay of the class has to trip before that "
-        "time. The tolerance of IEC 60034-1 permits a motor 20 % more current, with 1.44 times the heat of a start."
+    x = cited(relay, f"{PATH}.relay")
+    heat = (
+        "The start heats a relay as much as 7.2 times its setting of {} does in {}; the rotor may be locked for {}. "
+        "A cold relay surely holds up to the least trip time of its class, and the slowest relay of the class has to "
+        "trip before that time. The tolerance of IEC 60034-1 permits a motor 20 % more current, with 1.44 times the "
+        "heat of a start."
     )
+    lead = filled(heat, number(x.setting), number(x.start_seconds), number(x.stall_time))
     yield b.Text(lead, "lead", "long")
-    heads = b.heads(
-        "class", "holds up to", "trips with the rotor locked", "lets the start through, and protects"
+    yield from table(
+        x.classes.items(),
+        ("class", lambda row: row[0]),
+        ("holds up to", lambda row: number(row[1].shortest)),
+        ("trips with the rotor locked", lambda row: number(row[1].stall_trip, none=never)),
+        (
+            "lets the start through, and protects",
+            lambda row: "yes" if row[0] in relay.suitable else "no",
+        ),
+        form="long",
     )
-    yield b.Table(tuple(rows), heads, form="long")

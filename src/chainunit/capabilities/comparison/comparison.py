@@ -10,9 +10,9 @@ from typing import Any
 from ... import __version__
 from ...core.descriptions import USUAL_DRIVER
 from ...core.errors import printable
-from ...core.quantities import variables
+from ...core.quantities import finite, quantity, variables
 from ...reading.result_entries import as_mapping
-from ...reading.text import entry
+from ...reading.results import GIVEN, InUnit, part, result
 from ...study.line.shaft import ShaftAnswers
 from ...study.measures import Answers
 from ...study.sections import all_choices, all_sections
@@ -25,63 +25,130 @@ _RUNS = {"answers": "", "shaft": ": driveline", "pins": ": forces in the bearing
 """By table of a result with numbers of each run, what follows the title of the run."""
 _RANDOM = "monte_carlo.quantiles"
 
-Numbers = dict[str, Any]
-"""Entries of a result by their dotted names."""
+_TEXTS = ("unit", "kind", "title")
+"""The texts beside the value of a number."""
+
+Numbers = dict[str, InUnit]
+"""Numbers of a run by their dotted names."""
 
 
-def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
-    """The comparison, ready for JSON.
+@result
+class ComparedFile:
+    """A result that is compared."""
 
-    - ``verdict``: by result, those on its model and its motor
-    - ``warnings``: by result, the warnings of a kind and of runs of which the other has none
-    - ``given``: by the name in a study file, the given values that differ, those of `a` and of `b`
-    - ``runs``: by run, each measure of both: the values, the difference b - a, and its share of a's, of
-      values that are not negative and no shares themselves
-    - ``only``: the runs, events and measures that one of them has alone
-    """
+    file: str = part("its file")
+    title: str = part("title of the study")
+    status: str = part("whether the study is complete")
+    chainunit: str = part("version of chainunit")
+
+
+@result
+class ComparedVerdict:
+    """A verdict of one result."""
+
+    holds: str = part("whether it holds")
+    text: str = part("the verdict in words")
+
+
+@result
+class ComparedValue:
+    """A given value that differs, by "a" and "b"; a number is an `InUnit`."""
+
+    values: Mapping[str, Any] = part("the value, or null", unit=GIVEN, inline=True)
+    origins: Mapping[str, str] = part("its origin, by origin_a and origin_b", inline=True)
+
+
+@result
+class ComparedMeasure:
+    """A measure of a run of both results."""
+
+    title: str = part("the measure in words")
+    a: InUnit = part("its value in A")
+    b: InUnit = part("its value in B")
+    difference: InUnit = part("difference B - A")
+    relative: InUnit = part("share of A's, of values that are not negative and no shares themselves")
+
+
+@result
+class ComparedRun:
+    """A run of both results."""
+
+    title: str = part("the run in words")
+    measures: Mapping[str, ComparedMeasure] = part("the measures with a value in one of them")
+
+
+@result
+class Alone:
+    """What one result has alone."""
+
+    runs: list[str] = part("runs, by their titles")
+    events: list[str] = part("events, by their names")
+    measures: list[str] = part("measures of runs of both, in words")
+
+
+@result
+class StudyComparison:
+    """Two results of studies side by side: the content of comparison.json."""
+
+    chainunit: str = part("version of chainunit")
+    files: Mapping[str, ComparedFile] = part("both results", inline=True)
+    verdict: Mapping[str, Mapping[str, ComparedVerdict]] = part("by result, the verdicts on model and motor")
+    warnings: Mapping[str, list[str]] = part(
+        "by result, the warnings of a kind and of runs of which the other has none"
+    )
+    given: Mapping[str, ComparedValue] = part("by the name in a study file, the given values that differ")
+    given_equal: float = quantity("1", "number of given values that are the same")
+    runs: Mapping[str, ComparedRun] = part("the runs of both")
+    only: Mapping[str, Alone] = part("by result, what it has alone")
+
+
+def compare(a: StoredResult, b: StoredResult) -> StudyComparison:
+    """Both results side by side."""
     results, pairs = {"a": a, "b": b}, (SIDES, SIDES[::-1])
-    values = {side: dict(_given_values(result.data)) for side, result in results.items()}
-    runs = {side: _runs(result.data) for side, result in results.items()}
-    drivers = {result.words("driver") or USUAL_DRIVER for result in results.values()}
+    values = {side: dict(_given_values(stored.data)) for side, stored in results.items()}
+    runs = {side: _runs(stored.data) for side, stored in results.items()}
+    drivers = {stored.words("driver") or USUAL_DRIVER for stored in results.values()}
     descriptions = _words(drivers.pop() if len(drivers) == 1 else "driver")
     names = dict.fromkeys([*values["a"], *values["b"]])
     different = [name for name in names if not _same(*(values[side].get(name) for side in SIDES))]
-    origins = {side: as_mapping(result.data.get("origins")) for side, result in results.items()}
-    return {
-        "chainunit": __version__,
-        **{side: _head(result) for side, result in results.items()},
-        "verdict": {side: _verdicts(result) for side, result in results.items()},
-        "warnings": {side: _warnings_alone(results[side], results[other]) for side, other in pairs},
-        "given": {
-            name: {side: values[side].get(name) for side in SIDES}
-            | {f"origin_{side}": origins[side].get(name, "") for side in SIDES}
+    origins = {side: as_mapping(stored.data.get("origins")) for side, stored in results.items()}
+    return StudyComparison(
+        __version__,
+        {side: _head(stored) for side, stored in results.items()},
+        {side: _verdicts(stored) for side, stored in results.items()},
+        {side: _warnings_alone(results[side], results[other]) for side, other in pairs},
+        {
+            name: ComparedValue(
+                {side: values[side].get(name) for side in SIDES},
+                {f"origin_{side}": origins[side].get(name, "") for side in SIDES},
+            )
             for name in different
         },
-        "given_equal": entry(len(names) - len(different), "1"),
-        "runs": {
-            run: {"title": _title(b, run), "measures": _measures(numbers, runs["b"][run], descriptions)}
+        float(len(names) - len(different)),
+        {
+            run: ComparedRun(_title(b, run), _measures(numbers, runs["b"][run], descriptions))
             for run, numbers in runs["a"].items()
             if run in runs["b"]
         },
-        "only": {
+        {
             side: _alone(results[side], runs[side], results[other], runs[other], descriptions)
             for side, other in pairs
         },
-    }
+    )
 
 
-def _head(result: StoredResult) -> dict[str, str]:
-    names = ("title", "status", "chainunit")
-    return {"file": printable(str(result.file), 500)} | {name: result.words(name) for name in names}
+def _head(stored: StoredResult) -> ComparedFile:
+    texts = (stored.words(name) for name in ("title", "status", "chainunit"))
+    return ComparedFile(printable(str(stored.file), 500), *texts)
 
 
-def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
-    """The verdicts of a result by their subject: whether it holds, and the text."""
+def _verdicts(stored: StoredResult) -> dict[str, ComparedVerdict]:
+    """The verdicts of a result by their subject."""
     verdicts = {}
-    for name, verdict in as_mapping(result.data.get("verdict")).items():
-        texts = {key: as_mapping(verdict).get(key) for key in ("holds", "text")}
-        if all(isinstance(text, str) for text in texts.values()):
-            verdicts[printable(name)] = {key: printable(str(text), 2000) for key, text in texts.items()}
+    for name, verdict in as_mapping(stored.data.get("verdict")).items():
+        texts = [as_mapping(verdict).get(key) for key in ("holds", "text")]
+        if all(isinstance(text, str) for text in texts):
+            verdicts[printable(name)] = ComparedVerdict(*(printable(str(text), 2000) for text in texts))
     return verdicts
 
 
@@ -91,9 +158,9 @@ def _warnings_alone(mine: StoredResult, theirs: StoredResult) -> list[str]:
     return [text for subject, text in _warnings(mine) if subject not in others]
 
 
-def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
+def _warnings(stored: StoredResult) -> Iterator[tuple[Any, str]]:
     """The warnings of a result, each with its code and its runs. An earlier version has a kind in place of a code."""
-    warnings = result.data.get("warnings")
+    warnings = stored.data.get("warnings")
     for warning in map(as_mapping, warnings if isinstance(warnings, list) else []):
         if isinstance(text := warning.get("text"), str):
             code = str(warning.get("code") or warning.get("kind")).replace(" ", "-")
@@ -104,12 +171,14 @@ def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
 
 
 def _leaves(node: Any, path: str) -> Iterator[tuple[str, Any]]:
-    """All values below a node with their dotted names: entries, switches, lists of numbers, and texts."""
-    if isinstance(node, Mapping) and not _is_entry(node):
+    """All values below a node with their dotted names: numbers in their units, switches, lists of numbers, texts."""
+    if _is_entry(node):
+        yield path.removeprefix("."), InUnit(*(node.get(key, "") for key in ("value", *_TEXTS)))
+    elif isinstance(node, Mapping):
         for name, below in node.items():
             yield from _leaves(below, f"{path}.{printable(name)}")
     elif node is not None:
-        plain = isinstance(node, bool | Mapping) or (isinstance(node, list) and all(map(_is_finite, node)))
+        plain = isinstance(node, bool) or (isinstance(node, list) and all(map(_is_finite, node)))
         yield path.removeprefix("."), node if plain else printable(str(node))
 
 
@@ -121,7 +190,7 @@ def _is_entry(node: Any) -> bool:
     """Whether a node is a number or a list of numbers with its unit, as this program writes it."""
     if not isinstance(node, Mapping) or "value" not in node:
         return False
-    value, texts = node["value"], (node.get("unit"), node.get("kind", ""))
+    value, texts = node["value"], (node.get("unit"), *(node.get(key, "") for key in _TEXTS[1:]))
     numbers = value if isinstance(value, list) else [] if value is None else [value]
     return all(map(_is_finite, numbers)) and all(
         isinstance(text, str) and text.isprintable() for text in texts
@@ -143,8 +212,8 @@ def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _same(a: Any, b: Any) -> bool:
-    if all(_is_entry(x) and _is_finite(x["value"]) for x in (a, b)):
-        return a["unit"] == b["unit"] and math.isclose(a["value"], b["value"], rel_tol=_ROUNDING)
+    if all(isinstance(x, InUnit) and _is_finite(x.value) for x in (a, b)):
+        return a.unit == b.unit and math.isclose(a.value, b.value, rel_tol=_ROUNDING)
     return bool(a == b)
 
 
@@ -158,7 +227,7 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
         run: {
             name: value
             for name, value in _leaves(node, "")
-            if _is_entry(value) and not isinstance(value["value"], list)
+            if isinstance(value, InUnit) and not isinstance(value.value, list)
         }
         for run, node in nodes.items()
     }
@@ -180,40 +249,40 @@ def _spoken(name: str, descriptions: Mapping[str, str]) -> str:
     return ", ".join(filter(None, (descriptions.get(first, first.replace("_", " ")), rest)))
 
 
-def _title(result: StoredResult, run: str) -> str:
+def _title(stored: StoredResult, run: str) -> str:
     table, _, name = run.rpartition(".")
-    return "overloads at random" if run == _RANDOM else result.title_of(name) + _RUNS.get(table, "")
+    return "overloads at random" if run == _RANDOM else stored.title_of(name) + _RUNS.get(table, "")
 
 
 # -- both
 
 
-def _measures(a: Numbers, b: Numbers, descriptions: Mapping[str, str]) -> dict[str, Any]:
+def _measures(a: Numbers, b: Numbers, descriptions: Mapping[str, str]) -> dict[str, ComparedMeasure]:
     """The measures that both have and that have a value in one of them."""
     return {
-        name: {"title": _spoken(name, descriptions)} | _pair(a[name], b[name])
+        name: _measure(_spoken(name, descriptions), a[name], b[name])
         for name in a
-        if name in b and not a[name]["value"] is b[name]["value"] is None
+        if name in b and not a[name].value is b[name].value is None
     }
 
 
-def _pair(a: Mapping[str, Any], b: Mapping[str, Any]) -> dict[str, Any]:
+def _measure(title: str, a: InUnit, b: InUnit) -> ComparedMeasure:
     """Two values of a measure with their difference and its share, which are None where they have no meaning."""
-    kind, unit = str(a.get("kind", "")), a["unit"]
-    is_share = kind in ("percent", "dip", "used")
-    of_difference = "points" if is_share else "difference" if unit == "K" else kind
-    difference = share = None
-    if a["value"] is not None and b["value"] is not None and unit == b["unit"]:
-        difference = b["value"] - a["value"]
+    is_share = a.kind in ("percent", "dip", "used")
+    of_difference = "points" if is_share else "difference" if a.unit == "K" else a.kind
+    x, y, difference, share = finite(a.value), finite(b.value), None, None
+    if x is not None and y is not None and a.unit == b.unit:
+        difference = y - x
         # a temperature in K has a zero that says nothing, and so has a value of either sign
-        if a["value"] > 0.0 and b["value"] >= 0.0 and unit != "K" and not is_share:
-            share = difference / a["value"]
-    return {
-        "a": entry(a["value"], unit, kind),
-        "b": entry(b["value"], b["unit"], str(b.get("kind", ""))),
-        "difference": entry(difference, unit, of_difference),
-        "relative": entry(share, "1", "percent"),
-    }
+        if x > 0.0 and y >= 0.0 and a.unit != "K" and not is_share:
+            share = difference / x
+    return ComparedMeasure(
+        title,
+        InUnit(x, a.unit, a.kind),
+        InUnit(y, b.unit, b.kind),
+        InUnit(difference, a.unit, of_difference),
+        InUnit(share, "1", "percent"),
+    )
 
 
 def _alone(
@@ -222,24 +291,24 @@ def _alone(
     theirs: StoredResult,
     others: Mapping[str, Numbers],
     descriptions: Mapping[str, str],
-) -> dict[str, list[str]]:
+) -> Alone:
     """The runs, events and measures that one result has and the other has not."""
     missing = [run for run in runs if run not in others]
     # the further numbers of a run go with the run
     whole = {run.removeprefix("answers.") for run in missing if run.startswith("answers.")}
     events = as_mapping(theirs.data.get("event"))
-    return {
-        "runs": [
+    return Alone(
+        [
             _title(mine, run)
             for run in missing
             if run.startswith("answers.") or run.split(".")[-1] not in whole
         ],
-        "events": [name for name in as_mapping(mine.data.get("event")) if name not in events],
-        "measures": [
+        [name for name in as_mapping(mine.data.get("event")) if name not in events],
+        [
             f"{_title(mine, run)}: {_spoken(name, descriptions)}"
             for run, numbers in runs.items()
             if run in others
             for name in numbers
             if name not in others[run]
         ],
-    }
+    )

@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import check_kind
+from ...reading.results import as_data
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.stored_result import StoredResult, read_result, stored_result
 from ...work.progress import TaskProgress
+from .comparison import StudyComparison
 from .page import TASK
 
 
-class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], Mapping[str, Any]]):
+class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], StudyComparison]):
     """Two results side by side, A and B. Its `repr` shows the verdicts of both and the given values that differ."""
 
     _task = TASK
@@ -24,10 +26,10 @@ class ComparisonResult(ReportedResult[tuple[StoredResult, StoredResult], Mapping
         """Each measure of each run that both have: the values of both, the difference, and its share."""
         return {
             f"{run.removeprefix('answers.')}.{name}": {
-                column: measure[column] for column in ("a", "b", "difference", "relative")
+                column: entry for column, entry in as_data(measure).items() if column != "title"
             }
-            for run, entries in self._outcome["runs"].items()
-            for name, measure in entries["measures"].items()
+            for run, compared in self._outcome.runs.items()
+            for name, measure in compared.measures.items()
         }
 
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.cited import cited, number
-from ...report.lines import Line, line
+from ...report.cited import cited, exact, number
+from ...report.lines import Line, Number, filled, line
 from ...study.record import StudyRecord
 from .analysis import EnergyFindings, MotorComparison, Year
 from .motor_class import MotorClass, words_of
@@ -25,56 +25,56 @@ def _titles(study: StudyRecord) -> dict[str, str]:
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the energy."""
     findings = EnergyFindings.of_study(study)
-    yield b.Text(_lead(s, findings))
+    x, years = (
+        cited(findings, "findings.energy"),
+        exact(cited(study.config.table("usage"), "given.usage").years),
+    )
+    yield b.Text(_lead(findings, x))
     motor_class = MotorClass.found_in(study)
     if motor_class is not None:
         yield b.Text(words_of(motor_class))
     titles = _titles(study)
-    yield _places(s, findings, titles)
+    yield _places(findings, x, titles)
     yield _figure(findings, titles)
-    yield _year(s, findings)
-    if findings.comparison is not None:
-        yield b.Text(s.line(verdict_words(findings.comparison)))
+    yield _year(findings, x, years)
+    if findings.comparison is not None and x.comparison is not None:
+        yield b.Text(verdict(findings.comparison, x.comparison, years))
     else:
         yield b.Text(f"No other motor is compared: {findings.no_other}.", "note")
 
 
-def _lead(s: b.Source, findings: EnergyFindings) -> Line:
-    text = "The drive takes {energy.own.mean.electric} in the mean, {energy.own.energy} in a year of {energy.running}"
-    year = findings.own.year
+def _lead(findings: EnergyFindings, x: EnergyFindings) -> Line:
+    text, year, shown = "The drive takes {} in the mean, {} in a year of {}", findings.own.year, x.own.year
+    sizes = [number(x.own.mean.electric), number(shown.energy), number(x.running)]
     if year.energy_per_tonne is not None:
-        text += ", {energy.own.energy_per_tonne} a tonne"
+        text, sizes = text + ", {} a tonne", [*sizes, number(shown.energy_per_tonne)]
     if year.cost is not None:
-        text += "; a year costs {energy.own.cost}"
+        text, sizes = text + "; a year costs {}", [*sizes, number(shown.cost)]
     if year.co2 is not None:
-        text += (
-            " and stands for {energy.own.co2} of CO2" if year.cost is not None else "; CO2: {energy.own.co2}"
-        )
-    return s.line(text + ". Its winding, as warm as this duty makes it, is at {energy.own.temperature}.")
+        text += " and stands for {} of CO2" if year.cost is not None else "; CO2: {}"
+        sizes.append(number(shown.co2))
+    text += ". Its winding, as warm as this duty makes it, is at {}."
+    return filled(text, *sizes, number(x.own.temperature))
 
 
 def _known(findings: EnergyFindings) -> list[str]:
     return [name for name in PLACES if getattr(findings.own.mean, name) is not None]
 
 
-def _places(s: b.Source, findings: EnergyFindings, titles: Mapping[str, str]) -> b.Table:
-    loads = list(findings.loads)
-    paths = ["energy.own.mean", *(f"energy.loads.{name}" for name in loads)]
+def _places(findings: EnergyFindings, x: EnergyFindings, titles: Mapping[str, str]) -> b.Table:
+    columns = [x.own.mean, *(load.losses for load in x.loads.values())]
     rows = [
-        b.TableRow((titles[name], *(s.number(f"{path}.{name}") for path in paths)))
+        b.TableRow((titles[name], *(number(getattr(losses, name)) for losses in columns)))
         for name in ("electric", *_known(findings), "missing")
     ]
-    heads: list[Line] = ["mean"]
-    for name in loads:
-        path = f"energy.loads.{name}"
-        heads.append(
-            line(f"{name}: ", s.number(f"{path}.share"), " of the time, feed x ", s.number(f"{path}.factor"))
-        )
-    return b.Table(tuple(rows), b.heads("", *heads), title="Electric power, and where it goes")
+    heads = (
+        filled("{}: {} of the time, feed x {}", name, number(load.share), number(load.factor))
+        for name, load in x.loads.items()
+    )
+    return b.Table(tuple(rows), b.heads("", "mean", *heads), title="Electric power, and where it goes")
 
 
-def _year(s: b.Source, findings: EnergyFindings) -> b.Table:
-    x = cited(findings, "findings.energy")
+def _year(findings: EnergyFindings, x: EnergyFindings, years: Number) -> b.Table:
     motors = list(filter(None, (findings.own, findings.other)))
     shown = list(filter(None, (x.own, x.other)))
     rows = [
@@ -87,36 +87,27 @@ def _year(s: b.Source, findings: EnergyFindings) -> b.Table:
         ("price of the motor", [number(motor.price) for motor in shown]),
     ):
         rows += [b.TableRow((heading, *sizes))] if any(size.value is not None for size in sizes) else []
-    title = s.line("A year, and a life of {=usage.years} years")
+    title = filled("A year, and a life of {} years", years)
     return b.Table(tuple(rows), b.heads("", *(motor.motor for motor in shown)), title=title)
 
 
-def verdict_words(comparison: MotorComparison) -> str:
-    """Which motor takes less, and whether it pays: a text with the paths of its numbers in braces."""
+def verdict(comparison: MotorComparison, x: MotorComparison, years: Number) -> Line:
+    """Which motor takes less, and whether it pays in a life of so many `years`."""
     if not comparison.better:
         return "Both motors take the same energy."
-    text = (
-        "{energy.comparison.better} takes less: it saves {energy.comparison.saving} a year, "
-        "{energy.comparison.saving_share}"
-    )
+    text = filled("{} takes less: it saves {} a year, {}", x.better, number(x.saving), number(x.saving_share))
     if comparison.cost_saving is not None:
-        text += ", a cost of {energy.comparison.cost_saving} a year"
+        text = filled("{}, a cost of {} a year", text, number(x.cost_saving))
+    after, saved = number(x.pays_after), number(x.life_saving)
     if comparison.pays_after is None or comparison.life_saving is None:
         price = "" if comparison.cost_saving is not None else " and price (of a kWh)"
-        text += f"; payback: enter motor_price and other_price{price}"
-    elif comparison.pays_after <= 0.0:
-        text += "; it costs no more than the other, and saves {energy.comparison.life_saving} over the life"
-    elif comparison.life_saving >= 0.0:
-        text += (
-            "; it has paid after {energy.comparison.pays_after} years, and saves {energy.comparison.life_saving} "
-            "over the life"
-        )
-    else:
-        text += (
-            "; it would have paid after {energy.comparison.pays_after} years, and so does not pay in a life of "
-            "{=usage.years} years"
-        )
-    return text + "."
+        return line(text, f"; payback: enter motor_price and other_price{price}.")
+    if comparison.pays_after <= 0.0:
+        return filled("{}; it costs no more than the other, and saves {} over the life.", text, saved)
+    if comparison.life_saving >= 0.0:
+        return filled("{}; it has paid after {} years, and saves {} over the life.", text, after, saved)
+    late = "{}; it would have paid after {} years, and so does not pay in a life of {} years."
+    return filled(late, text, after, years)
 
 
 def _figure(findings: EnergyFindings, titles: Mapping[str, str]) -> fig.Figure:

@@ -81,9 +81,9 @@ class FlywheelFindings(Findings):
     @property
     def rows(self) -> list[tuple[str, Wheel, str]]:
         """For each flywheel, by inertia: its description, its run, and its place in the result."""
-        runs = [(wheel, f"flywheels.compared.{i}") for i, wheel in enumerate(self.wheels)]
+        runs = [(wheel, f"findings.flywheels.compared.{i}") for i, wheel in enumerate(self.wheels)]
         if self.least is not None and self.least not in self.wheels:
-            runs.append((self.least, "flywheels.least"))
+            runs.append((self.least, "findings.flywheels.least"))
         return [
             (self._words(wheel), wheel, path) for wheel, path in sorted(runs, key=lambda run: run[0].flywheel)
         ]

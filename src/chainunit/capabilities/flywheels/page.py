@@ -7,10 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core.quantities import Layout
-from ...reading.text import number
+from ...reading.text import number as number_words
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.lines import Line, capital, line
+from ...report.cited import cited, exact, number
+from ...report.given_numbers import motor_title, rating, ratio
+from ...report.lines import capital, filled, join, line
 from ...report.style import LINES
 from ...report.turn import angle_axis, last_turn
 from ...study.readings import crank_motion
@@ -18,6 +20,8 @@ from ...study.record import StudyRecord
 from .analysis import FlywheelFindings
 from .wheel import FlywheelAnswers, Wheel
 
+PATH = "findings.flywheels"
+"""Place of the flywheels in the result of a study."""
 PICTURE = "flywheel.png"
 _HEADS = {
     "start_time": "start",
@@ -36,10 +40,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the flywheels."""
     findings = FlywheelFindings.of_study(study)
     if study.config.plate is not None:
-        nameplate = ", ".join(f"{{motor.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
-        yield b.Text(s.line(f"Motor: {{motor.title}}, rated {nameplate}; ratio {{machine.ratio:4}}."))
+        x = rating(study.config.plate)
+        sizes = map(number, (x.rated_power, x.rated_speed, x.rated_torque, x.rated_current))
+        motor = motor_title(study.config.plate), join(sizes), number(ratio(study), 4)
+        yield b.Text(filled("Motor: {}, rated {}; ratio {}.", *motor))
     if findings.wheels:
-        yield _table(s, findings)
+        yield _table(study, findings)
         if findings.is_retuned:
             yield b.Text(
                 "The gains of the speed control are tuned to the inertia with each flywheel, except gains that the "
@@ -51,25 +57,30 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield _figure(study, findings, running)
 
 
-def _table(s: b.Source, findings: FlywheelFindings) -> b.Table:
-    rows = findings.rows
+def _table(study: StudyRecord, findings: FlywheelFindings) -> b.Table:
+    x = cited(findings, PATH)
+    rows = [(remark, cited(wheel.answers, path)) for remark, wheel, path in findings.rows]
     columns = [
         v
         for v in Layout(FlywheelAnswers).variables
-        if v.name in _HEADS and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in rows)
+        if v.name in _HEADS
+        and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in findings.rows)
     ]
-    heads = (b.Column(v.described(s.driver), _HEADS[v.name]) for v in columns)
-
-    def head(remark: str, path: str) -> Line:
-        return line(s.number(f"{path}.flywheel"), f" ({remark})" if remark else "")
-
+    heads = (b.Column(v.described(study.driver_noun), _HEADS[v.name]) for v in columns)
     return b.Table(
         tuple(
-            b.TableRow((head(remark, path), *(s.number(f"{path}.{v.name}", none="-") for v in columns)))
-            for remark, _, path in rows
+            b.TableRow(
+                (
+                    line(number(answers.flywheel), f" ({remark})" if remark else ""),
+                    *(number(getattr(answers, v.name), none="-") for v in columns),
+                )
+            )
+            for remark, answers in rows
         ),
         (b.Column("flywheel"), *heads),
-        title=s.line("Flywheels on the motor's shaft; permitted ripple of the speed {=flywheels.permitted}"),
+        title=line(
+            "Flywheels on the motor's shaft; permitted ripple of the speed ", exact(x.permitted_fluctuation)
+        ),
     )
 
 
@@ -95,7 +106,7 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
             current: run[f"motor.{drive.motor.current}"].values,
         }
         for axis, y in series.items():
-            items[axis].append(fig.Curve(number(wheel.flywheel, "kg.m2"), *last_turn(angle, y), look))
+            items[axis].append(fig.Curve(number_words(wheel.flywheel, "kg.m2"), *last_turn(angle, y), look))
     panels = [fig.Panel(angle_axis(study), axis, tuple(curves)) for axis, curves in items.items()]
     return fig.Figure(
         "flywheel",

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ...core.files import write_file
 from ...core.inputs import file_bytes
+from ...reading.results import as_data
 from ...report import blocks as b
-from ...report.lines import Name
+from ...report.cited import cited, number
+from ...report.lines import Name, filled, line
 from ...report.task import Task, Writer
 from ...study.record import LOAD_CYCLE
-from .sizing import CYCLE, RUN, STUDY, sizing_of, values_of
+from .sizing import CYCLE, RUN, STUDY, HandedDrive, by_name, sizing_of
 from .studied import read_study
 from .tables import CANDIDATES, CHECKS, candidates_csv, checks_csv, cycle_csv
 
@@ -21,7 +23,7 @@ from .tables import CANDIDATES, CHECKS, candidates_csv, checks_csv, cycle_csv
 class Handover(NamedTuple):
     """The files for other programs, ready to be written: the content of sizing.json, and those beside it by name."""
 
-    sizing: Mapping[str, Any]
+    sizing: HandedDrive
     files: Mapping[str, bytes]
 
 
@@ -50,38 +52,35 @@ def hand_over(results: Path) -> Handover:
 
 def handover_report(handover: Handover) -> b.Report:
     """The report on a handover."""
-    s = b.Source(handover.sizing)
+    x = cited(handover.sizing)
     return b.Report(
         "Files for other programs",
         "Handover",
-        handover.sizing,
-        tuple(_opening(s)),
-        (b.Section("left-open", "What the files leave open", tuple(_left_open(s))),),
-        source=s.line("{source} · chainunit {chainunit}"),
+        as_data(handover.sizing),
+        tuple(_opening(x)),
+        (b.Section("left-open", "What the files leave open", tuple(_left_open(handover.sizing))),),
+        source=filled("{} · chainunit {}", x.source, x.chainunit),
         opening_title="What the files say",
     )
 
 
-def _opening(s: b.Source) -> Iterator[b.Block]:
-    unknown, rows = s.result["open"], []
-    for name, value in values_of(s.result):
-        if name not in unknown:
-            shown = s.words(name) if isinstance(value, str) else s.number(name, digits=5)
-            rows.append(b.TableRow((Name(name), shown)))
-    title = s.line("{title}: ") if s.result["title"] else ()
-    yield b.Text((*title, f"{len(rows)} values of the drive are in sizing.json."))
-    yield b.Table(
-        tuple(rows), b.heads("name", "value"), numeric=False, title="Values of the drive", form="long"
+def _opening(x: HandedDrive) -> Iterator[b.Block]:
+    rows = tuple(
+        b.TableRow((Name(name), value if isinstance(value, str) else number(value, 5)))
+        for name, value in by_name(x.parts)
+        if name not in x.open
     )
+    title = line(x.title, ": ") if x.title else ()
+    yield b.Text(line(title, f"{len(rows)} values of the drive are in sizing.json."))
+    yield b.Table(rows, b.heads("name", "value"), numeric=False, title="Values of the drive", form="long")
 
 
-def _left_open(s: b.Source) -> Iterator[b.Block]:
-    unknown = s.result["open"]
-    if not unknown:
+def _left_open(sizing: HandedDrive) -> Iterator[b.Block]:
+    if not sizing.open:
         yield b.Text("Every value of sizing.json is known.")
         return
     yield b.Text("The study does not know these values of sizing.json; fill them in:")
-    rows = tuple(b.TableRow((Name(name),)) for name in unknown)
+    rows = tuple(b.TableRow((Name(name),)) for name in sizing.open)
     yield b.Table(rows, b.heads("name"), numeric=False, title="Names without a value")
 
 

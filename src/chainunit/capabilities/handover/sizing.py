@@ -15,7 +15,8 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import printable
-from ...reading.text import entry
+from ...core.quantities import finite
+from ...reading.results import GIVEN, InUnit, part, result
 from ...study.record import LOAD_CYCLE
 from .studied import StudiedDrive
 from .tables import text_of
@@ -34,52 +35,76 @@ _FROM_SI = {"degC": (1.0, -273.15), "%": (100.0, 0.0), "rpm": (30.0 / np.pi, 0.0
 Value = tuple[str, str, float | str | None]
 """A value of the drive: part and name, its unit in sizing.json, and its number in the unit of the result. A text has
 no unit."""
+Parts = Mapping[str, Mapping[str, InUnit | str | None]]
+"""By part of the drive and name, its values."""
 
 
-def sizing_of(study: StudiedDrive) -> dict[str, Any]:
-    """The content of sizing.json."""
-    parts: dict[str, dict[str, Any]] = {}
+@result
+class Message:
+    """A warning or a note of the study."""
+
+    kind: str = part("warning or note")
+    text: str = part("the sentences")
+
+
+@result
+class HandedDrive:
+    """The numbers of a sized drive: the content of sizing.json."""
+
+    chainunit: str = part("version of chainunit")
+    title: str = part("title of the study")
+    project: str = part("its project")
+    author: str = part("its author")
+    revision: str = part("its revision")
+    date: str = part("its date")
+    source: str = part("its result")
+    parts: Parts = part("the values by the parts of the drive", unit=GIVEN, inline=True)
+    verdict: Mapping[str, str] = part("the verdicts on model and motor")
+    messages: list[Message] = part("warnings and notes")
+    files: Mapping[str, str] = part("what the files beside it say")
+    open: list[str] = part("names of the values that the study does not know")
+
+
+def sizing_of(study: StudiedDrive) -> HandedDrive:
+    """The numbers of the drive of a study."""
+    parts: dict[str, dict[str, InUnit | str | None]] = {}
     for name, unit, value in _values(study):
-        part, _, key = name.partition(".")
+        drive_part, _, key = name.partition(".")
         factor, offset = _FROM_SI.get(unit, (1.0, 0.0))
-        if unit:
-            number = factor * value + offset if isinstance(value, float) else None
-            parts.setdefault(part, {})[key] = entry(number, unit)
-        else:
-            parts.setdefault(part, {})[key] = value
+        size = factor * value + offset if isinstance(value, float) else None
+        text = value if isinstance(value, str) else None
+        parts.setdefault(drive_part, {})[key] = InUnit(size, unit) if unit else text
     written = datetime.fromtimestamp(int(study.result.file.stat().st_mtime), UTC)
     with suppress(ValueError):  # of a study without a date in ISO 8601
         written = datetime.combine(date.fromisoformat(study.text("report/date")), time(), UTC)
-    return {
-        "chainunit": __version__,
-        "title": study.text("title"),
-        "project": study.text("report/project"),
-        "author": study.text("report/author"),
-        "revision": study.text("report/revision"),
-        "date": written.isoformat(),
-        "source": str(study.result.file),
-        **parts,
-        "verdict": {name: study.text(f"verdict/{name}/text") for name in ("model", "motor")},
-        "messages": [
-            {"kind": kind, "text": printable(message["text"], 2000)}
+    return HandedDrive(
+        __version__,
+        study.text("title"),
+        study.text("report/project"),
+        study.text("report/author"),
+        study.text("report/revision"),
+        written.isoformat(),
+        str(study.result.file),
+        parts,
+        {name: study.text(f"verdict/{name}/text") for name in ("model", "motor")},
+        [
+            Message(kind, printable(message["text"], 2000))
             for kind in ("warning", "note")
             for message in study.rows(f"{kind}s")
             if isinstance(message.get("text"), str)
         ],
-        "files": _FILES,
-        "open": [name for name, value in values_of(parts) if not _is_known(value)],
-    }
+        _FILES,
+        [
+            name
+            for name, value in by_name(parts)
+            if value is None or (isinstance(value, InUnit) and finite(value.value) is None)
+        ],
+    )
 
 
-def values_of(sizing: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def by_name(parts: Parts) -> Iterator[tuple[str, InUnit | str | None]]:
     """The dotted names of the values of all parts, and the values."""
-    for name, part in sizing.items():
-        if isinstance(part, Mapping) and name not in ("verdict", "files"):
-            yield from ((f"{name}.{value}", part[value]) for value in part)
-
-
-def _is_known(value: Any) -> bool:
-    return value is not None and (isinstance(value, str) or value["value"] is not None)
+    return ((f"{name}.{key}", value) for name, values in parts.items() for key, value in values.items())
 
 
 def _values(study: StudiedDrive) -> Iterator[Value]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from ...core.files import write_file
@@ -11,8 +11,8 @@ from ...reading.text import shown_in
 from ...recordings.measurands import MEASURANDS
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.cited import as_name, cited, number, table
-from ...report.lines import Line, Name, line
+from ...report.cited import as_name, cited, exact, number, source_line, table
+from ...report.lines import Name, filled, join, line
 from ...report.task import Task, Writer
 from ...study.config import Config
 from ...study.study_file import toml_text
@@ -25,28 +25,25 @@ FILE = "identified.toml"
 
 def identification_report(machine: IdentifiedMachine) -> b.Report:
     """The report on an identification."""
-    summary = summary_of(machine)
-    result, x = as_data(summary), cited(summary)
-    s = b.Source(result)
-    config = machine.config
+    summary, config = summary_of(machine), machine.config
+    x = cited(summary)
     with shown_in(config.units):
-        figures = tuple(_figures(s, machine))
         return b.Report(
             config.title or "Identified machine",
             "Identification from recordings",
-            result,
-            tuple(_opening(s, machine)),
+            as_data(summary),
+            tuple(_opening(x, machine)),
             (
-                b.Section("numbers", "Identified numbers", tuple(_numbers(s, x))),
-                b.Section("limits", "Limits of these recordings", tuple(_limits(s, x))),
-                b.Section("courses", "Measured and simulated", (*_residuals(s), *figures)),
-                b.Section("runs", "Recordings and sensors", tuple(_runs(s, x))),
+                b.Section("numbers", "Identified numbers", tuple(_numbers(x))),
+                b.Section("limits", "Limits of these recordings", tuple(_limits(x))),
+                b.Section("courses", "Measured and simulated", (*_residuals(x), *_figures(machine, summary))),
+                b.Section("runs", "Recordings and sensors", tuple(_runs(x))),
             ),
-            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            source=source_line(x.heading),
             failure=str(machine.failure or ""),
             units=config.units,
             opening_title="The answer",
-            status=result["status"],
+            status=summary.status,
         )
 
 
@@ -79,18 +76,19 @@ TASK: Task[Config, IdentifiedMachine] = Task(
 )
 
 
-def _opening(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
+def _opening(x: IdentificationSummary, machine: IdentifiedMachine) -> Iterator[b.Block]:
     if machine.is_described:
-        determined = s.line("These recordings determine {=told} of {=sought} numbers.")
-        yield b.Judgement(
-            "good", line("The model describes the recordings: their residuals are noise. ", determined)
+        sentence = (
+            "The model describes the recordings: their residuals are noise. These recordings determine {} of {} "
+            "numbers."
         )
+        yield b.Judgement("good", filled(sentence, exact(x.told), exact(x.sought)))
     else:
         sentence = "The model does not describe the recordings. No number is determined, and"
         yield b.Judgement("bad", f"{sentence} {FILE} is not written.")
     for sentence in sentences(machine):
         yield b.Judgement("warning", f"{sentence}.")
-    for remark in s.lines("remarks"):
+    for remark in x.remarks:
         yield b.Judgement("remark", line(remark, "."))
 
 
@@ -122,7 +120,7 @@ def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
         )
 
 
-def _numbers(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
+def _numbers(x: IdentificationSummary) -> Iterator[b.Block]:
     if not x.is_described:
         yield from _suspects(x)
 
@@ -166,9 +164,9 @@ def _meaning() -> b.Text:
     )
 
 
-def _limits(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
-    for direction in s.lines("blind"):
-        yield b.Judgement("partly", line("No trace in any column: ", direction, "."))
+def _limits(x: IdentificationSummary) -> Iterator[b.Block]:
+    for change in x.blind:
+        yield b.Judgement("partly", line("No trace in any column: ", change.text, "."))
     yield from table(
         x.combinations,
         ("sum", lambda combination: combination.text),
@@ -176,47 +174,39 @@ def _limits(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
         ("standard deviation", lambda combination: number(combination.deviation, 2)),
         title="Sums that are determined, of numbers that are not",
     )
-    before, is_whole = number(x.told_at_start), number(x.told).value == number(x.sought).value
-    title = "Further runs, the best first; without one {=told_at_start} numbers can be determined"
+    before, is_whole = exact(x.told_at_start), number(x.told).value == number(x.sought).value
+    title = "Further runs, the best first; without one {} numbers can be determined"
     yield from table(
         x.proposals,
         ("further run", lambda proposal: proposal.words),
         ("deviations fall by the factor", lambda proposal: number(proposal.factor, 3)),
-        ("numbers determined", lambda proposal: number(proposal.determined, as_given=True)),
+        ("numbers determined", lambda proposal: exact(proposal.determined)),
         title="Further runs that would make the numbers sharper, the best first"
         if is_whole
-        else s.line(title),
+        else filled(title, before),
     )
     more = (number(proposal.determined).value for proposal in x.proposals)
     if x.proposals and not is_whole and all((size or 0) <= (before.value or 0) for size in more):
         yield b.Text("None of these runs determines one more number: weigh a part, or know a gain.", "note")
 
 
-def _residuals(s: b.Source) -> Iterator[b.Block]:
-    rows = []
-    for k, residual in enumerate(s.result["residuals"]):
-        path = f"residuals.{k}"
-        orders = line(
-            s.number(f"{path}.orders.0.order", as_given=True),
-            " (",
-            s.number(f"{path}.orders.0.amplitude", digits=2),
-            ")",
-        )
-        rows.append(
-            b.TableRow(
-                (
-                    line(Name(residual["run"]), " ", Name(residual["column"])),
-                    s.number(f"{path}.noise", digits=3),
-                    s.number(f"{path}.statistic", digits=3, over=not residual["is_noise"]),
-                    s.number(f"{path}.limit", digits=3),
-                    orders,
-                )
-            )
-        )
-    yield b.Table(
-        tuple(rows),
-        b.heads(
-            "column", "noise, in parts of the stated one", "orders of the crank", "limit", "largest order"
+def _residuals(x: IdentificationSummary) -> Iterator[b.Block]:
+    yield from table(
+        x.residuals,
+        ("column", lambda residual: line(as_name(residual.run), " ", as_name(residual.column))),
+        ("noise, in parts of the stated one", lambda residual: number(residual.noise, 3)),
+        (
+            "orders of the crank",
+            lambda residual: number(residual.statistic, 3, over=not residual.is_noise),
+        ),
+        ("limit", lambda residual: number(residual.limit, 3)),
+        (
+            "largest order",
+            lambda residual: filled(
+                "{} ({})",
+                exact(residual.largest_orders[0].order),
+                number(residual.largest_orders[0].amplitude, 2),
+            ),
         ),
         title="Residuals",
     )
@@ -228,21 +218,20 @@ def _residuals(s: b.Source) -> Iterator[b.Block]:
     )
 
 
-def _figures(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
+def _figures(machine: IdentifiedMachine, summary: IdentificationSummary) -> Iterator[b.Block]:
     for run, file in zip(machine.plan.runs, pictures(machine), strict=True):
         panels = []
-        for name, course in s.result["courses"][run.name].items():
-            y, simulated = (course[key]["value"] for key in ("measured", "simulated"))
-            steady = "angle" in course
-            x = course["angle" if steady else "time"]["value"]
-            angle = fig.Axis("crank angle", "rad", step=45.0) if steady else fig.Axis("time", "s")
+        steady = machine.is_steady(run.name)
+        for name, course in summary.courses[run.name].items():
+            x, measured, simulated = (values.value for values in course.values())
+            place = fig.Axis("crank angle", "rad", step=45.0) if steady else fig.Axis("time", "s")
             panels.append(
                 (
                     fig.Panel(
-                        angle,
+                        place,
                         fig.Axis(MEASURANDS[name].description, MEASURANDS[name].unit),
                         (
-                            fig.Curve("measured", x, y, 1, marker="o", has_line=False),
+                            fig.Curve("measured", x, measured, 1, marker="o", has_line=False),
                             fig.Curve("simulated", x, simulated, 0),
                         ),
                     ),
@@ -252,28 +241,23 @@ def _figures(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
             f"course-{run.name}",
             f"Run {run.name}: measured and simulated",
             "Means in classes of the crank angle over all turns of the run."
-            if machine.is_steady(run.name)
+            if steady
             else "Means in classes of time.",
             tuple(panels),
             file=file,
         )
 
 
-def _listed(names: Sequence[str]) -> list[Line]:
-    """Names with commas between them."""
-    return [part for k, name in enumerate(names) for part in (", " if k else "", Name(name))]
-
-
-def _runs(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
+def _runs(x: IdentificationSummary) -> Iterator[b.Block]:
     yield from table(
         x.runs.items(),
         ("run", lambda row: Name(row[0])),
         ("file", lambda row: row[1].file),
         ("duration", lambda row: number(row[1].duration, 4)),
         ("rows a second", lambda row: number(row[1].rate, 4)),
-        ("crank speed", lambda row: number(row[1].crank_speed, as_given=True)),
+        ("crank speed", lambda row: exact(row[1].crank_speed)),
         ("feed", lambda row: row[1].feed),
-        ("columns", lambda row: line(*_listed(s.result["runs"][row[0]]["columns"]))),
+        ("columns", lambda row: join(map(as_name, row[1].columns))),
         title="Recordings",
         numeric=False,
         form="long",
@@ -286,15 +270,6 @@ def _runs(s: b.Source, x: IdentificationSummary) -> Iterator[b.Block]:
         title="Start, clock and sensors, as fitted",
         form="long",
     )
-    yield b.Text(
-        s.line(
-            "The fit took {=fit.rounds} rounds"
-            + (
-                "."
-                if number(x.fit.starts).value == 1.0
-                else "; {=fit.agreeing} of {=fit.starts} starts agree."
-            )
-        ),
-        "fine",
-        "long",
-    )
+    fit, rounds = x.fit, filled("The fit took {} rounds", exact(x.fit.rounds))
+    agree = filled("; {} of {} starts agree.", exact(fit.agreeing), exact(fit.starts))
+    yield b.Text(line(rounds, "." if number(fit.starts).value == 1.0 else agree), "fine", "long")

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ... import __version__
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.cited import as_name, cited, number, table
-from ...report.lines import Name, join, line
+from ...report.lines import Name, filled, join, line
 from ...report.task import Task, Writer
 from ...system.linear import LinearModel
 from .result import NPZ, FrequencyResponse, LinearQuestion, LinearResult, data, find, write_npz
@@ -23,27 +24,27 @@ _MOST_ROWS = 6
 def linear_report(findings: LinearResult) -> b.Report:
     """The report on a linear model."""
     result = data(findings)
-    s = b.Source(result)
-    sections = [b.Section("point", "The point", tuple(_point(cited(findings.linear))))]
+    x = cited(findings)
+    sections = [b.Section("point", "The point", tuple(_point(x.linear)))]
     if findings.responses:
         sections.insert(0, b.Section("bode", "Frequency responses", tuple(_responses(findings))))
     return b.Report(
         f"Linear model: {result['title']}",
         "Linear model",
         result,
-        tuple(_opening(s, findings)),
+        tuple(_opening(findings, x.linear)),
         tuple(sections),
-        source=s.line("{source} · chainunit {chainunit}"),
+        source=filled("{} · chainunit {}", x.source, cited(__version__, "chainunit")),
         opening_title="Poles",
     )
 
 
-def _opening(s: b.Source, findings: LinearResult) -> Iterator[b.Block]:
+def _opening(findings: LinearResult, x: LinearModel) -> Iterator[b.Block]:
     linear = findings.linear
     sizes = ((linear.states, "state"), (linear.inputs, "input"), (linear.outputs, "output"))
     counts = join([f"{len(signals)} {name}{'' if len(signals) == 1 else 's'}" for signals, name in sizes])
-    yield b.Text(line(s.words("description"), "."), form="long")
-    yield b.Text(line("At ", s.words("at"), ": ", counts, "."))
+    yield b.Text(line(x.description, "."), form="long")
+    yield b.Text(filled("At {}: {}.", x.at, counts))
     if not linear.states:
         yield b.Text("The model has no states: its outputs follow the inputs at once, by D alone.")
     elif not linear.poles:
@@ -51,8 +52,8 @@ def _opening(s: b.Source, findings: LinearResult) -> Iterator[b.Block]:
             "warning", "A slope of the states is not defined at this point: there are no poles."
         )
     else:
-        yield from _poles(cited(linear))
-    yield from _bends(linear)
+        yield from _poles(x)
+    yield from _bends(linear, x)
 
 
 def _poles(x: LinearModel) -> Iterator[b.Table]:
@@ -68,14 +69,14 @@ def _poles(x: LinearModel) -> Iterator[b.Table]:
     )
 
 
-def _bends(linear: LinearModel) -> Iterator[b.Block]:
-    for bend, x in zip(linear.bends, cited(linear).bends, strict=True):
+def _bends(linear: LinearModel, x: LinearModel) -> Iterator[b.Block]:
+    for bend, shown in zip(linear.bends, x.bends, strict=True):
         names, more = bend.rows[:_MOST_ROWS], len(bend.rows) - _MOST_ROWS
         rows = line(join(map(Name, names)), f" and {more} more" if more > 0 else "")
         said = (
             line("the slopes by it jump at this point; the matrices have those of one side: ")
             if bend.kink
-            else line("the slopes by it bend within ", number(x.within), " of this point: ")
+            else line("the slopes by it bend within ", number(shown.within), " of this point: ")
         )
         yield b.Judgement("warning", line(Name(bend.by), ": ", said, rows, "."))
 

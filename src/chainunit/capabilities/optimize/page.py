@@ -13,8 +13,8 @@ from ...reading.results import as_data
 from ...reading.text import Units, shown_in
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.cited import cited, number, table
-from ...report.lines import Aside, Line, Name, join, line
+from ...report.cited import cited, exact, number, source_line, table
+from ...report.lines import Aside, Line, Name, filled, join, line
 from ...report.live.page import live_of_config
 from ...report.live_block import Live, LiveMachine
 from ...report.task import Task, Writer
@@ -41,22 +41,21 @@ def optimum_report(
     with shown_in(units):
         machine = best_machine(best, Heading.of(title, file))
         result, x = as_data(machine), cited(machine)
-    s = b.Source(result)
-    sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best, x)))]
+    sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(best, x)))]
     if live:
         sections.append(b.Section("live", "Try it", live))
     if best.met:
-        sections.append(b.Section("binding", "What binds", tuple(_binding(s))))
+        sections.append(b.Section("binding", "What binds", tuple(_binding(x))))
     if best.front:
-        sections.append(b.Section("front", "Two objectives", tuple(_front(s, best, x))))
-    sections.append(b.Section("checks", "Starts and checks", tuple(_checks(s, best, x))))
+        sections.append(b.Section("front", "Two objectives", tuple(_front(best, x))))
+    sections.append(b.Section("checks", "Starts and checks", tuple(_checks(best, x))))
     return b.Report(
         _title(best, title),
         "Search for the best machine",
         result,
-        tuple(_opening(s, best, x)),
+        tuple(_opening(best, x)),
         tuple(sections),
-        source=s.line("Study file: {source} · chainunit {chainunit}"),
+        source=source_line(x.heading),
         units=units,
         opening_title="The answer",
         status="complete" if best.met else "no machine found",
@@ -137,30 +136,25 @@ TASK: Task[Config, OptimizedStudy] = Task(
 )
 
 
-def _opening(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
-    if not best.met:
-        sentences = s.lines("conflict.sentences")
-        yield b.Judgement("bad", sentences[0], items=())
-        for sentence in sentences[1:]:
-            yield b.Text(sentence)
+def _opening(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    if x.conflict is not None:
+        first, *others = x.conflict.sentences
+        yield b.Judgement("bad", first)
+        yield from map(b.Text, others)
         return
     for k, objective in enumerate(best.wishes.objectives):
         sought = x.quantities[objective.name]
-        text = line(
-            f"{objective.name}: ", number(sought.best), ", today ", number(sought.today), _share(sought), "."
-        )
+        values = number(sought.best), number(sought.today), _share(sought)
+        text = filled(f"{objective.name}: {{}}, today {{}}{{}}.", *values)
         yield b.Judgement("good", text) if k == 0 else b.Text(text)
     parts = (
         line(Name(free), " ", number(parameter.best, 5), Aside(line("today ", number(parameter.today, 5))))
         for free, parameter in x.parameters.items()
     )
     yield b.Text(line("The best machine has ", join(parts), "."))
-    for i in range(len(s.result["organs"])):
-        path = f"organs.{i}"
-        text = s.line(f"{{{path}.text}}: the crank turns at {{speed}}")
-        yield b.Judgement(
-            "warning", line(text, s.line(f", and the limit of the best machine is {{{path}.limit}}."))
-        )
+    for organs in x.organs:
+        beyond = "{}: the crank turns at {}, and the limit of the best machine is {}."
+        yield b.Judgement("warning", filled(beyond, organs.words, number(x.speed), number(organs.speed)))
     yield _turns(best)
 
 
@@ -188,19 +182,19 @@ def _turns(best: Best) -> fig.Figure:
     )
 
 
-def _machine(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
+def _machine(best: Best, x: BestMachine) -> Iterator[b.Block]:
     head = "best" if best.met else "nearest"
     yield from table(
         x.parameters.items(),
         ("parameter", lambda row: Name(row[0])),
         ("today", lambda row: number(row[1].today, 5)),
         (head, lambda row: number(row[1].best, 5)),
-        ("least", lambda row: number(row[1].low, as_given=True)),
-        ("largest", lambda row: number(row[1].high, as_given=True)),
+        ("least", lambda row: exact(row[1].low)),
+        ("largest", lambda row: exact(row[1].high)),
         title="Free parameters",
     )
     if best.idle:
-        yield b.Text(s.words("without_effect_words"))
+        yield b.Text(x.without_effect_words)
     limited: list[tuple[Line, WebPull]] = [
         (Name(sought), quantity) for sought, quantity in x.quantities.items()
     ]
@@ -213,27 +207,28 @@ def _machine(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
         ("quantity", lambda row: row[0]),
         ("today", lambda row: number(row[1].today, 4)),
         (head, lambda row: number(row[1].best, 4)),
-        ("least", lambda row: number(row[1].low, as_given=True)),
-        ("largest", lambda row: number(row[1].high, as_given=True)),
+        ("least", lambda row: exact(row[1].low)),
+        ("largest", lambda row: exact(row[1].high)),
         *(() if best.met else (missed,)),
-        title=s.line("Objectives and limits, of a turn at {=speed:4}"),
+        title=line("Objectives and limits, of a turn at ", exact(x.speed, 4)),
     )
     if x.least_pull is not None:
-        yield b.Text(s.line("The web mean pull is the least at crank speeds up to {=slack_free_speed:4}."))
+        pull = "The web mean pull is the least at crank speeds up to {}."
+        yield b.Text(filled(pull, exact(x.slack_free_speed, 4)))
 
 
-def _binding(s: b.Source) -> Iterator[b.Block]:
-    if not s.result["bindings"]:
+def _binding(x: BestMachine) -> Iterator[b.Block]:
+    if not x.bindings:
         yield b.Text("No limit and no bound holds the best machine back.")
-    for binding in s.lines("bindings"):
-        yield b.Text(line(binding, "."))
-    for clearance in s.lines("clearances"):
+    for binding in x.bindings:
+        yield b.Text(line(binding.text, "."))
+    for clearance in x.clearances:
         yield b.Text(
             line("It is as near as the clearance allows to a limit within which it turns: ", clearance, ".")
         )
 
 
-def _front(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
+def _front(best: Best, x: BestMachine) -> Iterator[b.Block]:
     first, second = best.wishes.objectives
     names = best.wishes.names
     yield b.Text(
@@ -263,15 +258,11 @@ def _front(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
     )
 
 
-def _checks(s: b.Source, best: Best, x: BestMachine) -> Iterator[b.Block]:
-    yield b.Text(s.words("starts.text"))
-    yield b.Text(
-        s.line(
-            "{=starts.programs} programs, {=starts.iterations} iterations, {=starts.evaluations} turns computed."
-        ),
-        "fine",
-        form="long",
-    )
-    if best.neighbours is not None:
-        severity: b.Severity = "warning" if best.neighbours.better else "good"
-        yield b.Judgement(severity, s.words("neighbours.text"))
+def _checks(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    yield b.Text(x.starts.text)
+    effort, counts = x.starts.effort, "{} programs, {} iterations, {} turns computed."
+    sizes = map(exact, (effort.programs, effort.iterations, effort.evaluations))
+    yield b.Text(filled(counts, *sizes), "fine", form="long")
+    if x.neighbours is not None:
+        severity: b.Severity = "warning" if best.neighbours and best.neighbours.better else "good"
+        yield b.Judgement(severity, x.neighbours.text)

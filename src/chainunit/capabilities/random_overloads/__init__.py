@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import Field
 
 from ...core.errors import refusal_prefix
-from ...report.blocks import Source, Text
+from ...report.blocks import Text
 from ...report.capability import AnswerBlocks, Capability, Contents
 from ...study.analysis import Analysis
 from ...study.conditions import given, is_above_zero
@@ -81,13 +81,13 @@ class RandomOverloads(Capability):
 
         return {"monte_carlo": Contents("Overloads at random", page.blocks)}
 
-    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+    def answer(self, study: StudyRecord) -> AnswerBlocks:
         """The largest quantile of the crank torque, and how often a run ends badly."""
         if "monte_carlo" not in study.findings:
             return AnswerBlocks()
         from . import page
 
-        return AnswerBlocks(end=[Text(page.summary(s, study))])
+        return AnswerBlocks(end=[Text(page.summary(study))])
 
 
 CAPABILITY = RandomOverloads()

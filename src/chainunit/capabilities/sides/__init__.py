@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from ...report.blocks import Source
 from ...report.capability import AnswerBlocks, Capability, Contents
 from ...report.supplement import Supplement
 from ...study.analysis import Analysis
@@ -30,11 +29,11 @@ class SidesCapability(Capability):
 
         return {"organs": Contents("One side against both", page.blocks, page.PICTURES.files)}
 
-    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+    def answer(self, study: StudyRecord) -> AnswerBlocks:
         """The crank speed up to which two bars stand for chains."""
         from . import page
 
-        return AnswerBlocks(validity=page.up_to_speed(s, study))
+        return AnswerBlocks(validity=page.up_to_speed(study))
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """The organs in motion."""

@@ -8,28 +8,30 @@ from ...core.quantities import Layout, finite
 from ...machines.chain_unit import SIDES
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.cited import cited, number
-from ...report.lines import capital
+from ...report.cited import cited, number, quantity_rows
+from ...report.given_numbers import asked_speed
+from ...report.lines import Line, capital, filled, join, line
 from ...report.pictures import Pictures
 from ...study.load_cases import OverloadFactors
 from ...study.record import StudyRecord
 from ...study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
-from .analysis import Limits, OrganFindings
+from .analysis import OrganFindings, Sides
 
 PICTURES = Pictures()
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Factors, limits and figure."""
-    yield _factors(s, study)
-    yield from _limits(s, study)
-    yield from PICTURES.figures(s, study)
+    x = cited(OrganFindings.of_study(study), "findings.organs")
+    yield _factors(study, x)
+    yield from _limits(study, x)
+    yield from PICTURES.figures(study)
 
 
-def _factors(s: b.Source, study: StudyRecord) -> b.Table:
-    sides = cited(OrganFindings.of_study(study), "findings.organs").overload_factors
+def _factors(study: StudyRecord, x: OrganFindings) -> b.Table:
+    sides = x.overload_factors
     by = f", of {organs}" if (organs := study.drive.machine.in_place) else ""
-    title = s.line("Overload factor, one side against both, at {=run.crank_speed:4}" + by)
+    title = line("Overload factor, one side against both, at ", asked_speed(study), by)
     first = next(iter(sides.values()))
     rows = (
         b.TableRow(
@@ -40,28 +42,33 @@ def _factors(s: b.Source, study: StudyRecord) -> b.Table:
     return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
 
-def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    limits = OrganFindings.of_study(study).limits
-    swing = "Rocker swings from {organs.limits.rocker_extreme_left} to {organs.limits.rocker_extreme_right}; margin "
-    yield b.Text(s.line(swing + "{organs.limits.margin}."), form="short")
+def _limits(study: StudyRecord, x: OrganFindings) -> Iterator[b.Block]:
+    limits = x.limits
+    swing = number(limits.rocker_extreme_left), number(limits.rocker_extreme_right), number(limits.margin)
+    yield b.Text(filled("Rocker swings from {} to {}; margin {}.", *swing), form="short")
     web = "with two bars a web" if study.drive.machine.in_place else "a web"
-    cases = [
-        f"{case}, {web} "
-        + (f"first goes slack at {{organs.limits.{name}}} of the crank" if speed else "is slack at rest")
-        for case, name, speed in (
-            ("with this feed", "slack_speed", limits.slack_speed),
-            ("empty", "slack_speed_empty", limits.slack_speed_empty),
-        )
-        if finite(speed) is not None
-    ]
-    if finite(limits.chain_resonance) is not None:
-        cases.append("the lowest mode of a chain lies near {organs.limits.chain_resonance}")
+    cases, speeds = [], []
+    for case, speed in (
+        ("with this feed", number(limits.slack_speed)),
+        ("empty", number(limits.slack_speed_empty)),
+    ):
+        if speed.value is not None:
+            cases.append(
+                f"{case}, {web} "
+                + ("first goes slack at {} of the crank" if speed.value else "is slack at rest")
+            )
+            speeds += [speed] if speed.value else []
+    mode = number(limits.chain_resonance)
+    if mode.value is not None:
+        cases.append("the lowest mode of a chain lies near {}")
+        speeds.append(mode)
     if cases:
-        yield b.Text(s.line(capital("; ".join(cases)) + "."))
-    yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Limits of the model", form="long")
+        yield b.Text(filled(capital("; ".join(cases)) + ".", *speeds))
+    rows = quantity_rows(limits, none="none")
+    yield b.Table(rows, title="Limits of the model", form="long")
 
 
-def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def up_to_speed(study: StudyRecord) -> Iterator[b.Block]:
     """The crank speeds up to which two bars stand for chains; nothing where no run has two bars."""
     findings, verdict = OrganFindings.found_in(study), study.verdict
     if findings is None or verdict is None:
@@ -72,19 +79,19 @@ def up_to_speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         )
         yield b.Text(sentence, "note", "long")
         return
-    limits = {
-        "crank_torque_speed": "the crank torque is good to 10 % up to {}",
-        "rocker_torque_speed": "the rocker torque up to {}",
-        "slack_speed": "a web goes slack from {} on",
-    }
+    limits = cited(findings, "findings.organs").limits
     parts = [
-        template.format(f"{{organs.limits.{name}}}")
-        for name, template in limits.items()
-        if finite(getattr(findings.limits, name)) is not None
+        filled(template, speed)
+        for template, speed in (
+            ("the crank torque is good to 10 % up to {}", number(limits.crank_torque_speed)),
+            ("the rocker torque up to {}", number(limits.rocker_torque_speed)),
+            ("a web goes slack from {} on", number(limits.slack_speed)),
+        )
+        if speed.value is not None
     ]
     if parts:
-        limits_line = s.line(f"Speed of the crank, for two bars in place of chains: {'; '.join(parts)}.")
-        yield b.Text(limits_line, "note", "long")
+        speeds = line("Speed of the crank, for two bars in place of chains: ", join(parts, "; "), ".")
+        yield b.Text(speeds, "note", "long")
 
 
 _GOOD = {"crank": CRANK_GOOD, "rocker": ROCKER_GOOD_EMPTY}
@@ -96,7 +103,7 @@ _SHADED = (
 
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
-def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _sides(study: StudyRecord) -> fig.Figure:
     sides = OrganFindings.of_study(study).sides
     titles = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 
@@ -127,19 +134,17 @@ def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with each side "
         "alone; the speed of normal running is marked.",
         fig.stacked(x, ((axis, items(of)) for of, axis in axes.items())),
-        s.line(f"{caption}{_crossings(s)}. {_SHADED}"),
+        line(caption, *_crossings(cited(sides, "findings.organs.sides_over_speed")), f". {_SHADED}"),
     )
 
 
-def _crossings(s: b.Source) -> str:
-    """The speeds at which one side alone asks as much as both, as a template; empty where no lines cross."""
-    text = ""
-    for torque, sides in s.result["organs"]["sides_over_speed"]["crossings"].items():
-        path = f"organs.sides_over_speed.crossings.{torque}"
+def _crossings(x: Sides) -> Iterator[Line]:
+    """The speeds at which one side alone asks as much as both; nothing where no lines cross."""
+    for torque, sides in x.crossings.items():
         places = [
-            f"{side} alone at " + " and ".join(f"{{{path}.{side}.{k}}}" for k in range(len(speeds)))
+            line(f"{side} alone at ", join(map(number, speeds), " and "))
             for side, speeds in sides.items()
             if speeds
         ]
-        text += f"; {torque} torque: {', '.join(places)}" if places else ""
-    return text
+        if places:
+            yield line(f"; {torque} torque: ", join(places))

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from ...core.errors import InputError
 from ...machines.machine import Machine
-from ...report.blocks import Source
 from ...report.capability import AnswerBlocks, Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
@@ -117,11 +116,11 @@ class SizingCapability(Capability):
 
         return {self.name: Contents("The drive", page.blocks, before="runs")}
 
-    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+    def answer(self, study: StudyRecord) -> AnswerBlocks:
         """The drive with the share that it takes of its limits, and the alarm if no motor fits."""
         from . import page
 
-        return AnswerBlocks(head=page.answer(s, study), judgements=page.judgements(study))
+        return AnswerBlocks(head=page.answer(study), judgements=page.judgements(study))
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The choice of a drive, with order numbers, of a study whose file gives its motor."""

@@ -145,7 +145,7 @@ class SizingFindings(Findings):
             best.drive,
             best.motor,
             as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
-            "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
+            "Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
             self.answer,
             lambda study: SizingFindings.of_study(study).sized(study).sentence,
             _currents_until_trip,

@@ -9,8 +9,9 @@ from typing import Any
 from ...core.descriptions import of_driver
 from ...core.quantities import finite
 from ...report import blocks as b
-from ...report.cited import cited, number, table
-from ...report.lines import Aside, Line, Strong, capital, join, line, spoken
+from ...report.cited import cited, exact, number, table
+from ...report.given_numbers import rating, run_settings
+from ...report.lines import Aside, Line, Number, Strong, Words, capital, filled, join, line, spoken
 from ...study.limits import Check
 from ...study.record import StudyRecord
 from .candidate import Candidate, DriveNumbers, Standing
@@ -31,7 +32,7 @@ _EMPTY_START = (
 )
 
 
-def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def answer(study: StudyRecord) -> Iterator[b.Block]:
     """Cards with the motor of all runs, its gear, flywheel and protection, and a table of the share that this drive
     takes of each limit."""
     findings = SizingFindings.found_in(study)
@@ -40,14 +41,14 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     drive, x = findings.sized(study), cited(findings, "findings.sizing")
     sized, best = cited(drive, "findings.sizing"), x.candidates[0]
     gear = (_gear(findings.best, best), *_belt(sized.belt), *_gear_torque(sized))
-    ratio = number(best.ratio, 4, as_given=True)
+    ratio = exact(best.ratio, 4)
     cards = [
         b.Card(
             "Motor",
             ((best.designation, str(findings.best.verdict)),),
-            (*_data(s), *_starter(s, drive, sized, best.numbers)),
+            (*_data(study), *_starter(study, drive, sized, best.numbers)),
         ),
-        b.Card("Gear ratio", ((ratio, f"motor turns per {s.driver} turn"),), gear),
+        b.Card("Gear ratio", ((ratio, f"motor turns per {study.driver_noun} turn"),), gear),
         b.Card(
             "Flywheel",
             ((number(x.flywheel.J) if findings.best.disc else "none", "flywheel on the motor shaft"),),
@@ -60,7 +61,7 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         cards.append(b.Card("Protection", (setting,)))
     elif isinstance(drive.protection, DriveProtection):
         torque: Line = number(protection.trip_torque) if drive.protection.trip_torque else "none"
-        limiter = torque, of_driver(_TRIP_TORQUE, s.driver)
+        limiter = torque, of_driver(_TRIP_TORQUE, study.driver_noun)
         cards.append(b.Card("Protection", (limiter,), tuple(_protection(drive.protection, protection))))
     yield b.Cards(tuple(cards))
     yield from _parts(drive, sized)
@@ -100,13 +101,13 @@ def _parts(drive: SizedDrive, x: SizedDrive) -> Iterator[b.Block]:
                 capital(item.kind),
                 shown.designation,
                 shown.order_number if item.order_number else "-",
-                number(shown.price, as_given=True, none="-"),
+                exact(shown.price, none="-"),
             )
         )
         for item, shown in zip(drive.parts.items, x.parts.items, strict=True)
     ]
     if len(rows) > 1 and drive.parts.total is not None:
-        rows.append(b.TableRow(("These parts together", "", "", number(x.parts.total, as_given=True))))
+        rows.append(b.TableRow(("These parts together", "", "", exact(x.parts.total))))
     columns = b.heads("part", "designation", "order number", "price")
     yield b.Table(tuple(rows), columns, title="Parts to order", numeric=False, form="long")
     sources = {
@@ -122,7 +123,7 @@ def _how_to_order(drive: SizedDrive, x: SizedDrive, k: int) -> Iterator[Line]:
         if drive.parts.items[k].order_number:
             yield line(", order number ", x.parts.items[k].order_number)
         if drive.parts.items[k].price is not None:
-            yield line(", price ", number(x.parts.items[k].price, as_given=True))
+            yield line(", price ", exact(x.parts.items[k].price))
 
 
 def judgements(study: StudyRecord) -> Iterator[b.Block]:
@@ -146,12 +147,13 @@ def _disc(candidate: Candidate, x: Candidate) -> Iterator[Line]:
         yield line("steel disc ", number(wheel.mass), ", ", number(wheel.diameter), " in diameter")
 
 
-def _data(s: b.Source) -> Iterator[Line]:
+def _data(study: StudyRecord) -> Iterator[Line]:
     """The data of the motor of all runs."""
-    if "rated_power" in s.result.get("motor", {}):
-        names = ("rated_speed", "rated_torque", "rated_current")
-        parts = "{=motor.rated_power}, {=motor.poles} poles, {=motor.rated_voltage}, {=motor.rated_frequency}"
-        yield join((s.line(parts), *(s.line(f"{{motor.{name}}}") for name in names)), ", ")
+    if study.plate is not None:
+        x = rating(study.plate)
+        plate = "{}, {} poles, {}, {}, {}, {}, {}"
+        sizes = map(exact, (x.rated_power, x.poles, x.rated_voltage, x.rated_frequency))
+        yield filled(plate, *sizes, *map(number, (x.rated_speed, x.rated_torque, x.rated_current)))
 
 
 def _gear_torque(x: SizedDrive) -> Iterator[Line]:
@@ -172,26 +174,28 @@ def _belt(x: OrderedBelt | None) -> Iterator[Line]:
         )
 
 
-def _starter(s: b.Source, drive: SizedDrive, x: SizedDrive, numbers: DriveNumbers) -> Iterator[Line]:
+def _starter(study: StudyRecord, drive: SizedDrive, x: SizedDrive, numbers: DriveNumbers) -> Iterator[Line]:
     """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
-    start = s.result["start"] if "starter" in s.result else "direct"
+    start, starter = study.config.drive.start, cited(study.config.drive.starter, "given.starter")
     if start == "soft":
-        yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
+        soft = starter.soft_start
+        yield filled("soft starter, {} voltage, {}", exact(soft.voltage), exact(soft.time))
     elif start == "star-delta":
         empty = _EMPTY_START if drive.needs_empty_start else ""
-        yield s.line(f"star-delta starter, {{=starter.star_delta.time}} in star{empty}")
-        yield _winding(s)
+        yield line("star-delta starter, ", exact(starter.star_delta.time), f" in star{empty}")
+        yield _winding(study)
     elif start == "inverter":
         starts = number(numbers.inverter_current).value is not None
         current = line(" of at least ", number(x.inverter.rated_current)) if x.inverter and starts else ()
-        yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))
+        ramp = exact(run_settings(study).ramp)
+        yield filled("inverter{}, boost {}, ramp {}", current, exact(starter.inverter.boost), ramp)
         if starts:
             yield line("in running ", number(numbers.frequency), ", ", number(numbers.speed))
 
 
-def _winding(s: b.Source) -> str:
+def _winding(study: StudyRecord) -> str:
     """The winding that a start in star and delta needs: one for the voltage of the supply in delta."""
-    supply = float(b.at(s.result, "motor.rated_voltage")["value"] or 0.0)
+    supply = 0.0 if study.plate is None else study.plate.nameplate.voltage
     in_star, other = (
         10.0 * round(supply * factor / 10.0) for factor in (math.sqrt(3.0), 1.0 / math.sqrt(3.0))
     )
@@ -230,14 +234,14 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         )
         heading = Strong("No candidate fits. The reasons:")
         yield b.Judgement("alarm", heading, items=tuple(reasons), form="long")
-    yield from _best(s, drive, sized, x.candidates[0])
+    yield from _best(study, drive, sized, x.candidates[0])
     if isinstance(drive.protection, DriveProtection):
         protection: Any = sized.protection
         yield b.Text(protection.coupling)
         yield from (b.Text(way.words) for way in protection.alternatives)
         yield from _ways(study, drive.protection, protection)
-    weak = line("; too weak by the nameplate: ", number(x.weak, as_given=True)) if findings.weak else ()
-    tried, motors = (number(count, as_given=True) for count in (x.tried, x.motors))
+    weak = line("; too weak by the nameplate: ", exact(x.weak)) if findings.weak else ()
+    tried, motors = map(exact, (x.tried, x.motors))
     yield b.Text(line("Tried: ", tried, " of ", motors, " motors of the catalogue", weak, "."))
     row_count = int(findings.plan.demands.candidates)
     yield from _trade(findings, x)
@@ -249,68 +253,63 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         )
     order = "; ".join(f"{i}. {criterion}" for i, criterion in enumerate(findings.order, 1))
     yield b.Text(f"Order of preference among drives that fit: {order}.", form="long")
-    yield b.Tables(tuple(_numbers(s, study, findings)))
+    yield b.Tables(tuple(_numbers(study, findings)))
 
 
-def _numbers(s: b.Source, study: StudyRecord, findings: SizingFindings) -> Iterator[b.Table]:
+def _numbers(study: StudyRecord, findings: SizingFindings) -> Iterator[b.Table]:
     """A table of the numbers of each part of the result."""
     # a machine without sides has no one-sided feed
     left_out = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
     if all(candidate.sold is None for candidate in findings.candidates):
         # it is a demand on gears of a catalogue
         left_out = (*left_out, "gear_torque")
-    section = s.result["sizing"]
+    section = findings.data(study)
     for name in ("asked", "cycle", "flywheel", "belt", "gear", "inverter", "protection"):
         # the sentences on the coupling are too long for a cell of a narrow table, and stand above with the ways to it
-        leaves = [
-            leaf
+        rows = tuple(
+            b.TableRow(leaf)
             for key, below in (section.get(name) or {}).items()
             if (not isinstance(below, str) or key == "section") and key not in (*left_out, "alternatives")
-            for leaf in _leaves(below, f"sizing.{name}.{key}", spoken(key))
-        ]
-        rows = tuple(b.TableRow((title, _leaf(s, path))) for title, path in leaves)
+            for leaf in _leaves(below, f"findings.sizing.{name}.{key}", spoken(key))
+        )
         if rows:
             yield b.Table(rows, title=capital(spoken(name)))
 
 
-def _best(s: b.Source, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Iterator[b.Block]:
+def _best(study: StudyRecord, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Iterator[b.Block]:
     """The sentences on what is ordered, and on the reason for the choice."""
-    doubt = line(" (", s.words("verdict.model.caveat"), ")") if drive.caveat else ()
+    doubt = line(" (", cited(drive.caveat, "verdict.model.caveat"), ")") if drive.caveat else ()
     # a motor that does not suffice is not ordered
     parts = () if drive.parts is None else drive.parts.items
-    motor = [line("motor ", best.designation, " of ", source) for source in _data(s)]
+    motor = [line("motor ", best.designation, " of ", source) for source in _data(study)]
     order: list[Line] = [line(title, *_how_to_order(drive, x, 0)) for title in motor]
     if not any(part.kind == "gear" for part in parts):
         order += (*_belt(x.belt), *_gear_torque(x))
     for k, item in enumerate(x.parts.items if x.parts is not None else ()):
         if k:
             order.append(line(f"{parts[k].kind} ", item.designation, *_how_to_order(drive, x, k)))
-    order += _starter(s, drive, x, best.numbers)
+    order += _starter(study, drive, x, best.numbers)
     if order and not drive.insufficient:
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
     begin = "Insufficient: " if drive.insufficient else "Chosen: "
     yield b.Text(line(begin, best.reason, doubt, "."), central=True)
 
 
-def _leaves(node: Any, path: str, title: str = "") -> Iterator[tuple[str, str]]:
-    """Title and path of each number and each text below a node."""
+def _leaves(node: Any, path: str, title: str = "") -> Iterator[tuple[str, Line]]:
+    """Title and piece of each number and each text below a node of the result."""
     if isinstance(node, Mapping) and "value" in node:
-        yield node.get("title", title), path
+        value, is_asked = node["value"], path.startswith("findings.sizing.asked.")
+        if isinstance(value, str):
+            yield node.get("title", title), Words(value, f"{path}.value")
+        else:
+            size = Number(value, node["unit"], node.get("kind", ""), path, as_given=is_asked, none="none")
+            yield node.get("title", title), size
     elif isinstance(node, Mapping | list):
         items = node.items() if isinstance(node, Mapping) else ((str(i), x) for i, x in enumerate(node))
         for name, below in items:
             yield from _leaves(below, f"{path}.{name}", f"{title}, {spoken(name)}" if title else spoken(name))
     elif isinstance(node, str):
-        yield title, path
-
-
-def _leaf(s: b.Source, path: str) -> Line:
-    node = b.at(s.result, path)
-    if isinstance(node, str):
-        return s.words(path)
-    if isinstance(node["value"], str):
-        return s.words(f"{path}.value")
-    return s.number(path, as_given=path.startswith("sizing.asked."), none="none")
+        yield title, Words(node, path)
 
 
 def _candidates(findings: SizingFindings, x: SizingFindings, row_count: int) -> b.Table:
@@ -369,7 +368,7 @@ def _gears(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Table]:
             for name in titles
         )
         note = line("ruled out by the runs with ", shown.runs_with) if shown.runs_with is not None else ()
-        price = number(gear.price, as_given=True, none="-")
+        price = exact(gear.price, none="-")
         rows.append(b.TableRow((gear.designation, shown.designation, price, *cells), note))
     if rows:
         columns = b.heads("gear", "motor", "price", *titles.values())
@@ -406,9 +405,7 @@ def _trade(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Block]:
         ((findings.candidates[k], x.candidates[k]) for k in findings.traded or ()),
         (
             "motor",
-            lambda row: line(
-                row[1].designation, Aside(line("ratio ", number(row[1].ratio, 4, as_given=True)))
-            ),
+            lambda row: line(row[1].designation, Aside(line("ratio ", exact(row[1].ratio, 4)))),
         ),
         ("flywheel", lambda row: _flywheel(*row)),
         ("start, worst angle", lambda row: number(row[1].checks["start"].value)),
@@ -421,7 +418,7 @@ def _trade(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Block]:
 def _behind(candidate: Candidate, x: Candidate) -> Line:
     """The gear of a candidate, if it is one of a catalogue, else its ratio."""
     if candidate.sold is None:
-        return line("ratio ", number(x.ratio, 4, as_given=True))
+        return line("ratio ", exact(x.ratio, 4))
     return x.parts[-1].designation
 
 

@@ -10,8 +10,10 @@ import numpy as np
 from ...core.quantities import quantity
 from ...mechanism.models import InverseMachine
 from ...reading.results import result
-from ...report.blocks import Source, Text
+from ...report.blocks import Text
 from ...report.capability import AnswerBlocks, Capability
+from ...report.cited import cited, number
+from ...report.lines import filled
 from ...study.analysis import Analysis, Findings, Work
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
@@ -74,16 +76,16 @@ class StaticInertiaCapability(Capability):
         """Both torques."""
         return (StaticInertiaAnalysis,)
 
-    def answer(self, s: Source, study: StudyRecord) -> AnswerBlocks:
+    def answer(self, study: StudyRecord) -> AnswerBlocks:
         """A line if they differ."""
         findings = StaticInertiaFindings.found_in(study)
         if findings is None or abs(findings.static - findings.machine) <= _ALIKE * findings.machine:
             return AnswerBlocks()
+        x = cited(findings, "findings.static_inertia")
         sentence = (
-            "A constant-inertia calculation takes RMS {static_inertia.static} instead of "
-            "{static_inertia.machine} at the {driver}."
+            f"A constant-inertia calculation takes RMS {{}} instead of {{}} at the {study.driver_noun}."
         )
-        return AnswerBlocks(end=[Text(s.line(sentence))])
+        return AnswerBlocks(end=[Text(filled(sentence, number(x.static), number(x.machine)))])
 
 
 CAPABILITY = StaticInertiaCapability()

@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from numbers import Integral
 from pathlib import Path
-from typing import Any
 
 from ...core.errors import InputError, shown
 from ...reading.results import as_data
 from ...reading.text import shown_in
 from ...report import blocks as b
-from ...report.cited import cited, number, table
-from ...report.lines import Line, Name, Number, join, line
+from ...report.cited import cited, estimate, exact, number, source_line, table
+from ...report.lines import Line, Name, Number, filled, join, line
 from ...report.task import Task
 from ...study.config import Config
 from ...work.progress import TaskProgress
 from . import figures as sweep_figures
 from .points import run_sweep
-from .summary import MOST_GAPS, Row, SweepSummary, SweptStudy
+from .summary import MOST_GAPS, Influence, Row, SweepSummary, SweptRange, SweptStudy
 
 _MOST_COLUMNS = 8
 """Columns of a table on the terminal."""
@@ -27,23 +26,23 @@ _MOST_COLUMNS = 8
 def report(swept: SweptStudy) -> b.Report:
     """The report on a sweep."""
     summary, config = swept.summary, swept.findings.config
+    x, driver = cited(summary), config.machine.model.driver_noun
     with shown_in(config.units):
-        s = b.Source(as_data(summary), config.machine.model.driver_noun)
         sections = (
-            b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
-            b.Section("best", "Points in order", tuple(_best(s, summary))),
-            b.Section("extremes", "Extremes", tuple(_extremes(summary))),
+            b.Section("influences", "Which parameter moves what", tuple(_influences(x, summary))),
+            b.Section("best", "Points in order", tuple(_best(x, summary))),
+            b.Section("extremes", "Extremes", tuple(_extremes(x, summary))),
             b.Section("maps", "Results over the parameters", tuple(sweep_figures.over_parameters(summary))),
-            b.Section("spread", _spread_heading(summary), tuple(_spread(s, summary))),
-            b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
+            b.Section("spread", _spread_heading(summary), tuple(_spread(x, summary))),
+            b.Section("basis", "Basis of the numbers", tuple(_basis(x, summary, driver))),
         )
         return b.Report(
             config.title,
             "Sweep",
-            s.result,
-            tuple(_opening(s)),
+            as_data(summary),
+            tuple(_opening(x, summary)),
             sections,
-            source=s.source_line(),
+            source=source_line(x.heading),
             units=config.units,
             opening_title="The sweep",
         )
@@ -72,36 +71,27 @@ def _store_in(swept: SweptStudy, folder: Path) -> Path:
     return folder / swept.findings.outcome.file.name
 
 
-def _opening(s: b.Source) -> Iterator[b.Block]:
-    names = list(s.result["parameters"])
-    yield b.Text(
-        line(
-            s.line("{=points} points, {method}, over "),
-            join(_range(s, name) for name in names),
-            s.line("; {=feasible} of them have results."),
+def _opening(x: SweepSummary, summary: SweepSummary) -> Iterator[b.Block]:
+    ranges = join(_range(name, swept) for name, swept in x.parameters.items())
+    size = "{} points, {}, over {}; {} of them have results."
+    yield b.Text(filled(size, exact(x.size.points), x.size.method, ranges, exact(x.size.feasible)))
+    for gap in x.reasons:
+        yield b.Judgement(
+            "warning", filled("No result at {} of the points: {}.", number(gap.share), gap.reason)
         )
-    )
-    for i, entry in enumerate(s.result["reasons"]):
-        if entry["points"]["value"]:
-            path = f"reasons.{i}"
-            yield b.Judgement(
-                "warning", s.line(f"No result at {{{path}.share}} of the points: {{{path}.reason}}.")
-            )
-    for i in range(len(s.result["organs"])):
-        path = f"organs.{i}"
-        sentence = s.line(
-            f"{{{path}.text}}: {{{path}.share}} of the points. The limit of the study's machine and feed "
-        )
-        yield b.Judgement("warning", line(sentence, s.line(f"is {{{path}.limit}}.")))
-    if not s.result["feasible"]["value"]:
+    for organs in x.organs:
+        beyond = "{}: {} of the points. The limit of the study's machine and feed is {}."
+        text = filled(beyond, organs.limit.words, number(organs.share), number(organs.limit.speed))
+        yield b.Judgement("warning", text)
+    if not summary.size.feasible:
         yield b.Judgement("bad", "No point of the sweep has a result; take other ranges.", form="both")
 
 
-def _range(s: b.Source, name: str) -> Line:
-    path, title = f"parameters.{name}", Name(name)
-    if s.result["parameters"][name]["tolerance"]["value"] is None:
-        return line(title, s.line(f" {{={path}.from}} to {{={path}.to}}"))
-    return line(title, s.line(f" {{={path}.study}} ± {{={path}.tolerance}}"))
+def _range(name: str, swept: SweptRange) -> Line:
+    tolerance = exact(swept.tolerance)
+    if tolerance.value is None:
+        return filled("{} {} to {}", Name(name), exact(swept.low), exact(swept.high))
+    return filled("{} {} ± {}", Name(name), exact(swept.centre), tolerance)
 
 
 def _columns(names: list[str]) -> tuple[b.Column, ...]:
@@ -116,24 +106,24 @@ def _value(summary: SweepSummary, row: Row, name: str) -> Number:
     return number(row[name], summary.digits(name))
 
 
-def _best(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+def _best(x: SweepSummary, summary: SweepSummary) -> Iterator[b.Block]:
     names = [*summary.parameters, *summary.results]
     rows = [
         b.TableRow(
-            (number(point["point"], as_given=True), *(_value(summary, point, name) for name in names)),
+            (exact(point["point"]), *(_value(summary, point, name) for name in names)),
             form="both" if i < 5 else "long",
         )
-        for i, point in enumerate(cited(summary).best)
+        for i, point in enumerate(x.best)
     ]
     if rows:
         heads = (b.Column("point"), *_columns(names))
         some = len(summary.parameters)
         groups = (tuple(range(1, 1 + some)), tuple(range(1 + some, 1 + len(names))))
-        title = s.line("Points with the {best_by} first")
+        title = filled("Points with the {} first", x.best_by)
         yield b.Table(tuple(rows), heads, title=title, groups=groups)
 
 
-def _extremes(summary: SweepSummary) -> Iterator[b.Block]:
+def _extremes(x: SweepSummary, summary: SweepSummary) -> Iterator[b.Block]:
     parameters = list(summary.parameters)
     rows = [
         b.TableRow(
@@ -142,7 +132,7 @@ def _extremes(summary: SweepSummary) -> Iterator[b.Block]:
                 *(_value(summary, ends[end], column) for column in (name, *parameters)),
             )
         )
-        for name, ends in cited(summary).extremes.items()
+        for name, ends in x.extremes.items()
         for end in ("least", "largest")
     ]
     if rows:
@@ -152,46 +142,43 @@ def _extremes(summary: SweepSummary) -> Iterator[b.Block]:
         )
 
 
-def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
-    parameters, table = list(s.result["parameters"]), s.result["influences"]
-    if not table or len(parameters) < 2:
+def _influences(x: SweepSummary, summary: SweepSummary) -> Iterator[b.Block]:
+    parameters, influences = list(summary.parameters), x.influences
+    if not influences or len(parameters) < 2:
         return
-    for name, influences in table.items():
-        if not all(influence["share"] for influence in influences.values()):
-            continue
-        most = max(influences, key=lambda parameter: influences[parameter]["share"]["value"])
-        path = f"influences.{name}.{most}"
-        sentence = f"{{name}}: {{most}} moves it most; alone it explains {{{path}.share}} of the variance."
-        yield b.Text(s.line(sentence, name=Name(name), most=Name(most)), form="long")
+    for name, row in influences.items():
+        shares = {parameter: influence.share for parameter, influence in row.items() if influence.share}
+        if len(shares) == len(row):
+            most = max(shares, key=lambda parameter: number(shares[parameter].value).value or 0.0)
+            sentence = "{}: {} moves it most; alone it explains {} of the variance."
+            yield b.Text(filled(sentence, Name(name), Name(most), number(shares[most].value)), form="long")
 
     def cell(name: str, parameter: str) -> Line:
-        if parameter not in table[name]:
+        influence = influences[name].get(parameter)
+        if influence is None:
             return "-"
-        path = f"influences.{name}.{parameter}"
-        if table[name][parameter]["share"] is None:
-            return s.line(f"{{{path}.rank:2}}")
-        return s.line(f"{{{path}.rank:2}} ({{{path}.share:2}})")
+        rank = number(influence.rank, 2)
+        return filled("{} ({})", rank, number(influence.share.value, 2)) if influence.share else rank
 
     rows = (
-        b.TableRow((Name(parameter), *(cell(name, parameter) for name in table))) for parameter in parameters
+        b.TableRow((Name(parameter), *(cell(name, parameter) for name in influences)))
+        for parameter in parameters
     )
-    has_shares = any(influence["share"] for row in table.values() for influence in row.values())
+    has_shares = any(influence.share for row in influences.values() for influence in row.values())
     title = "Rank correlation"
     if has_shares:
         title += "; in brackets the share of the variance that the parameter explains alone"
-    yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title)
+    yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(influences))), title=title)
     wide = [name for name, gap in summary.gaps.items() if gap > MOST_GAPS]
     if wide:
         worst = max(wide, key=lambda name: summary.gaps[name])
         sentence = (
-            "No shares of the variance: up to {gap} of the points have no value, and the parameters of the "
-            "others"
+            "No shares of the variance: up to {} of the points have no value, and the parameters of the others are "
+            "not independent."
         )
-        yield b.Text(
-            s.line(f"{sentence} are not independent.", gap=number(cited(summary).gaps[worst])), "note"
-        )
+        yield b.Text(filled(sentence, number(x.gaps[worst])), "note")
     if has_shares:
-        yield _shares(s, parameters, table)
+        yield _shares(parameters, influences)
     yield b.Text(
         "A rank correlation of 1 or -1: the result only rises or only falls with the parameter. Near 0 with a large "
         "share: it rises and falls. Shares that add up to less than 100 %: the parameters act together.",
@@ -202,29 +189,34 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         yield from sweep_figures.tornado(summary)
 
 
-def _shares(s: b.Source, parameters: list[str], table: Mapping[str, Any]) -> b.Table:
+def _shares(parameters: list[str], influences: Mapping[str, Mapping[str, Influence]]) -> b.Table:
     """The shares of the variance with their intervals."""
 
-    def cell(name: str, parameter: str, key: str) -> Line:
-        if parameter not in table[name] or table[name][parameter][key] is None:
-            return "-"
-        return s.estimate(f"influences.{name}.{parameter}.{key}", ".low", ".high")
+    def cell(influence: Influence | None, kind: str) -> Line:
+        share = influence and (influence.share if kind == "alone" else influence.total)
+        return estimate(share) if share else "-"
 
     rows = (
-        b.TableRow((line(Name(parameter), f", {kind}"), *(cell(name, parameter, key) for name in table)))
+        b.TableRow(
+            (
+                line(Name(parameter), f", {kind}"),
+                *(cell(row.get(parameter), kind) for row in influences.values()),
+            )
+        )
         for parameter in parameters
-        for key, kind in (("share", "alone"), ("total", "in all"))
+        for kind in ("alone", "in all")
     )
     title = "Shares of the variance: of a parameter alone, and in all with what it does together with others"
-    return b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title, form="long")
+    return b.Table(
+        tuple(rows), (b.Column("parameter"), *_columns(list(influences))), title=title, form="long"
+    )
 
 
 def _spread_heading(summary: SweepSummary) -> str:
     return "Spread by tolerances and ranges" if summary.spread.evenly else "Spread by tolerances"
 
 
-def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
-    x = cited(summary)
+def _spread(x: SweepSummary, summary: SweepSummary) -> Iterator[b.Block]:
     spread = x.spread.spread
     if not spread:
         return
@@ -239,7 +231,9 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
                 number(numbers.mean, summary.digits(name)),
                 number(numbers.deviation),
                 *(
-                    number(numbers.quantiles[key], summary.digits(name)) if key in numbers.quantiles else "-"
+                    number(numbers.quantiles[key].value, summary.digits(name))
+                    if key in numbers.quantiles
+                    else "-"
                     for key in quantiles
                 ),
             )
@@ -261,9 +255,10 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
             line(ranges, verb, ": the spread counts each of their values as equally frequent."), "note"
         )
     yield b.Text(
-        s.line(
-            "result.json has the interval of {=confidence} confidence of each quantile, as for points that are drawn "
-            "independently; points that fill the space evenly are more exact."
+        filled(
+            "result.json has the interval of {} confidence of each quantile, as for points that are drawn "
+            "independently; points that fill the space evenly are more exact.",
+            exact(x.spread.confidence),
         ),
         "fine",
         "long",
@@ -271,53 +266,49 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     yield from sweep_figures.distribution(summary)
 
 
-def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+def _basis(x: SweepSummary, summary: SweepSummary, driver: str) -> Iterator[b.Block]:
     yield from table(
-        cited(summary).parameters.items(),
+        x.parameters.items(),
         ("parameter", lambda row: Name(row[0])),
         ("meaning", lambda row: row[1].description),
-        ("in the study", lambda row: number(row[1].centre, as_given=True)),
-        ("from", lambda row: number(row[1].low, as_given=True)),
-        ("to", lambda row: number(row[1].high, as_given=True)),
-        ("tolerance", lambda row: number(row[1].tolerance, as_given=True)),
+        ("in the study", lambda row: exact(row[1].centre)),
+        ("from", lambda row: exact(row[1].low)),
+        ("to", lambda row: exact(row[1].high)),
+        ("tolerance", lambda row: exact(row[1].tolerance)),
         title="Swept quantities; all others have their values of the study",
         form="long",
     )
-    rows = (b.TableRow((Name(name), s.words(f"results.{name}.description"))) for name in s.result["results"])
-    yield b.Table(tuple(rows), b.heads("result", "meaning"), title="Results", numeric=False, form="long")
-    if summary.findings.plan.quantities:
-        yield b.Text(
-            s.line(
-                "Quantities of a turn hold at constant speed of the {driver} with the feed of normal running, at "
-                "{=angles} {driver} angles; extremes are those at these angles."
-            ),
-            "note",
-            "long",
+    yield from table(
+        x.results.items(),
+        ("result", lambda row: Name(row[0])),
+        ("meaning", lambda row: row[1]["description"]),
+        title="Results",
+        numeric=False,
+        form="long",
+    )
+    plan = summary.findings.plan
+    if plan.quantities:
+        held = (
+            f"Quantities of a turn hold at constant speed of the {driver} with the feed of normal running, at {{}} "
+            f"{driver} angles; extremes are those at these angles."
         )
-    named = {"installed_power", "energy_per_year"} & set(summary.findings.plan.quantities)
-    if named:
-        yield b.Text(
-            s.line(
-                "Assumed: {=basis.operating_hours} operating hours in a year, permitted overload {=basis.overload}."
-            ),
-            "note",
+        yield b.Text(filled(held, exact(x.size.angles)), "note", "long")
+    if {"installed_power", "energy_per_year"} & set(plan.quantities):
+        assumed = "Assumed: {} operating hours in a year, permitted overload {}."
+        hours, overload = exact(x.basis.operating_hours), exact(x.basis.overload)
+        yield b.Text(filled(assumed, hours, overload), "note")
+    if plan.measures:
+        run = (
+            "Measures are of a run in which {}: from rest to steady running, then the event, each point by itself, "
+            "with the control as tuned for the values of the study."
         )
-    if summary.findings.plan.measures:
-        yield b.Text(
-            s.line(
-                "Measures are of a run in which {event}: from rest to steady running, then the event, each point by "
-                "itself, with the control as tuned for the values of the study."
-            ),
-            "note",
-        )
+        yield b.Text(filled(run, x.event or ""), "note")
     if summary.current_limit is not None:
-        sentence = (
-            "The current is at its limit, {=current_limit}, at the points with the largest current_peak."
-        )
-        yield b.Text(s.line(sentence), "note")
-    if s.result["made_anew"]:
-        yield b.Text(s.line("{made_anew}."), "note")
-    yield b.Text(s.line("All points: {store} (NetCDF)."), "fine", "long")
+        limited = "The current is at its limit, {}, at the points with the largest current_peak."
+        yield b.Text(filled(limited, exact(x.current_limit)), "note")
+    if x.store.made_anew:
+        yield b.Text(line(x.store.made_anew, "."), "note")
+    yield b.Text(filled("All points: {} (NetCDF).", x.store.store), "fine", "long")
 
 
 TASK: Task[Config, SweptStudy] = Task(

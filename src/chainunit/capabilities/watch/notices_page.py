@@ -10,52 +10,50 @@ from ...machines.chain_unit import SIDES
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report import run_names
+from ...report.cited import cited, number, quantity_rows
+from ...report.lines import filled
 from ...report.pictures import Pictures
 from ...report.runs import by_side, over_runs
 from ...study.record import StudyRecord
-from .notices import DEVICES, Observed, ObserverFindings
+from .notices import DEVICES, ObserverFindings
 
 PICTURES = Pictures()
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table of the notices, the estimates in normal running, and a figure of each event."""
-    if s.result["observer"]["notices"]:
+    x = cited(ObserverFindings.of_study(study), "findings.observer")
+    if x.notices:
         lead = (
-            "Times count from the event. Rocker torque: the largest from the event to the notice, in parts of the "
-            "{observer.steady.rocker_torque} of normal running; where a device does not notice the event, the "
-            "largest in the time followed."
+            "Times count from the event. Rocker torque: the largest from the event to the notice, in parts of the {} "
+            "of normal running; where a device does not notice the event, the largest in the time followed."
         )
-        yield b.Text(s.line(lead), "lead")
-        yield _who_notices(s, study)
-    yield b.Table(
-        s.rows(Observed, "observer.steady"), title="The load observer in normal running", form="long"
-    )
-    yield from PICTURES.figures(s, study)
+        yield b.Text(filled(lead, number(x.steady.rocker_torque)), "lead")
+        yield _who_notices(study, x)
+    steady = quantity_rows(x.steady, study.driver_noun)
+    yield b.Table(steady, title="The load observer in normal running", form="long")
+    yield from PICTURES.figures(study)
 
 
-def _who_notices(s: b.Source, study: StudyRecord) -> b.Table:
-    notices, sides = s.result["observer"]["notices"], s.result["observer"]["sides"]
-    runs = by_side(study, notices)
+def _who_notices(study: StudyRecord, x: ObserverFindings) -> b.Table:
+    runs = by_side(study, x.notices)
 
     def rows() -> Iterator[b.TableRow]:
         for device, title in DEVICES.items():
-            if device in notices[runs[0]]:
-                paths = [f"observer.notices.{run}.{device}" for run in runs]
-                yield b.TableRow(
-                    (f"{title}, after", *(s.number(f"{path}.time", none="not") for path in paths))
-                )
-                yield b.TableRow(("rocker torque by then", *(s.number(f"{path}.carried") for path in paths)))
-        yield b.TableRow(("side that the observer names", *(_named(**sides[run]) for run in runs)))
+            if device in x.notices[runs[0]]:
+                notices = [x.notices[run][device] for run in runs]
+                times = (number(notice.time, none="not") for notice in notices)
+                yield b.TableRow((f"{title}, after", *times))
+                yield b.TableRow(("rocker torque by then", *(number(notice.carried) for notice in notices)))
+        sides = (_named(x.named[run], x.loaded[run]) for run in runs)
+        yield b.TableRow(("side that the observer names", *sides))
 
     return over_runs(study, runs, rows(), "Who notices")
 
 
-def _named(named: str | None, loaded: str | None) -> str:
+def _named(named: str, loaded: str) -> str:
     """The side that the observer names, and whether it is the loaded one."""
-    if named is None:
-        return "none"
-    return named if loaded in (None, named) else f"{named} (wrong)"
+    return f"{named} (wrong)" if named and loaded not in ("", named) else named or "none"
 
 
 _MASS = fig.Axis("feed of a side", "kg")
@@ -64,7 +62,7 @@ _SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
 
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices, "observer.png")
-def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
+def _print(study: StudyRecord) -> fig.Figure:
     """All events beside each other, for print."""
     events = [_event(study, name) for name in ObserverFindings.of_study(study).notices]
     rows = zip(*(figure.panels for figure in events), strict=True)
@@ -80,7 +78,7 @@ def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices)
-def _events(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
+def _events(study: StudyRecord) -> Iterator[fig.Figure]:
     return (_event(study, name) for name in ObserverFindings.of_study(study).notices)
 
 

@@ -12,8 +12,8 @@ from ...reading.text import shown_in
 from ...recordings.residuals import EXCESS_NOISE
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.cited import cited, number, table
-from ...report.lines import Name, join, line
+from ...report.cited import cited, exact, number, source_line, table
+from ...report.lines import Name, filled, join, line
 from ...report.task import Task
 from ...study.config import Config
 from .result import WatchSummary, summary_of
@@ -37,23 +37,22 @@ _USUAL = {
 def watch_report(watched: WatchedRecording) -> b.Report:
     """The report on a watched recording."""
     summary = summary_of(watched)
-    result, x = as_data(summary), cited(summary)
-    s = b.Source(result)
+    x = cited(summary)
     with shown_in(watched.config.units):
         return b.Report(
             watched.config.title or "Watched recording",
             "Watch for one-sided overload",
-            result,
-            tuple(_opening(s, x)),
+            as_data(summary),
+            tuple(_opening(x)),
             (
-                b.Section("loads", "Loads of both sides", tuple(_loads(s, x))),
+                b.Section("loads", "Loads of both sides", tuple(_loads(x, summary))),
                 b.Section("alarms", "Alarms and their grounds", tuple(_alarms(x))),
-                b.Section("basis", "Basis of the numbers", tuple(_basis(s, x))),
+                b.Section("basis", "Basis of the numbers", tuple(_basis(x))),
             ),
-            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            source=source_line(x.heading),
             units=watched.config.units,
             opening_title="The answer",
-            status="alarm" if result["alarms"] else "no alarm",
+            status="alarm" if summary.alarms else "no alarm",
         )
 
 
@@ -68,65 +67,65 @@ TASK: Task[Config, WatchedRecording] = Task(
 )
 
 
-def _opening(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
-    if not s.result["is_described"]:
+def _opening(x: WatchSummary) -> Iterator[b.Block]:
+    if not x.is_described:
         yield b.Judgement(
             "bad",
             line(
                 "The machine of this study does not describe the begin of the recording (",
-                join(s.lines("doubts"), "; "),
+                join(x.doubts, "; "),
                 "): its alarms may be those of a wrong machine. ",
                 "If the feed was another one, state it ([feed]), or widen its deviation (watch.feed_deviation)."
-                if s.result["of_feed_alone"]
+                if x.of_feed_alone
                 else "Identify the machine first.",
             ),
         )
-    if s.result["failed_identification"]:
-        yield b.Judgement(
-            "warning",
-            s.line(
-                "The identification of this machine failed: its model does not describe its recordings. The errors "
-                "of the machine are not bounded by those of {identification}."
-            ),
+    if x.failed_identification:
+        failed = (
+            "The identification of this machine failed: its model does not describe its recordings. The errors of "
+            "the machine are not bounded by those of {}."
         )
+        yield b.Judgement("warning", filled(failed, x.identification or ""))
     for name, noun in (("signal", "signal"), ("speed", "measured speed")):
-        if (number(x.noise[name]).value or 0.0) > EXCESS_NOISE:
-            louder = f"The noise of the {noun} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
-            yield b.Judgement("warning", s.line(f"{louder}: the thresholds follow from the measured noise."))
-    for part in s.lines("constant_parts"):
+        noise = exact(x.noise[name], 2)
+        if (noise.value or 0.0) > EXCESS_NOISE:
+            louder = f"The noise of the {noun} at the begin is {{}} times the stated one (watch.noise)"
+            more = ": the thresholds follow from the measured noise."
+            yield b.Judgement("warning", filled(louder + more, noise))
+    for part in x.constant_parts:
         more = ": a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
         yield b.Judgement("warning", line(part, more))
-    yield b.Judgement("remark", s.line("{file} is read with {understood}."))
-    for k in range(len(s.result["gaps"])):
-        sentence = f"No rows from {{gaps.{k}.from:4}} to {{gaps.{k}.to:4}}: the observer starts anew behind this gap."
-        yield b.Judgement("remark", s.line(sentence))
-    if not s.result["alarms"]:
-        yield b.Judgement("good", s.line("No alarm in {turns:3} turns ({duration:3})."))
-    for k, alarm in enumerate(s.result["alarms"]):
-        path = f"alarms.{k}"
-        if alarm["in_learning"]:
+    yield b.Judgement("remark", filled("{} is read with {}.", x.recording.file, x.recording.understood))
+    for gap in x.gaps:
+        rows = "No rows from {} to {}: the observer starts anew behind this gap."
+        yield b.Judgement("remark", filled(rows, number(gap.begin, 4), number(gap.end, 4)))
+    if not x.alarms:
+        turns, duration = number(x.recording.turns, 3), number(x.recording.duration, 3)
+        yield b.Judgement("good", filled("No alarm in {} turns ({}).", turns, duration))
+    for alarm in x.alarms:
+        if alarm.in_learning:
             yield b.Text(
-                s.line(
-                    "This alarm is within the time of learning: the recording may begin in an overload, or the "
-                    "study's feed is not that of its begin."
-                )
+                "This alarm is within the time of learning: the recording may begin in an overload, or the study's "
+                "feed is not that of its begin."
             )
-        yield b.Judgement(
-            "alarm",
-            s.line(
-                f"Overload of the {{{path}.side}} side from {{{path}.begin:4}} on, by the {{{path}.ground}}."
-            ),
-        )
+        overload = "Overload of the {} side from {} on, by the {}."
+        yield b.Judgement("alarm", filled(overload, alarm.side, number(alarm.begin, 4), alarm.ground))
+    limits = x.thresholds
     yield b.Text(
-        s.line(
-            "The thresholds of an alarm follow from the permitted false alarms in a million turns "
-            "({=tuning.alarm.rate}). According to the angle of the crank, that of the imbalance of the feed is "
-            "{feed_threshold_least:3} to {feed_threshold_most:3}, that of the processing forces "
-            "{force_threshold_least:3} to {force_threshold_most:3}."
+        filled(
+            "The thresholds of an alarm follow from the permitted false alarms in a million turns ({}). According to "
+            "the angle of the crank, that of the imbalance of the feed is {} to {}, that of the processing forces {} "
+            "to {}.",
+            exact(x.tuning["alarm.rate"]),
+            number(limits.feed_threshold_least, 3),
+            number(limits.feed_threshold_most, 3),
+            number(limits.force_threshold_least, 3),
+            number(limits.force_threshold_most, 3),
         )
     )
-    named = s.result["identification"] is not None
-    if not (number(x.false_imbalance.uncertainty).value or number(x.false_imbalance.force_uncertainty).value):
+    false, named = x.false_imbalance, x.identification is not None
+    deviations = number(false.uncertainty, 2), number(false.force_uncertainty, 2)
+    if not any(deviation.value for deviation in deviations):
         remedy = (
             "The identification sought no number of the machine that the observer knows."
             if named
@@ -134,21 +133,18 @@ def _opening(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
         )
         yield b.Text(f"The thresholds take the numbers of the machine for exact. {remedy}")
     else:
-        sentence = "Errors of the machine's parameters make"
+        cause = "Errors of the machine's parameters make"
         if named:
-            sentence = "The machine's parameters are those of an identification. Their errors make"
-        more = (
-            "a false imbalance of {uncertainty:2} and {force_uncertainty:2} (standard deviations); the thresholds of "
-            "feed and forces are wider by the factors {widening:3} and {force_widening:3}."
+            cause = "The machine's parameters are those of an identification. Their errors make"
+        effect = (
+            " a false imbalance of {} and {} (standard deviations); the thresholds of feed and forces are wider by "
+            "the factors {} and {}."
         )
-        yield b.Text(s.line(f"{sentence} {more}"))
+        factors = number(false.widening, 3), number(false.force_widening, 3)
+        yield b.Text(filled(cause + effect, *deviations, *factors))
 
 
-def _series(s: b.Source, name: str) -> Any:
-    return np.array([np.nan if x is None else x for x in s.result["course"][name]["value"]])
-
-
-def _loads(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
+def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
     usual = [(quantity, x.usual[name]) for name, quantity in _USUAL.items() if name in x.usual]
     yield from table(
         usual,
@@ -164,14 +160,15 @@ def _loads(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
             "Normal running scatters less; the threshold follows from that smaller deviation.",
             "note",
         )
-    time, axis = _series(s, "time"), fig.Axis("time", "s")
+    course = {name: np.asarray(values.value, float) for name, values in summary.course.items()}
+    time, axis, marks = course["time"], fig.Axis("time", "s"), tuple(_marks(summary))
     panels = []
     for name, title, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
-        courses = {side: _series(s, f"{side}.{name}") for side in ("left", "right")}
+        courses = {side: course[f"{side}.{name}"] for side in ("left", "right")}
         low, high = _span(time, list(courses.values()))
-        items = [fig.Curve(side, time, x, look) for look, (side, x) in enumerate(courses.items())]
+        items = [fig.Curve(side, time, load, look) for look, (side, load) in enumerate(courses.items())]
         y = fig.Axis(title, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*_marks(s), *items)),))
+        panels.append((fig.Panel(axis, y, (*marks, *items)),))
     yield fig.Figure(
         "loads",
         "Estimated loads",
@@ -181,11 +178,11 @@ def _loads(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
     )
     panels = []
     for name, title, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
-        x, limit = _series(s, f"imbalance.{name}"), _series(s, f"imbalance.{name}_threshold")
-        low, high = _span(time, [x, limit, -limit])
+        imbalance, limit = course[f"imbalance.{name}"], course[f"imbalance.{name}_threshold"]
+        low, high = _span(time, [imbalance, limit, -limit])
         band = fig.Between("below the threshold", time, -limit, limit, "band")
         y = fig.Axis(title, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*_marks(s), band, fig.Curve("imbalance", time, x, 0))),))
+        panels.append((fig.Panel(axis, y, (*marks, band, fig.Curve("imbalance", time, imbalance, 0))),))
     yield fig.Figure(
         "imbalance",
         "Imbalance and thresholds",
@@ -204,13 +201,12 @@ def _span(time: Any, courses: list[Any]) -> tuple[float, float]:
     return low - wide, high + wide
 
 
-def _marks(s: b.Source) -> Iterator[fig.Shade]:
+def _marks(summary: WatchSummary) -> Iterator[fig.Shade]:
     """The times of the alarms."""
     named = set[str]()
-    for alarm in s.result["alarms"]:
-        name = f"alarm, {alarm['side']}"
-        ends = alarm["begin"]["value"], alarm["end"]["value"]
-        yield fig.Shade(*ends, "" if name in named else name, look=f"{alarm['side']} alarm")
+    for alarm in summary.alarms:
+        name = f"alarm, {alarm.side}"
+        yield fig.Shade(alarm.begin, alarm.end, "" if name in named else name, look=f"{alarm.side} alarm")
         named.add(name)
 
 
@@ -242,14 +238,12 @@ def _alarms(x: WatchSummary) -> Iterator[b.Block]:
     )
 
 
-def _basis(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
-    yield b.Text(
-        s.line(
-            "Angle, zero and loads were learned in the first {=learning}. Alarms of one side with less than two "
-            "turns between them are one."
-        ),
-        "note",
+def _basis(x: WatchSummary) -> Iterator[b.Block]:
+    learned = (
+        "Angle, zero and loads were learned in the first {}. Alarms of one side with less than two turns between "
+        "them are one."
     )
+    yield b.Text(filled(learned, exact(x.recording.learning)), "note")
     yield from table(
         x.learned.items(),
         ("learned number", lambda row: Name(row[0])),
@@ -265,4 +259,4 @@ def _basis(s: b.Source, x: WatchSummary) -> Iterator[b.Block]:
         title="Tuning of the observer",
         form="long",
     )
-    yield b.Text(line("Recording: ", s.words("file")), "fine", "long")
+    yield b.Text(line("Recording: ", x.recording.file), "fine", "long")

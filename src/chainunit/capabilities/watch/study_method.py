@@ -7,12 +7,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...reading.results import as_data
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import TaskProgress
 from .page import TASK
-from .result import declared_outputs
+from .result import declared_outputs, summary_of
 from .watch import Alarm, WatchedRecording
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class WatchResult(ReportedResult[Config, WatchedRecording]):
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """The medians of the outputs after the time of learning and before the first alarm, with deviations and
         thresholds."""
-        usual: Mapping[str, Mapping[str, Any]] = self._report.result["usual"]
+        usual: Mapping[str, Mapping[str, Any]] = as_data(summary_of(self.record).usual)
         return usual
 
 
