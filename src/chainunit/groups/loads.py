@@ -208,6 +208,11 @@ class Block(NamedTuple):
         )
 
 
+def _laws(usual: Any, damping: Any, laws: Mapping[Joint, Any]) -> list[tuple[Joint | None, Any, Any]]:
+    """Joint, law and damping of the joints that differ, after those of all others, whose joint is None."""
+    return [(None, usual, damping), *((joint, law, law.damping) for joint, law in laws.items())]
+
+
 class PinLosses(NamedTuple):
     """Losses in all pins: Coulomb friction in proportion to the reaction, smoothed near rest, and viscous damping
     [N m s/rad] of each pin. Pins that differ have laws of their own, with damping, by joint.
@@ -258,13 +263,9 @@ class PinLosses(NamedTuple):
     def _constants(self) -> dict[Joint | None, tuple[Any, Any, Any]]:
         """By joint, and by None for all others, the friction moment per reaction [m], the square of the smoothing
         speed [rad2/s2], and the damping."""
-        laws = [
-            (None, self.pin, self.damping),
-            *((joint, law, law.damping) for joint, law in self.laws.items()),
-        ]
         return {
             joint: (0.5 * law.friction * law.diameter, law.w_smooth * law.w_smooth, damping)
-            for joint, law, damping in laws
+            for joint, law, damping in _laws(self.pin, self.damping, self.laws)
         }
 
 
@@ -322,11 +323,10 @@ class GuideLosses(NamedTuple):
     def _constants(self) -> dict[Joint | None, tuple[Any, Any, Any]]:
         """By joint, and by None for all others, the friction, the square of the smoothing speed [m2/s2], and the
         damping."""
-        laws = [
-            (None, self.guide, self.damping),
-            *((joint, law, law.damping) for joint, law in self.laws.items()),
-        ]
-        return {joint: (law.friction, law.v_smooth * law.v_smooth, damping) for joint, law, damping in laws}
+        return {
+            joint: (law.friction, law.v_smooth * law.v_smooth, damping)
+            for joint, law, damping in _laws(self.guide, self.damping, self.laws)
+        }
 
     def _presses(self, m: Moving, joint: Joint, reaction: Vec2) -> tuple[Any, ...]:
         """The forces with which a block bears [N]: at its two ends, or the one of a point."""

@@ -25,7 +25,8 @@ _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The drive where it was chosen, first in a sentence; the verdicts, the cards and the warnings."""
-    yield from sentence(study)
+    if study.proposal is not None:
+        yield b.Text(cited(study.proposal.sentence(study), "sentence"), central=True)
     parts = [part.answer(study) for part in capabilities()]
     yield from chain.from_iterable(part.head for part in parts)
     verdicts = cited(Verdicts(study.verdict, motor_verdict(study)), "verdict")
@@ -72,12 +73,6 @@ def remark_tables(remarks: Sequence[Remark], path: str) -> Iterator[b.Table]:
         )
         if rows:
             yield b.Table(rows, title=capital(remark.code.replace("-", " ")))
-
-
-def sentence(study: StudyRecord) -> Iterator[b.Block]:
-    """The sentence on the drive where it was chosen."""
-    if study.proposal is not None:
-        yield b.Text(cited(study.proposal.sentence(study), "sentence"), central=True)
 
 
 def _speed(study: StudyRecord, run: str) -> Line:

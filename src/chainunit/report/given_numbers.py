@@ -32,6 +32,6 @@ def rating(plate: CatalogueMotor) -> MotorRating:
     return cited(MotorRating.of(plate), "given.motor")
 
 
-def motor_title(plate: CatalogueMotor) -> str:
-    """The cited title of the motor of a study with this nameplate."""
-    return cited(plate.designation, "given.motor.title")
+def motor_title(study: StudyRecord) -> str:
+    """The cited title of the motor."""
+    return cited(study.motor_title, "given.motor.title")

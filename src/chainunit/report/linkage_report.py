@@ -53,7 +53,7 @@ def linkage_report(
 ) -> b.Report:
     """The report on a linkage from the file `source`, which has these values of an unusual size, and on which there
     are `remarks`."""
-    data = linkage_data(findings, source, unusual, remarks)
+    data = linkage_data(findings, source, unusual, [f"{capital(remark)}." for remark in remarks])
     unit = findings.machine.model.driver_port.unit
     x = cited(data, unit_of=unit)
     return b.Report(

@@ -27,7 +27,7 @@ from .analyses import analysis_sections
 from .capability import Contents, capabilities
 from .cited import cited, exact, numbers, quantity_rows, source_line
 from .drawing import drawing
-from .given_numbers import asked_speed, ratio, run_settings
+from .given_numbers import asked_speed, motor_title, ratio, run_settings
 from .lines import Line, Number, capital, filled, join, line, spoken
 from .live.runs import stand_in, whole_of
 from .live.study import of_study
@@ -68,10 +68,12 @@ def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
 
 def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
-    blocks: list[b.Block] = list(answer.sentence(study))
+    blocks: list[b.Block] = []
     with shown_in(study.config.units):
         for block in answer.blocks(study):
-            if isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
+            if isinstance(block, b.Text) and block.central:
+                blocks.append(block)
+            elif isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
                 blocks.append(replace(block, form="both"))
         if study.answers:
             table = runs.table_of_runs(study)
@@ -134,9 +136,7 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     is_chosen, feed = study.proposal is not None, study.config.feed
     rows: list[b.TableRow] = []
     if not is_chosen:
-        components = study.drive.graph.components
-        motor = components["motor"].title if study.plate is None else study.plate.designation
-        rows.append(b.TableRow(("motor", cited(motor, "given.motor.title"))))
+        rows.append(b.TableRow(("motor", motor_title(study))))
     driver, machine = study.driver_noun, cited(study.drive.machine.p, "given.machine")
     rows += quantity_rows(run, driver, only="crank_speed", as_given=True)
     rows += () if is_chosen else quantity_rows(machine, driver, only="ratio", as_given=True)

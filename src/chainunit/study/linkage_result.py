@@ -108,7 +108,7 @@ def linkage_data(
         {"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
         _at_rest(f),
         WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
-        [f"{remark[:1].upper()}{remark[1:]}." for remark in remarks],
+        [*remarks],
         [str(value) for value in slips_of(tuple(unusual))],
         [value.sentence for value in unusual if value.with_unit],
     )

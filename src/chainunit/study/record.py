@@ -167,6 +167,12 @@ class StudyRecord:
         return self.config.plate if self.proposal is None else self.proposal.motor
 
     @property
+    def motor_title(self) -> str:
+        """The designation of the motor of a catalogue, else the kind of the motor."""
+        plate = self.plate
+        return self.drive.graph.components["motor"].title if plate is None else plate.designation
+
+    @property
     def insufficient(self) -> str:
         """The sentence on a drive of which none fits, so that all is run with the nearest; empty where one fits."""
         return "" if self.proposal is None else self.proposal.insufficient

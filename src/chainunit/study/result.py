@@ -170,7 +170,7 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
 
 def _motor(study: StudyRecord) -> dict[str, Any]:
     kind, plate = study.drive.graph.components["motor"].title, study.plate
-    titles = {"kind": kind, "title": plate.designation if plate else kind}
+    titles = {"kind": kind, "title": study.motor_title}
     rating = {} if plate is None else as_data(MotorRating.of(plate))
     # the parameters of a foreign motor are not known
     return titles | rating | ({} if study.motor is None else entries(study.motor))

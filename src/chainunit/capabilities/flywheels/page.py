@@ -42,7 +42,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if study.config.plate is not None:
         x = rating(study.config.plate)
         sizes = map(number, (x.rated_power, x.rated_speed, x.rated_torque, x.rated_current))
-        motor = motor_title(study.config.plate), join(sizes), number(ratio(study), 4)
+        motor = motor_title(study), join(sizes), number(ratio(study), 4)
         yield b.Text(filled("Motor: {}, rated {}; ratio {}.", *motor))
     if findings.wheels:
         yield _table(study, findings)

@@ -191,7 +191,11 @@ class SizingFindings(Findings):
 
     def data(self, study: StudyRecord) -> dict[str, Any]:
         """Its declared parts, with the parts to order and the protection."""
-        return super().data(study) | as_data(self.sized(study), driver=study.driver_noun)
+        return self.data_with(self.sized(study), study)
+
+    def data_with(self, drive: SizedDrive, study: StudyRecord) -> dict[str, Any]:
+        """The same with the sized `drive`, see `sized`."""
+        return super().data(study) | as_data(drive, driver=study.driver_noun)
 
     def sized(self, study: StudyRecord) -> SizedDrive:
         """The drive with its protection by the runs of the study."""

@@ -253,17 +253,17 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         )
     order = "; ".join(f"{i}. {criterion}" for i, criterion in enumerate(findings.order, 1))
     yield b.Text(f"Order of preference among drives that fit: {order}.", form="long")
-    yield b.Tables(tuple(_numbers(study, findings)))
+    yield b.Tables(tuple(_numbers(study, findings, drive)))
 
 
-def _numbers(study: StudyRecord, findings: SizingFindings) -> Iterator[b.Table]:
+def _numbers(study: StudyRecord, findings: SizingFindings, drive: SizedDrive) -> Iterator[b.Table]:
     """A table of the numbers of each part of the result."""
     # a machine without sides has no one-sided feed
     left_out = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
     if all(candidate.sold is None for candidate in findings.candidates):
         # it is a demand on gears of a catalogue
         left_out = (*left_out, "gear_torque")
-    section = findings.data(study)
+    section = findings.data_with(drive, study)
     for name in ("asked", "cycle", "flywheel", "belt", "gear", "inverter", "protection"):
         # the sentences on the coupling are too long for a cell of a narrow table, and stand above with the ways to it
         rows = tuple(

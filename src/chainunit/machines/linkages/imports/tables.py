@@ -88,10 +88,13 @@ class _Tables:
             self.add(body, self.pins[body], [self.mass(name) for name in members])
             if len(members) > 1:
                 self.linkage.remarks.append(
-                    f"{', '.join(members)} do not move against each other: link {body}"
+                    f"the links {', '.join(members)} do not move against each other: link {body}"
                 )
         if massless := [name for name, link in self.links.items() if "mass" not in link]:
-            self.linkage.remarks.append(f"{', '.join(massless)} without mass; --density gives links a mass")
+            noun = "there is a link" if len(massless) == 1 else "there are links"
+            self.linkage.remarks.append(
+                f"{noun} {', '.join(massless)} without mass; --density gives links a mass"
+            )
         driver, phi = self.driver()
         self.guides()
         loads = {
