@@ -28,6 +28,7 @@ import signal
 import subprocess
 import tempfile
 import threading
+from collections import Counter
 
 import fmpy
 import hypothesis
@@ -54,7 +55,24 @@ def pytest_ignore_collect(collection_path, config):
     if config.option.markexpr != FIRST or not collection_path.match("test_*.py"):
         return None
     text = collection_path.read_text("utf-8")
-    return True if re.search(r"^pytestmark = .*mark[.](second|slow)", text, re.MULTILINE) else None
+    return (
+        True if re.search(r"^pytestmark = \[?\s*pytest[.]mark[.](second|slow)", text, re.MULTILINE) else None
+    )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """`stages(first=2, second=3)`: of the cases of a test, the first stage has two, the second three more, and
+    `.ci/full` the others. A number that is left out has no bound."""
+    counts = Counter()
+    for item in items:
+        if not (shares := item.get_closest_marker("stages")):
+            continue
+        first, second = shares.kwargs.get("first", 0), shares.kwargs.get("second", len(items))
+        number = counts[item.parent.nodeid, item.originalname]
+        counts[item.parent.nodeid, item.originalname] += 1
+        if number >= first:
+            item.add_marker(pytest.mark.second if number < first + second else pytest.mark.slow)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -388,6 +388,7 @@ def test_a_capability_is_a_folder_and_a_line(house):
     assert "has no table [pin_life]" in house.run("pin-life", "bare.toml", status=2)
 
 
+@pytest.mark.slow
 def test_a_capability_comes_with_a_package_of_somebody_else(tmp_path):
     """A wheel with an entry point brings table, rules, result, command and method to the installed program, of which
     no file changes."""

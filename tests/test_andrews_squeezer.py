@@ -27,6 +27,8 @@ from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 
+pytestmark = pytest.mark.second
+
 FILE = Path(__file__).parents[1] / "examples" / "linkages" / "andrews_squeezer.toml"
 TORQUE, END_TIME = 0.033, 0.03
 
@@ -223,7 +225,6 @@ def test_the_direct_motion_is_that_of_the_published_equations():
     assert np.max(np.abs(own_solution() - END)[ANGLES]) < 1e-8
 
 
-@pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_fmu_moves_to_the_same_end(fmi, tmp_path):

@@ -79,6 +79,7 @@ def random_values(model, rng, n):
     return values
 
 
+@pytest.mark.stages(second=4)
 @pytest.mark.parametrize(
     "name", ["ChamberForces", "DcMotor", "InductionMotor", "CardanDriveline", "KnifeDrive"]
 )

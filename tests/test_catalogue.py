@@ -131,6 +131,7 @@ LAW_60 = (  # 10 CFR 431.446 and 431.25, which are NEMA Premium and IE3 at 60 Hz
 )  # fmt: skip
 
 
+@pytest.mark.stages(first=4, second=12)
 @pytest.mark.parametrize("motor", SIXTY, ids=lambda m: m.designation)
 def test_a_60_hz_motor_is_the_50_hz_motor_on_other_mains(motor):
     """Its nameplate is the circuit of the 50 Hz motor on 460 V, 60 Hz, and its own circuit meets the nameplate."""

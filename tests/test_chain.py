@@ -219,6 +219,7 @@ def acceleration(psi, speed, rate):
     return Vec2(c, s) * (M["e"] * rate) + Vec2(-s, c) * (M["e"] * speed * speed)
 
 
+@pytest.mark.stages(first=3)
 @pytest.mark.parametrize("hand", [1.0, -1.0], ids=["left", "right"])
 @pytest.mark.parametrize("case", DATA["dynamic"]["data"], ids=lambda c: f"{c['label']}-{c['N']}")
 def test_dynamic_reference(case, hand):

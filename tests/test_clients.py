@@ -186,6 +186,7 @@ def by_fmpy(file, names):
     return [run[name][-1] for name in names]
 
 
+@pytest.mark.stages(second=3)
 @here("libcosimpy")
 def test_libcosim(alone):
     files, names = alone
@@ -236,6 +237,7 @@ def test_ecos(alone, fmi):
     assert in_ecos(script, files[fmi], *names) == pytest.approx(by_fmpy(files[fmi], names), rel=1e-12)
 
 
+@pytest.mark.stages(second=2)
 @ecos
 def test_ecos_connects(pair, jacobi, outputs, fmi):
     """Its algorithm with a fixed step is Jacobi's."""
@@ -261,6 +263,7 @@ def test_ecos_connects(pair, jacobi, outputs, fmi):
     assert in_ecos(script, *map(json.dumps, inputs)) == pytest.approx(jacobi(2)[1], rel=1e-12)
 
 
+@pytest.mark.stages(second=3)
 @here("fmu_manipulation_toolbox")
 @pytest.mark.parametrize("fmi", (2, 3))
 def test_fmu_manipulation_toolbox(alone, fmi, tmp_path):
@@ -316,6 +319,7 @@ def fmucontainer(files, outputs, fmi, sequential, folder):
     return folder / "container.fmu"
 
 
+@pytest.mark.stages(second=2)
 @here("fmu_manipulation_toolbox")
 @pytest.mark.parametrize("fmi", (2, 3))
 def test_fmucontainer_parallel(pair, jacobi, outputs, fmi, tmp_path):
@@ -324,6 +328,7 @@ def test_fmucontainer_parallel(pair, jacobi, outputs, fmi, tmp_path):
     assert [run[name][-1] for name in outputs] == pytest.approx(jacobi(3)[0], rel=1e-12)
 
 
+@pytest.mark.stages(second=2)
 @here("fmu_manipulation_toolbox")
 @pytest.mark.parametrize("fmi", (2, 3))
 def test_fmucontainer_sequential(kind, pair, master, outputs, fmi, tmp_path):
@@ -402,6 +407,7 @@ def test_fmpy_container(pair, master, outputs, fmi, tmp_path):
         np.testing.assert_allclose(run[name], master[name], rtol=1e-12, err_msg=name)
 
 
+@pytest.mark.stages(second=1)
 @pytest.mark.skipif(shutil.which("cmake", path=SCRIPTS) is None, reason="cmake is not installed")
 @pytest.mark.parametrize("fmi", (2, 3))
 def test_fmpy_compile(kind, pair, fmi, tmp_path):

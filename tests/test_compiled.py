@@ -91,6 +91,7 @@ def test_each_load_is_that_of_the_present_motion():
     assert outputs.machine == turning and turning.tau == pytest.approx(own.tau, rel=1e-12)
 
 
+@pytest.mark.stages(first=1)
 def test_engines_agree(system):
     """`math`, arrays and symbols give the same values."""
     import casadi
@@ -173,6 +174,7 @@ def test_a_linkage_file_says_where_it_does_not_close():
         part.model.check(part.parameters)
 
 
+@pytest.mark.stages(first=1)
 def test_another_process_gets_the_same_model(system):
     part = compiled(system)
     assert pickle.loads(pickle.dumps(part.model)) is part.model is system_model(*part.model.made[1])

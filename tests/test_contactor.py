@@ -372,6 +372,7 @@ def test_star_takes_a_third_of_torque_and_current():
         assert largest == pytest.approx(InductionMotor.largest_torque(p, 293.15, 400.0, 50.0) / 3.0, rel=1e-2)
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("pause", [0.02, 0.04, 0.06])
 def test_the_preferred_delta_follows_the_field(pause):
     """In the change from star to delta near the full speed the preferred connection takes less current."""

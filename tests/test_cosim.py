@@ -330,6 +330,7 @@ def test_a_guard_acts_in_rows_that_are_not_kept(fmus):
     xr.testing.assert_identical(some, whole[["machine.tau"]].isel(time=[0, -1]))
 
 
+@pytest.mark.second
 def test_a_file_has_what_memory_has(fmus, tmp_path, monkeypatch):
     """Several blocks of rows, a step that fails, and a run that goes on."""
     from chainunit.system import rows

@@ -21,7 +21,10 @@ from chainunit.core.printing.vector_code import header
 from chainunit.core.symbolic_trace import outputs_of
 from chainunit.models import MODELS
 
-pytestmark = pytest.mark.skipif(cuda_device.COMPILER is None, reason="no C++ compiler")
+pytestmark = [
+    pytest.mark.second,
+    pytest.mark.skipif(cuda_device.COMPILER is None, reason="no C++ compiler"),
+]
 CLOSE = 1e-13
 """Largest deviation in parts of the peak of an output."""
 TURN = {"phi": np.linspace(0.0, 6.0, 400), "r": [0.1, 0.14, 0.16, 3.0, 0.2], "w": 4.0}
@@ -42,7 +45,7 @@ def deviation(x, wanted):
     return float(np.nanmax(np.abs(x - wanted), initial=0.0) / peak)
 
 
-@pytest.mark.second
+@pytest.mark.stages(second=4)
 @pytest.mark.parametrize(
     "name",
     [
@@ -234,7 +237,6 @@ def test_wrong_reductions_and_too_many_results_are_refused(device, monkeypatch):
 SIX = ["tau", "rocker.tau", "rocker.psi", "power", "margin", "J"]
 
 
-@pytest.mark.second
 @pytest.mark.skipif(shutil.which("nvcc") is None, reason="no compiler of CUDA")
 @pytest.mark.parametrize("more", [{}, {"over": "phi", "reduce": {"tau": REQUESTS}}])
 def test_the_compiler_of_cuda_takes_the_kernels(device, tmp_path, more):

@@ -75,6 +75,7 @@ def test_arrays_of_machines():
     assert np.isnan(out["installed_power"].isel(r=2)).all()
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("machine", [Machine(KnifeDrive), Machine(WATT)], ids=lambda m: m.model.name)
 def test_other_machines(machine):
     names = ("peak(crank_torque)", "installed_power", "energy_per_year", "box.width")

@@ -89,6 +89,7 @@ def test_start_values_make_a_model(model):
     model.check(model.Parameters())
 
 
+@pytest.mark.stages(first=2)
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_no_unit_of_an_fmu_can_be_read_in_two_ways(model):
     """`kg.m2/s4.A` is kg m2 A/s4 to one reader, kg m2/(s4 A) to another."""

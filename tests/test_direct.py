@@ -76,6 +76,7 @@ def test_a_machine_without_inertia_at_its_dead_points_is_refused():
     MODEL.check(parameters(ChainUnitMachine({"crank.m": 0.0, "crank.I": 0.0}), J_added=0.1))
 
 
+@pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_the_fmu_falls_and_swings_as_the_equations(tmp_path):
     """From rest, no torque: CS and ME, FMI 2 and 3, against an error-controlled solver."""

@@ -204,6 +204,7 @@ def errors_of(system, signals, stop, rtol=1e-9):
     return errors
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize(
     ("speed", "ramp", "order", "of_page"),
     [

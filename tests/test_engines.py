@@ -124,6 +124,7 @@ def printed(model):
     return names
 
 
+@pytest.mark.stages(second=4)
 @pytest.mark.second
 @pytest.mark.parametrize(
     "name",
@@ -149,6 +150,7 @@ def test_printed_python_is_the_equations(name):
         compare(got, rates, layout.names, [v.unit for v in layout.variables])
 
 
+@pytest.mark.second
 def test_what_is_printed_to_be_computed_once_has_no_errors():
     """As C: a later requirement may be undefined where an earlier one is not met."""
     assert python_math.Quotient(-1.0, 0.0) == python_math.Quotient(1.0, -0.0) == -math.inf

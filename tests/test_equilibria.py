@@ -184,7 +184,7 @@ def check_random(count):
     return kinds, swings
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_equilibria_of_a_few_random_linkages():
     kinds, swings = check_random(9)
     assert swings >= 3 and len({driver for driver, _ in kinds}) == 3
@@ -412,6 +412,7 @@ points = { B = [0.5, 0.35] }
 """
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize(
     ("name", "at", "number"),
     [
@@ -491,6 +492,7 @@ def figure_of(report):
     return figure
 
 
+@pytest.mark.second
 def test_equilibria_are_told():
     """In the data, in words, and on the page; those of a slider have its units."""
     data, words, page = report_of(Machine(read_linkage(LINKAGES / "pump_jack.toml")))
@@ -514,6 +516,7 @@ def test_equilibria_are_told():
     assert "On its stop at 0.200 m the driver rests with 56.4 kN on it" in words
 
 
+@pytest.mark.second
 def test_a_machine_without_a_potential_or_a_torque_is_told():
     lifting = four_bar(loads={"own": {**TORQUE, "torque": -1.0}})
     data, words, _ = report_of(lifting)

@@ -323,6 +323,7 @@ def test_a_measured_pump_gives_back_what_was_put_in(case, tmp_path):
     assert (tmp_path / "measured_pump.png").exists()
 
 
+@pytest.mark.stages(second=2)
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -446,6 +446,7 @@ def test_port_carries_the_torque_and_its_slopes_follow_the_motion():
             assert J == pytest.approx(now["dJ_dphi"] * u.w, abs=1e-5 * abs(now["J"] * u.w / p.ratio))
 
 
+@pytest.mark.second
 def test_power_is_what_the_machine_stores_and_loses():
     """A route to the torque without forces: tau w = d/dt (kinetic + potential) + dissipated, with friction, damping,
     processing and any acceleration; of each organ, too, that its energy is what came less what went."""
@@ -629,7 +630,7 @@ def test_port_is_that_of_dense_equations():
 # -- coupling
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @native
 def test_coupling_is_of_second_order_with_slopes_of_first_without(files, tmp_path):
     """A DC motor behind its gear, from a start without current; errors at instants 4 ms apart in parts of the peak.
@@ -669,7 +670,7 @@ def test_coupling_is_of_second_order_with_slopes_of_first_without(files, tmp_pat
 # -- energy
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @native
 @pytest.mark.parametrize("law", [{}, LOOSE], ids=["assumed", "loose"])
 def test_energy_over_twenty_turns(files, law):
@@ -813,6 +814,7 @@ def test_a_saved_state_goes_on_to_the_bit(files):
         run.unit.forget(saved)
 
 
+@pytest.mark.second
 @native
 def test_steps_far_too_long_and_senseless_ones(files):
     """A second of snatching in one step, as in many; what is no step is refused in words, and the machine runs on."""
@@ -1096,6 +1098,7 @@ def undamped(files):
     return files(1, 1), study, Drive(DcMotor, DcMotor.Parameters(), study.machine)
 
 
+@pytest.mark.second
 @native
 def test_numbers_of_two_rods_are_those_of_two_bars(undamped):
     """Slack, snatch and torques have the same definition for chains and for two bars."""
@@ -1111,8 +1114,8 @@ def test_numbers_of_two_rods_are_those_of_two_bars(undamped):
     assert all(share.shape == (2,) for share in by_rod.values())
 
 
+@pytest.mark.slow
 @native
-@pytest.mark.second
 def test_the_intervals_hold_what_rounding_changes(files):
     """At 15 rad/s the motion is chaotic: a feed that is larger by 1e-13 changes the medians by more than a part in a
     million, and by less than their intervals tell; at 4 rad/s it changes none."""
@@ -1139,6 +1142,7 @@ def test_the_intervals_hold_what_rounding_changes(files):
             assert change > 1e-6 if is_chaotic else change < 1e-9, (speed, name, change)
 
 
+@pytest.mark.second
 @native
 def test_an_interrupted_sweep_keeps_what_it_has(undamped):
     """Ctrl-C at the third speed: the study's own and the first of the sweep stay."""

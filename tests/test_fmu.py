@@ -111,6 +111,7 @@ def made(request, make):
     return lambda name: files[name, make][0]
 
 
+@pytest.mark.second
 @BY_EACH
 @pytest.mark.parametrize("step", [0.004, 0.05])
 def test_outputs_in_fmpy_are_those_of_the_end_of_a_step(made, step):
@@ -262,6 +263,7 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
     other.close()
 
 
+@pytest.mark.second
 def test_runs_twice_and_side_by_side(fmus):
     for _ in range(3):
         for file in fmus.values():
@@ -289,7 +291,7 @@ def test_many_instances_in_one_process(chamber):
             assert math.isfinite(unit.get(["tau"])[0])
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_process_ends_cleanly(fmus):
     """pythonfmu 0.7 releases its interpreter handle twice at exit; now and then that aborted the host."""
     script = textwrap.dedent(
@@ -309,6 +311,7 @@ def test_process_ends_cleanly(fmus):
         assert done.stdout.strip() == "done"
 
 
+@pytest.mark.second
 def test_needs_only_the_standard_library(fmus, tmp_path):
     """The slave in a Python without site-packages, as pythonfmu calls it."""
     for name, file in fmus.items():

@@ -66,6 +66,7 @@ def toml_text(text):
     return json.dumps(text)
 
 
+@pytest.mark.stages(first=2)
 @pytest.mark.parametrize(
     "text",
     [
@@ -224,7 +225,7 @@ def test_an_fmu_that_cannot_be_instantiated_is_told(tmp_path):
     fmu.close()
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_threads_that_load_leave_the_working_directory(motor, fmus, monkeypatch):
     """fmpy goes to each library's folder and back; two threads at once would take each other's folder for home."""
     here, files, change = Path.cwd(), (motor, fmus["ChamberForces"]), os.chdir

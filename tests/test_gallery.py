@@ -609,7 +609,7 @@ fluctuation = "10 %"
 """
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "speed"),
     [

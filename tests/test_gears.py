@@ -182,6 +182,7 @@ def independent(name):
     return Multibody(described(name), wheels=MACHINES[name][1])
 
 
+@pytest.mark.stages(first=3)
 @pytest.mark.parametrize("name", MACHINES)
 def test_against_an_independent_solution(name):
     """Motion of every link and point, the pitch points among them, every reaction, torque and energies."""
@@ -196,6 +197,7 @@ def test_against_an_independent_solution(name):
         assert worst < 1e-11, (q, key, worst)
 
 
+@pytest.mark.stages(second=4)
 @pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
@@ -220,6 +222,7 @@ def test_fmus(name, make, tmp_path):
             assert worst < 1e-11, (q, key, worst)
 
 
+@pytest.mark.stages(first=3)
 @pytest.mark.parametrize("name", MACHINES)
 def test_torque_inertia_and_slopes_belong_together(name):
     """Torque by the teeth and by virtual work; the inertia is that of the kinetic energy; slopes against differences

@@ -336,6 +336,7 @@ def test_the_current_limit_of_the_inverter_holds_its_frequency_back():
     assert ample[0] == pytest.approx(free[0], rel=1e-12)
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("w_ref", [40.0, 130.0])
 def test_inverter_follows_within_the_slip(w_ref):
     u = inputs({"w_ref": w_ref, "load.tau_bias": 6.0, "load.J": 0.01})

@@ -302,6 +302,7 @@ def test_an_archive_of_the_size_that_is_read_is_as_it_was():
     assert archive.contents(out.getvalue(), "x.fmu") == content
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize(
     ("command", "text"),
     [

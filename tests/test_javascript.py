@@ -239,11 +239,13 @@ def names_and_units(variables):
     return [v.name for v in variables], [v.unit for v in variables]
 
 
+@pytest.mark.stages(first=2)
 @pytest.mark.parametrize("name", QUICK)
 def test_random_states_are_those_of_python(name):
     check_points(name, 200)
 
 
+@pytest.mark.stages(second=4)
 @pytest.mark.second
 @pytest.mark.parametrize(
     "name",
@@ -283,6 +285,7 @@ def test_own_functions_have_the_bits_of_the_definition():
             np.testing.assert_array_equal(np.signbit(got[known, column]), np.signbit(want[known]), kind)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", ["InductionMotor", "KnifeDrive"])
 def test_the_text_calls_nothing_whose_bits_differ_and_evaluates_none(name):
     text = program({"m": model_text(MODELS[name])})
@@ -290,6 +293,7 @@ def test_the_text_calls_nothing_whose_bits_differ_and_evaluates_none(name):
     assert not re.search(r"\beval\b|\bFunction\b|WebAssembly|\bimport\b", text)
 
 
+@pytest.mark.stages(second=1)
 @pytest.mark.second
 @pytest.mark.parametrize("name, most", [("InductionMotor", 8_000), ("KnifeDrive", 210_000)])
 def test_the_text_is_the_same_in_every_process(name, most):
@@ -479,6 +483,7 @@ RUNS = {
 }  # fmt: skip
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_is_that_of_the_integrators(name):
     run = RUNS[name]
@@ -551,6 +556,7 @@ def test_a_run_stops_where_it_cannot_go_on():
         np.testing.assert_array_equal(states, rows[5])
 
 
+@pytest.mark.second
 def test_start_and_requirements_are_those_of_python():
     """Also of chains, whose start is an iteration."""
     script = """const m = models.m;

@@ -122,6 +122,7 @@ _WITH_VALUES = [
 ]
 
 
+@pytest.mark.stages(first=10)
 @pytest.mark.parametrize(
     ("table", "key"), _WITH_VALUES, ids=[f"{table.heading} {key.name}" for table, key in _WITH_VALUES]
 )

@@ -43,6 +43,8 @@ from chainunit.study.turn import TurnAnalysis
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic
 
+pytestmark = pytest.mark.second
+
 HEAD = 'event = []\n[system]\nmachine = "KnifeDrive"\n'
 SMALL = """
 [flywheel]
@@ -316,7 +318,6 @@ def test_the_files_of_the_study(done, tmp_path):
     assert all(f"{number(w.flywheel, 'kg.m2')}" in told for w in study.findings["flywheels"].wheels)
 
 
-@pytest.mark.second
 def test_a_run_that_fails_keeps_what_was_computed(tmp_path, monkeypatch):
     whole = flywheels._run
 

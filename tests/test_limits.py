@@ -166,7 +166,7 @@ def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     assert not {"speed-missed", "speed-by-slip"} & set(warnings)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_motor_whose_gear_misses_the_speed_starts_all_the_same(tmp_path):
     """Behind a gear for three quarters of the speed: the verdict speaks of the speed alone."""
     text = KNIFE.replace("1.5 kW, 90L", "3 kW, 100L").replace("efficiency = 1", "ratio = 49")
@@ -267,7 +267,7 @@ def test_an_inertia_beyond_the_standard_is_a_warning(tmp_path):
         study.drive = dataclasses.replace(study.drive, added_inertia=study.drive.added_inertia - added)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_change_to_delta_at_half_the_speed_is_warned_of(tmp_path):
     """The current jumps to that of a start direct on line, and the starter is good for nothing."""
     short, long = (run_study(parse(STAR % time), tmp_path / time[0]) for time in ("0.05 s", "3 s"))

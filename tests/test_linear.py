@@ -123,6 +123,7 @@ def test_slopes_of_large_models_are_those_of_differences(name):
     check_slopes(model, model.check(model.Parameters()), *moved(model))
 
 
+@pytest.mark.stages(first=5)
 @pytest.mark.parametrize("inverse", [False, True])
 @pytest.mark.parametrize("name", GALLERY)
 def test_slopes_of_linkages_are_those_of_differences(name, inverse):

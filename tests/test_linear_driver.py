@@ -318,6 +318,7 @@ def test_the_energy_of_an_end_stop_is_the_work_of_its_spring(end):
     assert np.all(actions.lost == 0.0) and actions.energy[-1] == pytest.approx(50.0, rel=0.02)
 
 
+@pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("name", ["tipper", "cylinder_lift"])
 def test_the_fmu_of_a_cylinder_stays_in_its_range_in_its_default_experiment(name, tmp_path):

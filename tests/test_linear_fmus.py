@@ -82,6 +82,7 @@ def check(folder, fmi, found, apart=()):
     np.testing.assert_allclose(told, values, rtol=1e-9, atol=1e-9 * np.max(np.abs(values)))
 
 
+@pytest.mark.stages(second=3)
 @native
 @both
 @pytest.mark.parametrize("name", MODELS)
@@ -92,6 +93,7 @@ def test_slopes_of_packaged_models_are_those_of_their_fmus(native_fmus, name, fm
     check(native_fmus[name, fmi][1], fmi, found, apart)
 
 
+@pytest.mark.stages(second=4)
 @native
 @both
 @pytest.mark.parametrize("inverse", [False, True], ids=["direct", "inverse"])

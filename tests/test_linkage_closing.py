@@ -95,6 +95,7 @@ def test_names_with_another_number_do_not_look_alike():
     assert "alike" not in str(caught.value)
 
 
+@pytest.mark.stages(first=3)
 @pytest.mark.parametrize("seed", range(12))
 def test_a_change_point_is_a_dead_position_with_its_reason(seed):
     """Parallelograms and kites close all the way round but for rounding: coupler and rocker come into line."""

@@ -96,6 +96,7 @@ def test_show(tmp_path):
     }
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("direct", [False, True])
 def test_export(tmp_path, direct):
     run("export", str(PRESS), "-o", "press.fmu", *(["--direct"] if direct else []), cwd=tmp_path)

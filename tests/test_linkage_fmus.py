@@ -150,6 +150,7 @@ def test_a_text_that_is_no_text_is_told(tmp_path):
     assert "about.author: is 3; must be a text" in first and "about.owner" in second and "author" in second
 
 
+@pytest.mark.stages(first=3)
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_outputs_that_repeat_another_one_share_its_value(file):
     """The names that share a value, and those that are always 0, by the model itself at random states. Of the values

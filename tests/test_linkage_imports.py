@@ -38,6 +38,7 @@ def refusal(source, **options):
     return str(caught.value)
 
 
+@pytest.mark.stages(first=3)
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_random_linkage_against_an_independent_solution(number, tmp_path):
     """Places of all pins, and the torque with weights and a force, to 1e-11 at five angles of the crank."""

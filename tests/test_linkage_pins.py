@@ -52,6 +52,7 @@ def test_each_pin_takes_the_power_of_its_own_law():
     assert np.mean(sum(usual.values())) > 1.3 * np.mean(sum(wanted.values()))
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize(
     ("file", "tables"),
     [

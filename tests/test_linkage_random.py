@@ -67,8 +67,8 @@ def deviations(found, wanted):
         yield name, abs(gap) / (abs(value) + (most if name.endswith(FORCES) else 1.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", COUNTS)
-@pytest.mark.second
 def test_against_an_independent_solution(count):
     """Motion of every link and point, every reaction and guide moment, torque and energies to 1e-9; torque by two
     routes and the balance of power, both to 1e-9 of their largest part."""
@@ -195,6 +195,7 @@ def four_bar(order):
     }
 
 
+@pytest.mark.slow
 def test_three_links_in_one_pin_are_joined_by_their_order_of_motion():
     """In the file the rod stands before the links that hold its pin: it must not be taken for one of them."""
     outputs = []

@@ -96,6 +96,7 @@ MACHINES = {
 }
 
 
+@pytest.mark.stages(second=2)
 @pytest.mark.second
 @pytest.mark.parametrize("name", MACHINES)
 def test_links_that_turn_fully(name):
@@ -116,6 +117,7 @@ def test_links_that_turn_fully(name):
         assert angles[-1] - angles[0] == pytest.approx(4.0 * math.pi * turns, abs=1e-9), each
 
 
+@pytest.mark.second
 def test_a_triad_that_cannot_be_followed_is_refused():
     """A pose that the series does not lead to is none: better no machine than one of another mode."""
     refused = 0

@@ -135,6 +135,7 @@ def acceleration_behind_gear(p, phi, torque, estimates):
     return answer
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("loads", [(36.0, 24.0, 300.0, 10.0), (5.0, 55.0, 0.0, 900.0)])
 @pytest.mark.parametrize("speed", [143.0, -143.0])
 def test_the_gradient_behind_a_gear(loads, speed):
@@ -380,6 +381,7 @@ def discrete(p, rows, x, P, parts=12):
     return np.array(estimates).T, P
 
 
+@pytest.mark.second
 @native
 def test_a_discrete_filter_by_other_means_gives_the_same(observer, quiet):
     """On the same noisy rows, with loads that are not those at the start."""
@@ -512,6 +514,7 @@ def test_a_measured_speed_that_jumps_is_no_load(observer, quiet):
     assert not np.any(result[3])
 
 
+@pytest.mark.second
 @native
 def test_covariances_stay_positive(observer, quiet):
     """Over long running, with precise sensors, with a jam, and at rest, where nothing is seen and no variance exceeds
@@ -615,6 +618,7 @@ def test_false_alarms_are_fewer_than_permitted(observer, values, monkeypatch):
     assert 0.1e-3 < np.sum(rates) < 1e-3, counts
 
 
+@pytest.mark.second
 @native
 def test_thresholds_of_the_linear_filter(observer, monkeypatch):
     """The estimates of the linear filter on the periodic solution have less variance than the thresholds assume."""

@@ -1151,6 +1151,7 @@ UNITS = {"crank.tau": {"N m": 1.0, "kN m": 1e3, "Nm": 1.0}, "motor.i": {"A": 1.0
 STYLES = ("{0} [{1}]", "{0} ({1})", "{0}_{1}", "{0} / {1}", "{0} in {1}")
 
 
+@pytest.mark.second
 @settings(max_examples=150, deadline=None)
 @given(
     series=st.lists(st.floats(-1e6, 1e6, allow_nan=False), min_size=12, max_size=12),

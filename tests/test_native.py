@@ -185,6 +185,7 @@ def numbers(unit, variables):
     return [float(getattr(unit, f"get{v.type}")([v.valueReference])[0]) for v in variables]
 
 
+@pytest.mark.stages(first=2)
 @pytest.mark.parametrize("name", list(MODELS))
 def test_directional_derivatives_are_exact(native, name):
     model = MODELS[name]
@@ -324,6 +325,7 @@ def assert_a_derivative(found, right, left):
     assert (found < np.maximum(right, left) + slack).all()
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("name", list(MODELS))
 def test_linearisation_at_the_start_and_in_a_run(native, name):
     """A, B, C and D as PyFMI takes them, one directional derivative a column; in initialization mode the states
@@ -532,6 +534,7 @@ def test_a_wrong_guid_is_refused(native):
     fmu.close()
 
 
+@pytest.mark.stages(second=1)
 @pytest.mark.second
 @pytest.mark.parametrize(
     "name", [n if n not in LARGE else pytest.param(n, marks=pytest.mark.slow) for n in MODELS]
@@ -591,6 +594,7 @@ def random_calls(folder, fmi, calls, tmp_path):
     assert process.returncode == 0, process.stdout + process.stderr[-3000:]
 
 
+@pytest.mark.stages(second=4)
 @pytest.mark.second
 @pytest.mark.parametrize("share", [0.03, pytest.param(1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -657,6 +661,7 @@ def assert_met(name, got, wanted):
         np.testing.assert_allclose(got[n], wanted[n], rtol=0.0, atol=tolerance * size + 1e-12, err_msg=n)
 
 
+@pytest.mark.stages(second=2)
 @pytest.mark.second
 @pytest.mark.parametrize("name", list(MODELS))
 def test_a_master_meets_both_reference_results(native, fmus, tmp_path, name):
@@ -818,6 +823,7 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
         assert_met(name, np.rec.fromarrays(np.array(got).T, names=unit.outputs), reference)
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
 def test_euler_keeps_near_at_the_declared_step(native, name):
     """In a second of the reference inputs it errs by less than a fifth of a state's size; at 100 times the step by

@@ -36,7 +36,7 @@ def test_a_page_unpacks_what_python_packed():
     assert json.loads(done.stdout) == TEXTS
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium here")
 def test_a_page_that_is_printed_without_waiting_has_its_plots(tmp_path):
     x = np.linspace(0.0, 1.0, 50)

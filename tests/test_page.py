@@ -48,6 +48,8 @@ from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
 from chainunit.study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 
+pytestmark = pytest.mark.second
+
 SHORT = """
 title = "A mill <b>& more</b> </script><!--"
 EVENTS
@@ -458,7 +460,6 @@ def test_a_run_whose_energy_balance_is_not_kept_is_no_verdict_on_the_motor(study
     assert "its reserve of torque is not known" in motor["text"]
 
 
-@pytest.mark.second
 def test_the_speed_after_the_event_is_a_sentence(study):
     def caption(**answers):
         runs = study.answers | {"jam_left": dataclasses.replace(study.answers["jam_left"], **answers)}
@@ -509,7 +510,6 @@ def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatc
     assert motor["holds"] == "in part" and "insufficient" in motor["text"]
 
 
-@pytest.mark.second
 def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
     answers = dict(study.answers)
     answers["steady"] = dataclasses.replace(answers["steady"], speed_mean=3.74)
@@ -688,7 +688,6 @@ def test_the_page_carries_the_library_packed(written):
     assert written.stat().st_size < 2.5e6
 
 
-@pytest.mark.second
 def test_a_piece_of_another_page_has_nothing_that_a_script_draws(study):
     report = report_of(study)
     kinds = {type(block).__name__ for block in report.blocks("long")}
@@ -753,7 +752,7 @@ def test_paths_numbers_and_units():
     assert {unit: unit_text(unit) for unit in units} == units
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_factors_of_two_bars_are_not_passed_for_those_of_chains(chains, study):
     words = "of two bars in place of the chains"
     assert words in said_of(chains) and words not in said_of(study)
@@ -837,7 +836,6 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         assert words in told, words
 
 
-@pytest.mark.second
 def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     """At rest a chain of 8 rods pulls as two bars do with this feed, but not without: the parts differ by a fifth."""
     machine, feed, own = chains.drive.machine, chains.config.feed, chains.findings["chain"].own
@@ -863,7 +861,6 @@ def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     assert all(math.isnan(x) for x in rest_forces(weightless, "left", feed, 8))
 
 
-@pytest.mark.second
 def test_the_rods_of_chains_move_as_simulated(chains):
     moving = pictures(study_motion.motion(chains))
     walls, webs = chains.drive.simulated_machine.rods
@@ -884,7 +881,7 @@ def test_the_rods_of_chains_move_as_simulated(chains):
                 assert np.max(np.abs(np.hypot(*np.subtract(*places)) - rod)) < 3e-4, (run["name"], ends)
 
 
-@pytest.mark.second
+@pytest.mark.stages(second=1)
 def test_any_linkage_moves(knife):
     """Also behind the open coupling; links keep their lengths, and the blade stays on its path."""
     moving = pictures(study_motion.motion(knife))

@@ -26,6 +26,8 @@ from chainunit.study import config
 from chainunit.study.readings import crank_motion, crank_torque
 from chainunit.study.run import run_study
 
+pytestmark = pytest.mark.second
+
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
 STUDY = """
 title = "A press"

@@ -61,6 +61,7 @@ def test_values_of_one_run_count_together():
     assert inside[0] > 0.92 and inside[1] < 0.5
 
 
+@pytest.mark.stages(first=2)
 @pytest.mark.parametrize("common", [0.0, 0.3, 0.5, 0.8])
 @pytest.mark.parametrize("q", [0.5, 0.95])
 def test_what_few_starts_tell_is_so(common, q):

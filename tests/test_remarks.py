@@ -7,6 +7,8 @@ import ast
 import re
 from pathlib import Path
 
+import pytest
+
 import chainunit
 from chainunit.core.descriptions import of_driver
 from chainunit.report.reference import reference
@@ -17,6 +19,7 @@ MODULES = sorted(Path(chainunit.__file__).parent.rglob("*.py"))
 MOST_WORDS = 30
 
 
+@pytest.mark.second
 def test_the_reference_lists_each_declared_remark():
     """Each call of `fault`, `warning` and `note` in the package declares one, and each is in the table."""
     codes = []

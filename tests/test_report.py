@@ -157,6 +157,7 @@ def test_one_screen_counts_the_rows_that_it_leaves_out(count):
     assert shown + left == count and len(lines) <= 45 and "of the page" not in "".join(lines)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("text_of", [screen_of, lambda report: terminal.brief(report, 0).splitlines()])
 def test_a_long_table_is_printed_a_few_times_to_find_its_room(text_of, monkeypatch):
     """On one screen and in a notebook alike, and not once for each row that is left out."""

@@ -164,6 +164,7 @@ def test_the_provenance_has_the_digest_of_each_file():
     )
 
 
+@pytest.mark.second
 def test_a_result_without_a_study_has_its_provenance(tmp_path):
     """Of a linkage, a comparison, a linear model, and files for other programs: the software and the files."""
     file = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"

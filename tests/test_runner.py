@@ -295,6 +295,7 @@ def test_a_scheduler_without_dask_is_refused_with_a_remedy(tmp_path, monkeypatch
         runner.check_scheduler("tcp://127.0.0.1:8786")
 
 
+@pytest.mark.second
 def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(runner, "PATIENCE", 0.3)

@@ -156,6 +156,7 @@ def test_native_code_and_javascript_have_the_same_bits(name, tmp_path):
     assert digests == job.in_node() and len(set(digests)) == 10
 
 
+@pytest.mark.stages(second=1)
 @here
 @zig
 @pytest.mark.second

@@ -110,6 +110,7 @@ RIGHT = [
 ]
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("text", RIGHT, ids=range(len(RIGHT)))
 def test_no_right_file_is_marked(text):
     if "polygon" in text:
@@ -261,6 +262,7 @@ def _file(*parts):
     return tables.pop("") + "".join(f"\n[{name}]{lines}" for name, lines in tables.items())
 
 
+@pytest.mark.stages(second=4)
 @pytest.mark.second
 @pytest.mark.parametrize("drive", DRIVES)
 def test_each_table_beside_each_machine(drive):

@@ -30,6 +30,8 @@ from chainunit.study.readings import crank_torque
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 
+pytestmark = pytest.mark.second
+
 JAM, BLOCKED = (event_line(name, turns=1) for name in ("jam_left", "blocked"))
 SHORT = f"""
 {JAM}
@@ -249,7 +251,6 @@ def test_the_report_shows_it(study, tmp_path):
     assert result["place"] == "crank" and result["damping_ratio"]["value"] is None
 
 
-@pytest.mark.second
 def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     """What is behind the coupling keeps the inertia of the line; the energy certificate holds in its run, too."""
     study = run_study(config.parse(f"{SHORT}{LINE}[coupling]\ntrip_torque = 150\n"), tmp_path)
@@ -269,7 +270,6 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     assert "jam_left_coasting" in {clip.name for clip in motion(study).runs}
 
 
-@pytest.mark.second
 def test_the_rigid_drive_has_the_same_coupling(tmp_path):
     """Where it opens, both peak near the trip torque: what comes after it is in neither."""
     events = SHORT.replace(JAM, BLOCKED)
@@ -293,7 +293,6 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
     write(study, tmp_path)
 
 
-@pytest.mark.second
 def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
     """A heavy J4: the gains are those of rotor, J4 and machine, and so is the loop that is shown."""
     study = run_study(config.parse(f"{SHORT}[driveline]\nJ4 = 20\n"), tmp_path)

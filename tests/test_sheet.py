@@ -294,6 +294,7 @@ def test_an_annex_that_would_be_too_long_is_set_closer(study, made, tmp_path, mo
     assert lengths[1] < lengths[0] - 0.2
 
 
+@pytest.mark.second
 def test_a_table_of_two_shares_stays_within_its_page(made):
     """Two bars with the value and the limit beside each are not wider than the paper."""
     try:

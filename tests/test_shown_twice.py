@@ -129,6 +129,7 @@ def pieces_of(node):
             yield from pieces_of(getattr(node, each.name))
 
 
+@pytest.mark.stages(second=2)
 def test_one_screen_has_the_answer_and_one_table(study, report):
     lines = screen_of(report)
     assert len(lines) <= 45 and max(map(len, lines)) <= 80

@@ -107,6 +107,7 @@ def test_a_start_of_a_wheel_by_hand(tmp_path):
     assert start.gear_torque > 1.8 * start.quasi_static
 
 
+@pytest.mark.second
 def test_a_start_from_an_angle_by_the_compiled_system(pump):
     """The same start by another route: one system with the motor's shaft at that angle, without FMUs."""
     worst, drive = pump.findings["starts"].worst, pump.drive
@@ -318,7 +319,7 @@ efficiency = 0.98
 """
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_large_motor_has_the_boost_of_its_stator_and_does_not_hunt(tmp_path):
     """A triplex pump was ordered with a boost of 5 %: the motor turned back at 13.5 rad/s in its start, and took
     183 A, in silence."""

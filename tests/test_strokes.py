@@ -25,6 +25,7 @@ def shaper():
     return findings("crank_shaper")
 
 
+@pytest.mark.second
 def test_the_lever_of_a_shaper_swings_between_its_tangents(shaper):
     """The slot touches the crank circle at both ends, and the crank takes 180 deg + swing for the one way. Here the
     slot passes the bearing of the lever at 15 mm."""

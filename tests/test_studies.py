@@ -19,6 +19,8 @@ from chainunit.core.files import LIST, FileList, claim
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.record import StudyRecord
 
+pytestmark = pytest.mark.second
+
 FILE = """
 title = "<b>Short</b> & quick"
 [machine]
@@ -58,7 +60,6 @@ def command(tmp_path_factory):
     return folder / "out"
 
 
-@pytest.mark.second
 def test_python_and_the_command_find_the_same(result, command, tmp_path):
     written = result.save(tmp_path / "out", png=True)
     assert {file.name for file in written} == {p.name for p in command.iterdir()} - {"fmu", LIST}
@@ -165,7 +166,6 @@ def test_a_result_shows_itself(result):
     assert "mean" not in shown and "crank torque, mean" not in words
 
 
-@pytest.mark.second
 def test_files_of_a_result_without_a_folder_vanish_with_it(command):
     study = Study(**TABLES)
     result = study.run(backend="python")
@@ -176,7 +176,6 @@ def test_files_of_a_result_without_a_folder_vanish_with_it(command):
     assert not kept.exists()
 
 
-@pytest.mark.second
 def test_a_run_in_a_folder_leaves_the_files_there(tmp_path, command):
     reports = []
     result = Study.from_text(FILE).run(tmp_path / "out", progress=lambda *report: reports.append(report))
@@ -193,7 +192,6 @@ def test_a_run_in_a_folder_leaves_the_files_there(tmp_path, command):
         Study(**TABLES).run(tmp_path / "out")
 
 
-@pytest.mark.second
 def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
     def stop(what, done, todo):
         if done > 0.5 * todo:

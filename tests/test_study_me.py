@@ -44,6 +44,7 @@ def studies(tmp_path_factory):
     return studies
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["start_up", "jam_left", "blocked"])
 @pytest.mark.parametrize("of", ["machine.tau", "motor.w"])
 def test_me_is_near_the_equations_and_cs_comes_nearer_as_the_step_shrinks(of, run, studies):

@@ -141,6 +141,7 @@ def test_both_routes_to_the_torque_and_the_power_balance(name):
         assert np.max(np.abs(out.power - out.dissipated_power - rate)) < 1e-6 * np.max(np.abs(out.power))
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("make", ["python", "native 2", "native 3"])
 @pytest.mark.parametrize("name", ["double_rocker", "watt"])
@@ -220,6 +221,7 @@ def test_a_range_of_a_whole_turn_gives_the_machine_that_turns():
 # the range in which a linkage closes
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize(
     ("r", "l", "h", "d"), [(0.6, 0.5, 0.6, 1.0), (0.9, 0.4, 0.5, 1.1), (0.7, 1.2, 0.35, 0.8)]
 )
@@ -357,6 +359,7 @@ def test_a_triad_needs_a_driver_that_turns_all_the_way_round():
 # the report
 
 
+@pytest.mark.second
 def test_the_findings_there_and_back():
     """Peaks, means and work of both ways from fine places; friction takes power on both."""
     data = {**WATT, "pins": {"friction": 0.15, "diameter": 0.05}}
@@ -411,6 +414,7 @@ points = { B = ["800 mm", "650 mm"] }
 """
 
 
+@pytest.mark.second
 def test_the_command_shows_the_motion_there_and_back(tmp_path):
     (tmp_path / "gripper.toml").write_text(FILE, "utf-8")
     done = chainunit("linkage", "gripper.toml", "--speed", "20 rpm", "-o", "out", cwd=tmp_path)
@@ -447,6 +451,7 @@ def run(direct, p, tau, seconds, pieces=24):
     return moved_by_itself(direct, p, direct.Inputs(tau=tau), seconds, pieces, 1e-8, 1e2)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("ratio", [1.0, 8.0])
 def test_a_driver_that_moves_by_itself_stays_between_its_end_stops(ratio):
     data = {**DOUBLE_ROCKER, "ratio": ratio, "pins": {"friction": 0.1, "damping": 2.0}}

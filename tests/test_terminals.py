@@ -52,6 +52,7 @@ SHAFTS = {
 }
 
 
+@pytest.mark.stages(first=2)
 @pytest.mark.parametrize("name", SHAFTS)
 def test_every_shaft_has_the_flange_of_modelica(name):
     """In FMI 2 and 3, beside each flange of this package: the same angle and torque, by Modelica's names."""

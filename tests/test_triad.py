@@ -84,6 +84,7 @@ def test_all_assembly_modes(seed):
     assert min(abs(math.remainder(mode.theta - built.theta, 2.0 * math.pi)) for mode in modes) < 1e-9
 
 
+@pytest.mark.second
 def test_many_triads_find_the_mode_they_were_built_in():
     """Also six modes, and pins on one line."""
     rng = np.random.default_rng(3)
@@ -133,6 +134,7 @@ SPECIAL = {
 }  # fmt: skip
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("name", SPECIAL)
 def test_modes_of_special_triads(name):
     """Where two of the three equations for D are dependent, as with parallel hangers: against a search."""

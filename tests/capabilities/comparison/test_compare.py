@@ -15,6 +15,8 @@ from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.stored_result import ResultEntries, read_result
 
+pytestmark = pytest.mark.second
+
 STUDY = """
 title = "{title}"
 [machine]

@@ -76,7 +76,7 @@ SHARES = {"load 1": 0.6, "half": 0.3, "empty": 0.1}
 FACTORS = {"load 1": 1.0, "half": 0.5, "empty": 0.0}
 
 
-@pytest.fixture(scope="module", params=["inverter", "direct"])
+@pytest.fixture(scope="module", params=["direct", pytest.param("inverter", marks=pytest.mark.second)])
 def study(request, tmp_path_factory):
     made = run_study(parse(STUDY.format(start=request.param)), tmp_path_factory.mktemp(request.param))
     assert made.failure is None
@@ -102,6 +102,7 @@ def test_the_losses_by_place_add_up_to_the_electric_power(study):
         assert all(x is None or x >= 0.0 for x in places)
 
 
+@pytest.mark.stages(second=2)
 @pytest.mark.second
 def test_a_year_is_the_integral_over_a_simulated_day(study):
     """The feed changes its size through a day of the shares, scaled down; the supply's power of the compiled system

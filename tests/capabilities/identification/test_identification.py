@@ -112,6 +112,7 @@ def test_derivatives_of_residuals(loaded):
     check_derivatives(problem, z)
 
 
+@pytest.mark.stages(first=1)
 @pytest.mark.parametrize("angle", ["mark", "motor.count", None])
 def test_a_loaded_and_an_empty_run_are_identified(loaded, empty, angle):
     """With a mark, with an encoder, and with neither, from the middle of the bounds: within four standard deviations,
@@ -167,6 +168,7 @@ def test_a_minute_of_an_induction_motor_from_many_starts(angle):
     assert all(0.5 < share < 1.1 for share in best.mean_squares.values())
 
 
+@pytest.mark.second
 def test_the_residuals_tell_a_wrong_machine(loaded, empty):
     """Of the right one they are noise of the size that is stated. A crank that is longer by 2 % leaves orders of the
     crank in them, which noise of twice the size does not."""
@@ -190,6 +192,7 @@ def test_the_residuals_tell_a_wrong_machine(loaded, empty):
     assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and worst.reason == "orders"
 
 
+@pytest.mark.second
 def test_a_wrong_gear_strains_the_clock(loaded):
     """With a mark on the crank and a speed of the motor, a gear that is off by 2 % looks as a clock that is."""
     recording = without(loaded, "motor.count")

@@ -15,6 +15,8 @@ from rich.console import Console
 from chainunit import Study, linearize
 from chainunit.report import blocks, terminal
 
+pytestmark = pytest.mark.second
+
 EXAMPLES = Path(__file__).parents[3] / "examples"
 DRIVE = EXAMPLES / "jam_with_driveline.toml"
 PAIRS = "motor.w_ref:motor.w, machine.left.material_mass:machine.tau"
@@ -113,7 +115,6 @@ def test_texts_in_a_table_of_numbers_begin_at_the_left(done):
     assert re.fullmatch(r"│ a    │ short         │       1 │", first), first
 
 
-@pytest.mark.second
 def test_a_later_model_replaces_all_files(tmp_path):
     for pairs in (["--pairs", "w_ref:w,load.tau_bias:w"], ["--pairs", "tau_ff:i_ref"], []):
         run = chainunit("linearize", "DcMotor", *pairs, cwd=tmp_path)

@@ -116,7 +116,7 @@ def least_mean(machine, feed, speeds, points=720):
     return np.min(machine.mean_pulls(speeds, feed.left, feed.right, points)[:webs])
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_slack_free_speed_counts_in_what_is_shown(best):
     """The pulls beside the machines' own route, and among the neighbours only machines that keep them."""
     feed = best.wishes.feed
@@ -139,6 +139,7 @@ def test_the_slack_free_speed_counts_in_what_is_shown(best):
     assert counts[1] <= min(counts[0], sum(keeps)) and counts[1] < counts[0]
 
 
+@pytest.mark.second
 def test_sensitivities_are_those_of_perturbed_problems(best):
     """Each limit and bound that binds, moved a little: the least value moves as its multiplier says."""
     search, objective = Search(best.wishes), best.wishes.objectives[0]
@@ -161,6 +162,7 @@ def test_sensitivities_are_those_of_perturbed_problems(best):
         assert (moved.value - value) / step == pytest.approx(each.slope, rel=0.02), each.name
 
 
+@pytest.mark.second
 def test_a_search_compiles_nothing_and_refines_each_end_once(monkeypatch):
     def compiled(*_):
         raise AssertionError("the search needs no compiler")
@@ -175,6 +177,7 @@ def test_a_search_compiles_nothing_and_refines_each_end_once(monkeypatch):
     assert search.effort.programs <= len(starts) + 6
 
 
+@pytest.mark.second
 def test_an_exact_limit():
     """A limit with one value for both sides, and its sensitivity."""
     search = Search(wishes(**{'"16 deg", max = "20 deg"': '"17 deg", max = "17 deg"'}))
@@ -676,6 +679,7 @@ def test_an_interrupt_inside_the_solver_ends_the_command(sent, status, few, monk
     assert len(calls) == 3 and not (few / "out").exists()
 
 
+@pytest.mark.second
 def test_the_command_with_an_impossible_wish(tmp_path):
     text = TABLE.replace('"16 deg", max = "20 deg"', '"40 deg"').replace("starts = 4", "starts = 1")
     (tmp_path / "mine.toml").write_text(text)

@@ -369,7 +369,7 @@ def test_the_remedy_of_the_rejected_example_works(tmp_path):
     assert all(u <= 1.0 for u in result.chosen_candidate.sizes.values())
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
     """One is asked for; the smaller ones get too hot with so many starts, and the largest are spared."""
     monkeypatch.setattr(sizing, "catalogue", lambda *files: small(8))
@@ -437,7 +437,7 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
     assert "No motor of the catalogue fits." in page and "which is insufficient" in page
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_long_soft_start_is_waited_for(tmp_path):
     """At a third of the voltage, rising over 15 s, the machine is judged when it runs."""
     config = one_candidate("", fluctuation=0.9)

@@ -253,6 +253,7 @@ def test_threads_make_the_same_store(unbroken, in_small_batches, tmp_path):
     assert made.file.name == unbroken.name and made.file.read_bytes() == unbroken.read_bytes()
 
 
+@pytest.mark.second
 @pytest.mark.skipif(cuda_device.COMPILER is None, reason="no C++ compiler")
 def test_a_gpu_makes_the_same_points(spread, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "cupy", cuda_device.cupy())
@@ -322,7 +323,7 @@ def test_a_sweep_grows(unbroken, in_small_batches, tmp_path):
     assert len(digests) == 6
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_two_workers_of_a_scheduler(unbroken, in_small_batches, tmp_path):
     """On loopback, in processes that share no file with this one."""
     pytest.importorskip("distributed")

@@ -44,6 +44,8 @@ from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation
 
+pytestmark = pytest.mark.second
+
 SYSTEM = '[system]\nmachine = "Accelerator"\n'
 EVENT = '[[event]]\ntype = "overload"\ntorque = 200\nduration = 0.05\n'
 BARE = "[driveline]\nbeta_planes = 0\n"
@@ -237,7 +239,7 @@ def test_forced_vibration_of_small_bends_has_a_closed_form():
     np.testing.assert_allclose(found.peak3, want, rtol=5e-3)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_stiff_shafts_carry_what_rigid_ones_do():
     p = bent(30.0, 15.0)
     speed = np.array([0.4, 0.6]) * frequency(p)
@@ -249,7 +251,6 @@ def test_stiff_shafts_carry_what_rigid_ones_do():
     assert np.all(np.abs(elastic.peak2 / want.peak2 - 1.0) > 0.1)
 
 
-@pytest.mark.second
 def test_time_simulation_finds_the_steady_motion_where_it_is_stable():
     p = bent(35.0, 8.0, damping=0.03)
     k = frequency(p)
@@ -282,7 +283,6 @@ def test_undamped_multipliers_lie_on_the_circle_but_for_tongues():
     np.testing.assert_allclose(found.drive, 10.0, rtol=1e-6)
 
 
-@pytest.mark.second
 def test_steps_are_fine_enough(monkeypatch):
     p = bent(45.0, 10.0, damping=0.02)
     speed = np.array([0.2, 0.9, 1.5]) * frequency(p)
@@ -331,7 +331,6 @@ def test_stiffness_from_geometry(table, constant):
     assert soft == pytest.approx(2.6e10 * constant / 2.0, rel=1e-5)
 
 
-@pytest.mark.second
 @pytest.mark.skipif(
     importlib.util.find_spec("sectionproperties") is None, reason="extra sections is not installed"
 )
@@ -488,7 +487,7 @@ def test_numbers_are_those_of_the_former_program():
         compare(before[key], now[key])
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_orders_of_one_joint_have_a_closed_form():
     """The series of atan(tan(x)/cos(alpha)) - x."""
     found = findings("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n[feed]\nload = 0\n" + SMALL)
@@ -540,7 +539,7 @@ damping_ratios = [0.05]
 """
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
     study = study_of(SLOW_LINE)
@@ -654,7 +653,6 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
         assert [remark.code for remark in study.remarks] == [] if found else ["torsion-left-out"]
 
 
-@pytest.mark.second
 def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     """A motor that gives a constant torque, as the analysis takes it, in the FMUs of the study."""
     found = findings(SMALL)

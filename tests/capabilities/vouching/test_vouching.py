@@ -649,6 +649,7 @@ FORGERIES = {
 }  # fmt: skip
 
 
+@pytest.mark.stages(first=7)
 @pytest.mark.parametrize(
     "name",
     [
@@ -950,6 +951,7 @@ def test_an_ssp_package_with_its_fmus(made, tmp_path):
     assert signature.startswith("does not hold") and member.startswith("resources/DcMotor.fmu: ")
 
 
+@pytest.mark.stages(second=4)
 @pytest.mark.second
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", list(MODELS))

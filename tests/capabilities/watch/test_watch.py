@@ -26,7 +26,7 @@ from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 EXAMPLES = Path(__file__).parents[3] / "examples" / "identification"
 TRUTH = json.loads((EXAMPLES / "truth.json").read_text("utf-8"))
 TURN = 2.0 * math.pi / TRUTH["crank_speed"]
@@ -108,7 +108,6 @@ def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
     assert result["learned"]["mark.angle"]["value"]["value"] == pytest.approx(-0.13, abs=0.01)
 
 
-@pytest.mark.second
 def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     """A shift of 12 kg that comes in 10 s is seen as soon as the part that has come is beyond the threshold."""
     config, speed = parse(study_text(TRUTH["machine"])), TRUTH["crank_speed"]
@@ -133,7 +132,7 @@ def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     assert found.alarms[0].begin < 30.0 + 4.2 * TURN  # as the page has it
 
 
-@pytest.mark.second
+@pytest.mark.stages(second=1)
 @pytest.mark.parametrize("start", ["direct", "inverter"])
 def test_behind_a_gear_that_loses_much_equal_feeds_make_no_alarm(start, tmp_path):
     """The power of an induction motor behind a gear of 70 %: with a mean friction in place of the loss, an imbalance
@@ -155,7 +154,6 @@ def test_behind_a_gear_that_loses_much_equal_feeds_make_no_alarm(start, tmp_path
         assert np.mean(record.outputs[f"{side}.material_mass"][late]) == pytest.approx(30.0, abs=2.0)
 
 
-@pytest.mark.second
 def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     """One whose left wall is heavier by a third is named, with the column and the feed that tell."""
     wrong = TRUTH["machine"] | {"left.wall_mass": 81.0}
@@ -207,7 +205,6 @@ def changed(folder, keep=lambda time: time < 60.0, **columns):
     return folder / "changed.csv"
 
 
-@pytest.mark.second
 def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     """Without a false alarm, and it finds the shift that comes later. A noise that is louder than stated is told and
     counts, and so are errors of the forces and an identification that failed."""
@@ -248,7 +245,6 @@ def test_the_noise_of_columns_that_the_observer_does_not_use():
     assert watching.noises(checks, recording) == (3.0, 1.0)
 
 
-@pytest.mark.second
 def test_a_sensor_that_fails_behind_the_begin(tmp_path):
     """It makes a false alarm, which the page doubts; a machine that stops is watched all the same."""
     stuck = changed(tmp_path, motor_i=lambda t, x: np.where(t > 35.0, x[7000], x))
