@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "src" / "chainunit"
@@ -53,9 +54,14 @@ def admitted(above: str, below: str) -> bool:
 
 def imports() -> set[tuple[str, str]]:
     """Pairs of modules of the package, importing and imported, wherever in the module the import stands."""
+    return _imports(PACKAGE)
+
+
+@cache
+def _imports(package: Path) -> set[tuple[str, str]]:
     pairs = set()
-    for file in sorted(PACKAGE.rglob("*.py")):
-        parts = file.relative_to(PACKAGE).with_suffix("").parts
+    for file in sorted(package.rglob("*.py")):
+        parts = file.relative_to(package).with_suffix("").parts
         if parts == ("__init__",):
             continue  # the names for users, which are loaded when they are needed
         name = ".".join(p for p in parts if p != "__init__")

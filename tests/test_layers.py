@@ -90,7 +90,6 @@ def _is_own(entry):
     return entry.dist is None or entry.dist.name == "chainunit"
 
 
-@pytest.mark.second
 def test_no_renderer_names_a_study_or_a_machine():
     """Blocks, figures and lines, and the modules that draw and print them, serve any study."""
     renderers = [
