@@ -76,7 +76,10 @@ def off(run, exact, names=None):
     return worst
 
 
-@pytest.fixture(scope="module", params=SYSTEMS)
+LATER = [pytest.param(name, marks=pytest.mark.second) for name in SYSTEMS if name != "motor"]
+
+
+@pytest.fixture(scope="module", params=["motor", *LATER])
 def whole(request, tmp_path_factory):
     """System, its one model with parameters, signals, native FMU, and the monolithic solution."""
     system, signals = SYSTEMS[request.param], SIGNALS[request.param]
@@ -90,7 +93,6 @@ def of_whole(signals):
     return {f"whole.{name}": signal for name, signal in signals.items()}
 
 
-@pytest.mark.stages(first=1)
 def test_the_states_that_an_event_changes_are_those_of_the_chains(whole):
     _, part, _, file, _ = whole
     states = part.model.state_layout.names
@@ -150,7 +152,6 @@ def test_the_co_simulation_of_the_parts_converges_to_it(whole, tmp_path):
     assert np.all(orders > 1.7) and np.max(errors[-1]) < 1e-4, (errors, orders)
 
 
-@pytest.mark.stages(first=1)
 def test_python_fmu_agrees_to_rounding(whole, tmp_path):
     system, part, signals, file, _ = whole
     export_compiled(system, tmp_path / "python.fmu", backend="python")
@@ -165,7 +166,6 @@ def test_python_fmu_agrees_to_rounding(whole, tmp_path):
         )
 
 
-@pytest.mark.stages(first=1)
 def test_the_fmu_is_valid_and_its_derivatives_exact(whole):
     """Of all outputs and derivatives, along a random direction, against differences of the FMU itself."""
     _, part, _, file, _ = whole

@@ -72,7 +72,12 @@ KINDS = {
 STOP = 0.24
 
 
-@pytest.fixture(scope="module", params=KINDS)
+FIRST, *LATER = KINDS
+
+
+@pytest.fixture(
+    scope="module", params=[FIRST, *(pytest.param(name, marks=pytest.mark.second) for name in LATER)]
+)
 def kind(request, tmp_path_factory):
     """The system with its FMUs, its signals, names that are compared."""
     graph, signals, names = KINDS[request.param]
@@ -86,7 +91,6 @@ def off(run, exact, name):
     return float(np.max(np.abs(run[name].values[::every] - reference)) / np.max(np.abs(reference)))
 
 
-@pytest.mark.stages(first=1)
 def test_it_is_the_monolithic_solution_to_its_tolerance(kind):
     system, signals, names = kind
     exact = monolithic(system, signals, np.arange(0.0, STOP + 1e-9, STEP), rtol=1e-12)
@@ -100,7 +104,6 @@ def test_it_is_the_monolithic_solution_to_its_tolerance(kind):
     assert worst[0] < 1e-3 and worst[1] < 5e-9 and worst[1] < 1e-3 * worst[0], worst
 
 
-@pytest.mark.stages(first=1)
 def test_the_co_simulation_tends_to_it_with_the_square_of_the_step(kind):
     system, signals, names = kind
     with ModelExchange(system, signals, rtol=1e-9) as simulation:
