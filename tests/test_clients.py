@@ -220,6 +220,7 @@ def in_ecos(script, *arguments):
     return values(textwrap.dedent(script) + leave, *arguments, LD_LIBRARY_PATH=path)
 
 
+@pytest.mark.stages(second=3)
 @ecos
 def test_ecos(alone, fmi):
     files, names = alone

@@ -279,7 +279,7 @@ def test_the_direct_model_goes_on_from_where_the_inverse_one_is():
             assert got[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @native
 def test_the_direct_fmu_goes_on_from_where_the_inverse_one_is(tmp_path):
     model = flexible(2, 1)

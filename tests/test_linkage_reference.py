@@ -96,7 +96,7 @@ def test_machines_without_reference_states_keep_their_energy(name):
     assert np.max(np.abs(out.power - out.dissipated_power - rate)) < 1e-6 * np.max(np.abs(out.power))
 
 
-@pytest.mark.stages(first=2)
+@pytest.mark.stages(first=2, second=2)
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("name", [name for name, each in MACHINES.items() if each["states"]])
 @pytest.mark.parametrize("make", [export, export_python], ids=["native", "python"])

@@ -104,7 +104,7 @@ def test_a_turn_of_the_packaged_study_is_that_of_python(packaged):
         check_turn(live, choice.drive.machine, float(config.run.crank_speed), config.feed, changed)
 
 
-@pytest.mark.stages(first=1)
+@pytest.mark.stages(first=1, second=1)
 @pytest.mark.parametrize(
     "file",
     [pytest.param(f, id=f.stem, marks=() if f.stem in QUICK else pytest.mark.slow) for f in LINKAGES],

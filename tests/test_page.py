@@ -836,6 +836,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         assert words in told, words
 
 
+@pytest.mark.slow
 def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     """At rest a chain of 8 rods pulls as two bars do with this feed, but not without: the parts differ by a fifth."""
     machine, feed, own = chains.drive.machine, chains.config.feed, chains.findings["chain"].own

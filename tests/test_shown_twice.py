@@ -103,7 +103,14 @@ IN_PHASES = r"checks\.relay\.(before|setting)|sizing\.protection\.relay_current"
 """The places of a star-delta relay: in the phases of the delta it carries the current of the line over sqrt(3)."""
 
 
-@pytest.fixture(scope="module", params=STUDIES)
+SHORT = ("packaged", "press", "jam")
+"""The studies that the second stage has."""
+
+
+@pytest.fixture(
+    scope="module",
+    params=[name if name in SHORT else pytest.param(name, marks=pytest.mark.slow) for name in STUDIES],
+)
 def study(request, tmp_path_factory):
     folder, text, _ = STUDIES[request.param]
     out = tmp_path_factory.mktemp(request.param)
@@ -129,7 +136,6 @@ def pieces_of(node):
             yield from pieces_of(getattr(node, each.name))
 
 
-@pytest.mark.stages(second=2)
 def test_one_screen_has_the_answer_and_one_table(study, report):
     lines = screen_of(report)
     assert len(lines) <= 45 and max(map(len, lines)) <= 80

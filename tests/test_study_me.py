@@ -56,6 +56,7 @@ def test_me_is_near_the_equations_and_cs_comes_nearer_as_the_step_shrinks(of, ru
         assert 1.4 < np.log2(off["coarse"] / off["fine"]) < 2.6, off
 
 
+@pytest.mark.slow
 def test_answers_agree(studies):
     """Events that open no coupling: each run starts from the saved state."""
     for run in ("steady", "jam_left"):
@@ -64,6 +65,7 @@ def test_answers_agree(studies):
             assert fine == pytest.approx(me, rel=1e-3), (run, name)
 
 
+@pytest.mark.slow
 def test_the_coupling_opens_at_the_instant_at_which_its_torque_is_reached(studies):
     """In co-simulation the coupling opens at the end of the step in which the torque is reached."""
     limit = TRIP / studies["me"].drive.ratio

@@ -57,6 +57,7 @@ def result(tmp_path_factory):
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_the_force_rises_and_falls_and_the_torque_follows(result):
     """The torque of the crank is that of the machine alone at the motion and the force of the run."""
     run = xr.open_datatree(result / "result.nc")["surge_press_force"]
@@ -73,6 +74,7 @@ def test_the_force_rises_and_falls_and_the_torque_follows(result):
     assert run["machine.tau_bias"].values == pytest.approx(np.asarray(out["tau_bias"]), rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_random_surges_reach_other_processes(result):
     data = ResultEntries(json.loads((result / "result.json").read_text("utf-8")))
     assert data["status"] == "complete" and data["monte_carlo"]["runs"]["value"] == 2

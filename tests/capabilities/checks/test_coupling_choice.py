@@ -250,7 +250,7 @@ def studied(tmp_path_factory):
     return folder, " ".join(done.stdout.split())
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_each_coupling_is_tried_in_the_cycle_of_the_study(studied):
     """The shares of each row are those of the equations of motion with its own stiffness, damping and inertia; the
     chosen one is the cheapest that keeps each limit by them."""

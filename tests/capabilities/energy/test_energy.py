@@ -102,7 +102,7 @@ def test_the_losses_by_place_add_up_to_the_electric_power(study):
         assert all(x is None or x >= 0.0 for x in places)
 
 
-@pytest.mark.stages(second=2)
+@pytest.mark.stages(second=1)
 @pytest.mark.second
 def test_a_year_is_the_integral_over_a_simulated_day(study):
     """The feed changes its size through a day of the shares, scaled down; the supply's power of the compiled system

@@ -117,7 +117,7 @@ def test_a_relay_trips_within_the_times_of_its_class(trip_class):
     assert class_holding(start_seconds(hold, np.full(101, 36.0), 5.0)) == max(seconds, 10)
 
 
-@pytest.mark.slow
+@pytest.mark.second
 def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
     """A start from another angle takes a heavier class: then its trips in the events are those of that class."""
     study = dataclasses.replace(on_line, answers=dict(on_line.answers), findings=dict(on_line.findings))
@@ -162,7 +162,7 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
     assert protection["relay_class"]["value"] == "class 30"
 
 
-@pytest.mark.slow
+@pytest.mark.second
 def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
     """Turns that begin in the start take up energy: no mean of them stands for running that lasts. A motor that does
     not start from another angle is not told as one that keeps the speed."""
@@ -393,7 +393,7 @@ def on_line(tmp_path_factory):
         return ran(heavy(*SIX), tmp_path_factory.mktemp("on_line"), patch)
 
 
-@pytest.mark.slow
+@pytest.mark.second
 def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     """By the rule of the gear, and the electromagnetic transient stands beside it; a start that is harder than the
     shocks leaves no coupling. There are ways to a lower one."""

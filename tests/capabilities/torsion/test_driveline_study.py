@@ -251,6 +251,7 @@ def test_stiff_shafts_carry_what_rigid_ones_do():
     assert np.all(np.abs(elastic.peak2 / want.peak2 - 1.0) > 0.1)
 
 
+@pytest.mark.slow
 def test_time_simulation_finds_the_steady_motion_where_it_is_stable():
     p = bent(35.0, 8.0, damping=0.03)
     k = frequency(p)
@@ -283,6 +284,7 @@ def test_undamped_multipliers_lie_on_the_circle_but_for_tongues():
     np.testing.assert_allclose(found.drive, 10.0, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_steps_are_fine_enough(monkeypatch):
     p = bent(45.0, 10.0, damping=0.02)
     speed = np.array([0.2, 0.9, 1.5]) * frequency(p)

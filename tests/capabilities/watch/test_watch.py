@@ -132,7 +132,7 @@ def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     assert found.alarms[0].begin < 30.0 + 4.2 * TURN  # as the page has it
 
 
-@pytest.mark.stages(second=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["direct", "inverter"])
 def test_behind_a_gear_that_loses_much_equal_feeds_make_no_alarm(start, tmp_path):
     """The power of an induction motor behind a gear of 70 %: with a mean friction in place of the loss, an imbalance
