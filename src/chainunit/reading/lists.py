@@ -63,9 +63,10 @@ class Entry(Faults):
         with self.at(name, " = "):
             raise InputError(f"{shown(value)}: {message}{self.more}")
 
-    def keys(self, name: str, table: Mapping[str, Any], allowed: Collection[str]) -> None:
-        """Collect the faults of the unknown keys of a `table` in it, or, with an empty name, of the table itself."""
-        for key in table:
+    def keys(self, name: str, keys: Iterable[str], allowed: Collection[str]) -> None:
+        """Collect the faults of the unknown `keys` of the table `name` in it, or, with an empty name, of the table
+        itself."""
+        for key in keys:
             if key not in allowed:
                 full_name = ".".join(filter(None, (name, str(key))))
                 self.fault(

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +29,8 @@ from .checks import (
     quantity_names,
     spring_faults,
     study_fault,
-    usual_distance,
-    usual_inertia,
 )
-from .entries import is_among, is_given, sized
+from .entries import is_among, is_given, sized, usual_distance, usual_inertia
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
@@ -69,8 +68,7 @@ def read_linkage(file: Path) -> InverseMachine:
         for a value that looks like a slip of its unit.
     """
     machine, unusual = linkage_in(file)
-    for value in slips_of(unusual):
-        warnings.warn(value.sentence, RemarkWarning, stacklevel=2)
+    _warn(unusual)
     return machine
 
 
@@ -82,9 +80,38 @@ def linkage_in(file: Path) -> tuple[InverseMachine, tuple[UnusualValue, ...]]:
     InputError
         as `read_linkage`.
     """
+    with _tables_of(file) as tables:
+        return linkage_from(tables, file.stem, file.parent)
+
+
+def linkage_unless_study(file: Path) -> InverseMachine | None:
+    """The model of the machine in a linkage file; None for a study file, which has none of its tables.
+
+    Raises
+    ------
+    InputError, RemarkWarning
+        as `read_linkage`.
+    """
+    with _tables_of(file) as tables:
+        if not {"links", "ground", "driver", "joints"} & tables.keys():
+            return None
+        machine, unusual = linkage_from(tables, file.stem, file.parent)
+    _warn(unusual)
+    return machine
+
+
+@contextmanager
+def _tables_of(file: Path) -> Iterator[dict[str, Any]]:
+    """The tables of a file; a refusal in the block names the file and the line of its key."""
     text = file_text(file, TOML)
     with in_file(str(file), lambda: toml_lines.lines_of(text)):
-        return linkage_from(toml(text), file.stem, file.parent)
+        yield toml(text)
+
+
+def _warn(unusual: Iterable[UnusualValue]) -> None:
+    """Warn of the values that look like a slip of their unit."""
+    for value in slips_of(unusual):
+        warnings.warn(value.sentence, RemarkWarning, stacklevel=3)
 
 
 def linkage_from(

@@ -156,7 +156,9 @@ class ParameterReader(EntryReader):
             if name in (*WORDS, *CONSTANTS, *MOTION):
                 self.refused.add(name)
             whole = entry if isinstance(entry, Mapping) else {"value": entry}
-            self.keys(f"{kind}.{name}", whole, ("value", "unit", "min", "max", "description", "tunable"))
+            self.keys(
+                f"{kind}.{name}", whole.keys(), ("value", "unit", "min", "max", "description", "tunable")
+            )
             with self.at(f"{kind}.{name}"):
                 value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
                 limits = {end: self.limit(end, whole, unit or "1") for end in ("min", "max") if end in whole}
