@@ -327,7 +327,9 @@ def _solve(matrix: Any, gradient: Any) -> Any:
 
 
 def _next_point(problem: Problem, point: NormalEquations, damping: float) -> Any:
-    """The next point. Unknowns that would pass a bound stop there, and the others follow."""
+    """The next point of Levenberg and Marquardt's method, shape (unknowns,): the least squares of the linear
+    residuals at `point`, with a `damping` of the unknowns that need a simulation. Unknowns that would pass a bound
+    stop there, and the others are solved for again."""
     low, high = problem.bounds
     step, moving = np.zeros(len(point.z)), np.ones(len(point.z), bool)
     damped = point.matrix + np.diag(

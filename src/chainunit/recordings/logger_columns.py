@@ -135,6 +135,7 @@ def _fits(text: str, unit: str) -> bool:
 
 
 def _number(cell: str, boolean: bool) -> float:
+    """The number in a cell, in a `boolean` column of a word such as "on", too; NaN without one."""
     if boolean and cell.lower() in _BOOLEANS:
         return _BOOLEANS[cell.lower()]
     try:
@@ -357,7 +358,7 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
     if has_times(table, places[0]):
         time, source = _of_clock(table, places)
     elif len(places) > 1:
-        time, source = _of_parts(table, places, others)
+        time, source = _time_of_parts(table, places, others)
     else:
         x = numbers(table, places[0], others, "time")
         factor, source = _unit_of_time(table, head, table.units[places[0]], x)
@@ -366,10 +367,18 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
         time = x * factor
         if wraps:
             source += f" (the counter begins anew {wraps} {'time' if wraps == 1 else 'times'})"
-    return _ordered(table, time, source, head)
+    return _rising(table, time, source, head)
 
 
 def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[float, str]:
+    """The factor from the numbers `x` of a column to seconds, and words on its unit: the `unit` of the head, or the
+    one in which the numbers are dates.
+
+    Raises
+    ------
+    InputError
+        for numbers without a unit that are no dates.
+    """
     if unit and not is_time(unit):
         return scale(unit, "s")[0], f"time in {unit}"
     for unit_text, low, high in _EPOCHS:
@@ -383,7 +392,9 @@ def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[flo
     )
 
 
-def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> tuple[Any, str]:
+def _time_of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> tuple[Any, str]:
+    """The times from the first one on [s], shape (rows,), by columns of hour, minute and second, and of the date if
+    there is one; and words on their source. Without a date, a clock that falls has passed midnight."""
     names = [name_and_unit(table.heads[k])[0].lower().rstrip("s") for k in places]
     columns = {name: numbers(table, k, others) for name, k in zip(names, places, strict=True)}
     time = 3600.0 * columns["hour"] + 60.0 * columns["minute"] + columns["second"]
@@ -485,6 +496,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
 
 
 def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:
+    """The refusal of a row whose cells at `places` are no time."""
     cells = " ".join(table.rows[row][place] for place in places)
     return InputError(
         f"{table.place_of(row, places[0])}: "
@@ -558,31 +570,27 @@ def unwrapped(x: Any, sizes: Sequence[float] = WRAPS) -> tuple[Any, int]:
     return x, 0
 
 
-def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
-    """Rising times; those of a coarse clock are spread evenly."""
+def _rising(table: LoggerTable, time: Any, source: str, head: str) -> Times:
+    """The times of the rows in rising order, from the `time` of each row [s], shape (rows,), NaN without one. If the
+    last row is the first one in time, the rows are turned round; times of a coarse clock are spread evenly; of rows
+    that stand there twice one is left out. Any other times that do not rise are refused."""
     remarks: list[str] = []
-    has_time = np.flatnonzero(np.isfinite(time))
-    if len(has_time) < 2:
+    timed = np.flatnonzero(np.isfinite(time))
+    if len(timed) < 2:
         raise InputError(f"{table.file}, column {head}: has no times")
-    order = -1 if np.all(np.diff(time[has_time]) <= 0.0) and time[has_time[0]] > time[has_time[-1]] else 1
-    if order < 0:
+    falls = time[timed[0]] > time[timed[-1]] and bool(np.all(np.diff(time[timed]) <= 0.0))
+    if falls:
         remarks.append("the last row is the first one in time")
-    has_time = has_time[::order]
-    t = time[has_time]
-    if order < 0 and not source.startswith("time in"):
+        timed = timed[::-1]
+    t = time[timed]
+    if falls and not source.startswith("time in"):
         t = t - t[0]
     steps = np.diff(t)
-    back = np.flatnonzero(steps < 0.0)
-    _refuse_names(table, has_time, np.flatnonzero(steps <= 0.0))
-    if len(back):
-        remedy = "delete the rows before this line, or those from it on"
-        if len(back) > SOME * len(steps):
-            remedy = f"the times run backwards at {len(back)} rows: sort the rows by time"
-        raise _not_later(table, int(has_time[back[0] + 1]), t[back[0] : back[0] + 2], remedy)
+    _refuse_names(table, timed, np.flatnonzero(steps <= 0.0))
+    _refuse_falls(table, timed, t)
     still = np.flatnonzero(steps == 0.0)
-    rows = [table.rows[k] for k in has_time] if len(still) else []
-    different = [int(k) for k in still if rows[k] != rows[k + 1]]
     share, even = len(still) / len(steps), _even(t)
+    different = [k for k in still if table.rows[timed[k]] != table.rows[timed[k + 1]]]
     if share > SOME and even is not None and (different or share > COARSE):
         t = even
         longest = 1 + _longest(steps == 0.0)
@@ -591,16 +599,29 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
         raise _coarse(table, t, head)
     elif different:
         k = different[0]
-        raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
+        raise _not_later(table, int(timed[k + 1]), t[k : k + 2], "delete one of the two rows")
     elif len(still):
         keep = np.append(True, steps > 0.0)
         remarks.append(f"{len(still)} doubled rows left out")
-        has_time, t = has_time[keep], t[keep]
-    return Times(t, has_time, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
+        timed, t = timed[keep], t[keep]
+    return Times(t, timed, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
+
+
+def _refuse_falls(table: LoggerTable, rows: Any, t: Any) -> None:
+    """Refuse times `t` of the `rows` that fall [s]: of many falls the rows are to be sorted, of a few deleted."""
+    steps = np.diff(t)
+    falls = np.flatnonzero(steps < 0.0)
+    if not len(falls):
+        return
+    remedy = "delete the rows before this line, or those from it on"
+    if len(falls) > SOME * len(steps):
+        remedy = f"the times run backwards at {len(falls)} rows: sort the rows by time"
+    raise _not_later(table, int(rows[falls[0] + 1]), t[falls[0] : falls[0] + 2], remedy)
 
 
 def _refuse_names(table: LoggerTable, rows: Any, places: Any) -> None:
-    """Refuse a table in which another name stands in each row whose time does not go on."""
+    """Refuse a table in which another name stands in each row whose time does not go on: `rows` are its rows in the
+    order of time, `places` the places among them after which the time does not rise."""
     for k, cell in enumerate(table.rows[rows[0]] if len(places) else []):
         if is_data(cell) or MISSING.fullmatch(cell):
             continue
@@ -619,15 +640,15 @@ def _not_later(table: LoggerTable, row: int, pair: Any, remedy: str) -> InputErr
     )
 
 
-def _longest(are: Any) -> int:
-    """The length of the longest series of true values."""
-    ends = np.flatnonzero(np.concatenate([[True], ~are, [True]]))
+def _longest(flags: Any) -> int:
+    """The length of the longest series of true values among `flags`, shape (n,)."""
+    ends = np.flatnonzero(np.concatenate([[True], ~flags, [True]]))
     return int(np.max(np.diff(ends))) - 1
 
 
 def _even(t: Any) -> Any:
-    """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on. None
-    for rows that are not even."""
+    """Even times of rows whose clock is coarse, from the times `t` [s], shape (rows,): they lie on a line through the
+    rows at which the clock goes on. None for rows that are not even."""
     ticks = 1 + np.flatnonzero(np.diff(t) > 0.0)
     if len(ticks) < 3:
         return None
@@ -654,8 +675,9 @@ def _coarse(table: LoggerTable, t: Any, head: str) -> InputError:
     )
 
 
-def lost_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list[str]]:
-    """Which rows have a number in all columns, and words on the others.
+def complete_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list[str]]:
+    """Whether a row has a number in all `columns` (numbers by the place of the column), shape (rows,); and words on
+    the rows that have not, if there are such.
 
     Raises
     ------
@@ -673,17 +695,16 @@ def lost_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list
                 "that it is left out"
             )
         whole &= ~missing
-    lost = ~whole
-    places = [place for place, x in columns.items() if np.isnan(x).any()]
-    kinds = ", ".join(
-        dict.fromkeys(kind for k in places for kind in _kinds_of(table, k, np.isnan(columns[k])))
-    )
-    count = int(lost.sum())
-    return whole, [f"{count} {'row' if count == 1 else 'rows'} without a number ({kinds})"] if count else []
+    count = int(np.sum(~whole))
+    if not count:
+        return whole, []
+    kinds = [kind for place, x in columns.items() for kind in _kinds_of(table, place, np.isnan(x))]
+    rows = "row" if count == 1 else "rows"
+    return whole, [f"{count} {rows} without a number ({', '.join(dict.fromkeys(kinds))})"]
 
 
 def _kinds_of(table: LoggerTable, place: int, missing: Any) -> Iterator[str]:
-    """The different cells without a number."""
+    """The different cells of a column in the rows that are `missing`, shape (rows,)."""
     yield from dict.fromkeys(printable(table.rows[k][place], 20) or "empty" for k in np.flatnonzero(missing))
 
 

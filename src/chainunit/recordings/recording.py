@@ -19,10 +19,10 @@ from ..drives.dc_motor import DcMotor
 from ..drives.induction_motor import InductionMotor
 from ..drives.motor import Motor
 from .logger_columns import (
+    complete_rows,
     decimal_signs,
     decimal_words,
     has_times,
-    lost_rows,
     numbers,
     time_places,
     unwrapped,
@@ -130,7 +130,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     faults.refuse()
     assert times is not None
     raw = {place: numbers(table, place, others(place), name) for name, place in places.items()}
-    whole, lost = lost_rows(table, {time_from[0]: times.missing, **raw})
+    whole, lost = complete_rows(table, {time_from[0]: times.missing, **raw})
     kept = whole[times.kept]
     rows = times.kept[kept]
     if "mark" in places:

@@ -159,34 +159,45 @@ class EntryReader(Entry):
     def entry(
         self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False
     ) -> Any:
-        """A number in SI units, or the text of an expression, with its unit checked; NaN if it is wrong. `motion` are
-        the units of the names that a load knows beside parameters and inputs."""
+        """The value of a key: a number in the SI `unit`, or the text of an expression whose names and unit are right;
+        NaN, with a fault, if it is wrong.
+
+        Parameters
+        ----------
+        motion : of the entry of a load, the units of the names that it knows beside parameters and inputs
+        inputs : whether an expression may name inputs
+        """
         with self.at(key):
             if not isinstance(entry, str) or _is_quantity(entry):
                 return self.number(key, entry, unit)
             if self.refused & words_in(entry):  # the name itself is faulted at its own key
                 return math.nan
-            parsed = expression(entry)
-            names = {**self.units, **(motion or {}), **self.further_units(parsed, motion is not None)}
-            self.check_names(parsed, names, inputs)
-            self.used |= {*parsed.names}
-            name = entry.strip()
-            if parsed.names == (name,) and self.units.get(name, "") is None:
-                self.units[name] = names[name] = unit
-                self.derived_dimensions = None
-            checked_dimension(parsed.text, self.dimensions(names), unit)
-            for width in parsed.widths:
-                moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
-                if moving:
-                    raise InputError(
-                        f"is {shown(entry)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
-                        "must be a number or an expression of parameters; a ramp that begins at such a value a is "
-                        "ramp(x - a, 0, width)"
-                    )
+            self.check_expression(expression(entry), unit, motion, inputs)
             if motion is None:
                 self.expressed[key, entry] = None
             return entry
         return math.nan
+
+    def check_expression(self, parsed: Expression, unit: str, motion: NameUnits | None, inputs: bool) -> None:
+        """Refuse an expression with a wrong name, of another unit, or with a width that changes in a run; the
+        arguments are as of `entry`. The parameters and inputs in it are used, and one that has no unit yet, and
+        stands alone in it, has this one."""
+        names = {**self.units, **(motion or {}), **self.further_units(parsed, motion is not None)}
+        self.check_names(parsed, names, inputs)
+        self.used |= {*parsed.names}
+        name = parsed.text.strip()
+        if parsed.names == (name,) and self.units.get(name, "") is None:
+            self.units[name] = names[name] = unit
+            self.derived_dimensions = None
+        checked_dimension(parsed.text, self.dimensions(names), unit)
+        for width in parsed.widths:
+            moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
+            if moving:
+                raise InputError(
+                    f"is {shown(parsed.text)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
+                    "must be a number or an expression of parameters; a ramp that begins at such a value a is "
+                    "ramp(x - a, 0, width)"
+                )
 
     def check_names(self, parsed: Expression, names: NameUnits, inputs: bool) -> None:
         """Refuse an expression with a name that is not among the `names`, or of an input without leave."""
@@ -428,6 +439,7 @@ def _like(unit: str) -> str:
 
 
 def _same_unit(text: str, unit: str) -> bool:
+    """Whether a text is the name of the SI `unit`, as FMI or as an engineer writes it."""
     try:
         return units.convert(1.0, text, unit) == 1.0 if text != "1" else unit == "1"
     except ValueError:

@@ -259,12 +259,14 @@ class GearKind(SingleLinkKind):
         return float(rate)
 
     def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
-        """The wheel with its mesh; an idler only hands on the turn of the wheel before it."""
+        """The wheel `link`, which turns on the arm in its `pin` and meshes with another wheel in the gear `joint`. If
+        the other wheel is itself driven by a gear on the same arm, it is an idler: the turn then follows from the
+        wheel that drives it, by the product of both ratios."""
         other, arm = joint.other_link(link), joint.third
-        before = next((g for g in parts.groups if isinstance(g, GearedLink) and g.bar.name == other), None)
+        idler = next((g for g in parts.groups if isinstance(g, GearedLink) and g.bar.name == other), None)
         rolling = Rolling(_moving(arm), _moving(other), _ratio(joint, link))
-        if before is not None and before.rolling.arm == rolling.arm:
-            rolling = before.rolling._replace(ratio=rolling.ratio * before.rolling.ratio)
+        if idler is not None and idler.rolling.arm == rolling.arm:
+            rolling = idler.rolling._replace(ratio=rolling.ratio * idler.rolling.ratio)
         bar, mesh = parts.hung(link, pin), parts.pin(arm, joint.name)
         parts.receive(joint, mesh, link)
         structure, centre = parts.structure, parts.pin(other, joint.at(other))

@@ -37,6 +37,7 @@ class LinkageParts:
         self.frames: dict[str, LinkFrame] = {GROUND: OWN}
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
         self._carriers = {self.pin(GROUND, name): GROUND for name in self.structure.ground}
+        """by pin, the first link that has it: all others hang on this one there"""
         groups = list(self.structure.groups)
         cylinder = groups.pop(0) if groups and groups[0].kind == CYLINDER else None
         self.driver = self._driver() if cylinder is None else self._cylinder(cylinder)
@@ -61,7 +62,10 @@ class LinkageParts:
     # bars
 
     def bar(self, link: str, frame: LinkFrame, start: str = "", length: Any = None) -> Bar:
-        """The bar of a link in a frame; it starts from the pin `start`."""
+        """The bar of a link in a frame, with a `length` [m] if it has two joints; it starts from the pin `start`. It
+        carries the points that no link before it carries. A point that an earlier link carries is named anew, as
+        ``link.point``, if a load or a joint asks for the one of this very link (`Structure.marked`), and else left
+        out."""
         entry = self.structure.links[link]
         self.frames[link] = frame
         points = {}
