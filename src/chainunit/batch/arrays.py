@@ -93,7 +93,8 @@ def by_numpy(
 
 def _mark(out: Any, reason: Any, not_finite: int) -> None:
     """Write NaN into the results of states that have a reason, and the reason `not_finite` for states of which a
-    result is not finite. `out` has an array for each result, of the shape of `reason`, which is 0 for a good state."""
+    result is not finite. `out` has an array for each result, of the shape of `reason`, which is 0 for a good
+    state."""
     finite = np.ones(reason.shape, bool)
     for y in out:
         finite &= np.isfinite(y)
