@@ -266,6 +266,7 @@ def csv_rows(
         faults.add([InputError(f"{file}:{first}: column {name}: {message}", placed=True)])
 
     def rows() -> Iterator[CatalogueRow]:
+        """The rows of the table; one with more or fewer cells than headings is a fault."""
         for line, row in others:
             if len(row) == len(columns):
                 cells = zip(columns, map(str.strip, row), strict=True)

@@ -149,6 +149,7 @@ def _pins(
 
 
 def _lines(sketch: Sketch, positions: Mapping[str, Place], width: float) -> list[str]:
+    """The links of a sketch as paths of SVG of a `width`, with the driven one in its own colour."""
     return [
         f'<path d="M{" L".join(f"{x:.1f} {y:.1f}" for x, y in points)}" fill="none" '
         f'stroke="{_DRIVEN if name == sketch.driven else _DARK}" stroke-width="{width:g}" stroke-linecap="round" '

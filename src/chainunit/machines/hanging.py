@@ -90,6 +90,7 @@ def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
     w = W / l
 
     def parts(p: Any) -> tuple[float, Any, Any]:
+        """Value, gradient and second derivatives of f at the pull `p`: integrals over the pieces in closed form."""
         H = abs(p[0])
         v = p[1] - ends
         size = np.hypot(H, v)

@@ -188,6 +188,7 @@ class TableList:
         present: set[str] = set()
 
         def named_result(entry: Entry, number: int) -> tuple[str, T]:
+            """The name of an entry and what `read` gives for it; a name that stands there twice is a fault."""
             self._read_form(entry)
             name = entry.given.get(self.named_by, usual and f"{usual}{number}")
             self._check(entry, name, names, fixed or {})

@@ -112,6 +112,7 @@ def derived(
     description. A type checker takes the property for an attribute of the type that it gives."""
 
     def declared(function: Callable[[Any], T]) -> Any:
+        """The property of a function, whose docstring is the description of the part."""
         derived_part = _Derived(function)
         description = " ".join((function.__doc__ or "").split()).removesuffix(".")
         description = description[:1].lower() + description[1:]

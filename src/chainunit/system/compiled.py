@@ -238,6 +238,7 @@ class _Influences:
 
 @lru_cache(maxsize=64)
 def _influences(model: Model) -> _Influences:
+    """The inputs on which outputs, derivatives and start of a model depend, by its equations."""
     interface = Interface(model, {})
     n_states, n_outputs = len(interface.states), len(interface.others)
 
@@ -257,6 +258,7 @@ def _influences(model: Model) -> _Influences:
 
 
 def _constraints(interface: Interface) -> set[str]:
+    """The inputs on which the states after an event depend, see `Model.constrained_states`."""
     import casadi
 
     t = interface.trace
@@ -308,6 +310,8 @@ class _Plan:
         self._started_by: dict[str, set[str]] = {}
 
         def begin(name: str, above: tuple[str, ...]) -> None:
+            """Add the start of a component to the steps, after all outputs that its states need; `above` are the
+            components that wait for it."""
             if name in above:
                 loop = " -> ".join((*above[above.index(name) :], name))
                 raise InputError(f"the states at the start depend on each other: {loop}")

@@ -162,6 +162,7 @@ class LinearModel:
         return control.ss(self.A, self.B, self.C, self.D, name=self.model, **names)
 
     def _refuse_undefined(self) -> None:
+        """Refuse a linear model with a derivative that is not defined."""
         for name in "ABCD":
             for row, column in np.argwhere(~np.isfinite(getattr(self, name)))[:1]:
                 row_name = (self.states if name in "AB" else self.outputs)[row].name

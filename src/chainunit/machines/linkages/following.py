@@ -258,6 +258,7 @@ def _lowest(
     open_places: list[float] = []
 
     def value(q: float) -> float:
+        """The margin at a place; NaN from the first place on at which the linkage does not close."""
         try:
             margin = math.nan if open_places else margins_at(q)[group]
         except (ArithmeticError, ValueError):

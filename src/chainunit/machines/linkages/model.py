@@ -240,6 +240,8 @@ class LinkageDescription(LinkageOutputs):
         return MotionExtreme(coordinate, self.way.places(), 1.0 if kind == "max" else -1.0, ends)
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
+        """A load of the file on the links: a spring, a torque, or a force along the frame or along its link
+        (follower)."""
         kind, (link, *point), geometry = load["type"], load["on"], parts.geometry
         if kind == "spring":
             one, other = (
