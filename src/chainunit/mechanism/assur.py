@@ -123,7 +123,8 @@ def in_order_of_motion(
 def _dependences(
     unknown: Sequence[str], joints: Sequence[JointOf], matched: Mapping[tuple[int, int], str]
 ) -> dict[str, dict[str, None]]:
-    """For each link the others on which its equations depend."""
+    """By link, the others on which it depends: those in the joints whose equations are `matched` with it. The inner
+    dicts are sets that keep the order."""
     depends: dict[str, dict[str, None]] = {link: {} for link in unknown}
     for (k, _), link in matched.items():
         for other in joints[k].links:

@@ -366,7 +366,7 @@ def inspect_steadiness(
 
 
 def inspect_work(recording: Recording, ratio: float, off: float | None = None) -> list[InputError]:
-    """That no turn of a steady run takes work of the other sign than the run, by the mean torque or power of each.
+    """The faults of turns of a steady run whose mean torque or power has another sign than in most turns.
 
     Parameters
     ----------

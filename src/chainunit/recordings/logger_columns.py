@@ -167,7 +167,22 @@ def decimal_signs(cells: Sequence[str]) -> frozenset[str]:
 
 
 def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
-    """The cells of a column with a decimal point and without marks of thousands."""
+    """The cells of a column with a decimal point and without marks of thousands; `others` are the decimal signs of
+    other columns."""
+    text = _usual_numbers(table, place)
+    decimal, has_thousands = _decimal_sign(table, place, text, others)
+    if has_thousands:
+        text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
+    text = text.replace(",", ".") if decimal == "," else text
+    plain = _without_absent(text.split("\n")) if _ABSENT.search(text) else text.split("\n")
+    _refuse_left_out(table, place, plain)
+    _refuse_added(table, place, plain)
+    return plain
+
+
+def _usual_numbers(table: LoggerTable, place: int) -> str:
+    """The cells of a column, line by line: signs without a blank after them, exponents by an e, negative numbers with
+    their sign before them, and thousands without blanks between."""
     # Python takes an underscore for a mark of thousands
     text = "\n".join(table.column(place)).replace("_", "?")
     if " " in text:
@@ -176,12 +191,16 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
         text = _OF_FORTRAN.sub("e", text)
     if len(_OF_ACCOUNTS.findall(text)) > max(1.0, LEFT_OUT * len(table.rows)):
         text = _OF_ACCOUNTS.sub(r"-\1\2", text)
-    if (
-        any(sign in text for sign in _BLANKS)
-        and _GROUP.search(text)
-        and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE)
-    ):
+    has_groups = any(sign in text for sign in _BLANKS) and _GROUP.search(text)
+    if has_groups and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE):
         text = _GROUP.sub("", text)
+    return text
+
+
+def _decimal_sign(table: LoggerTable, place: int, text: str, others: frozenset[str]) -> tuple[str, bool]:
+    """The decimal sign of the cells in `text`, empty without one, and whether they have marks of thousands. A sign
+    whose cells may have either is the decimal one if `others` have it, or else if it is usual with the mark between
+    columns; any other doubt is refused."""
     present = {sign: shapes for sign, shapes in _SHAPES.items() if sign in text}
     decimals = {sign for sign, (decimal, _, _) in present.items() if decimal.search(text)}
     maybe = {sign for sign, (_, _, either) in present.items() if either.search(text)}
@@ -198,14 +217,7 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
         decimals = maybe
     if decimals and (maybe - decimals) - grouped:
         raise _doubtful(table, place, maybe - decimals)
-    decimal = next(iter(decimals), "")
-    if grouped:
-        text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
-    text = text.replace(",", ".") if decimal == "," else text
-    plain = _without_absent(text.split("\n")) if _ABSENT.search(text) else text.split("\n")
-    _refuse_left_out(table, place, plain)
-    _refuse_added(table, place, plain)
-    return plain
+    return next(iter(decimals), ""), bool(grouped)
 
 
 def _without_absent(cells: list[str]) -> list[str]:
@@ -412,10 +424,45 @@ def _time_of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[
     return time - np.nanmin(time), f"time from {len(places)} columns"
 
 
+class _ClockTime(NamedTuple):
+    """A time of a clock [s], with the days that stand before it; whether it is `short`, from the full hour on, else
+    it is from midnight on; and its hour, the digits of its fraction of a second, and its zone."""
+
+    seconds: float
+    short: bool
+    hour: int
+    digits: int
+    zone: str
+
+
+def _clock_time(table: LoggerTable, row: int, place: int, clock: Any, half: str) -> _ClockTime:
+    """The time of a row by the match of its `clock`; `half` is the cell with the half of the day, if the clock has
+    none. Refuse a time whose minutes or whose fraction may mean two things."""
+    h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
+    if s is None:
+        h, m, s = 0, h, str(m)
+        if clock["f"] is None:
+            raise InputError(
+                f"{table.place_of(row, place)}: {printable(clock[0], 40)} may be hh:mm or mm:ss, and does not "
+                "resolve the rows; write hh:mm:ss.fff"
+            )
+    fraction = clock["f"] or ""
+    if fraction and len(fraction) < 3 and clock[0][clock.start("f") - clock.start() - 1] == ":":
+        raise InputError(
+            f"{table.place_of(row, place)}: {printable(clock[0], 40)} may end with hundredths, with frames or with "
+            "ms; write hh:mm:ss.fff"
+        )
+    if letter := clock["half"] or half[:1]:
+        h = h % 12 + 12 * (letter in "pP")
+    days = int(clock["days"] or clock["span"] or 0)
+    seconds = _DAY * days + 3600.0 * h + 60.0 * m + int(s) + float(f"0.{fraction or 0}")
+    return _ClockTime(seconds, clock["s"] is None, h, len(fraction), (clock["zone"] or "").strip())
+
+
 def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
-    """The times from the first row on, by dates and times of the day."""
-    seconds, days = np.full(len(table.rows), np.nan), list[str]()
-    short, has_fraction, hours, zones, widths = False, False, set[int](), set[str](), set[int]()
+    """The times from the first row on [s], shape (rows,), by dates and times of the day; and words on their source.
+    The columns at `places` have dates, times, the half of the day, and parts of a second."""
+    seconds, days, clocks = np.full(len(table.rows), np.nan), list[str](), list[_ClockTime]()
     half = next((place for place in places if _is_half(table, place)), -1)
     beside = {place: factor for place in places if (factor := _fraction(table, place))}
     places = [place for place in places if place not in beside and place != half]
@@ -440,34 +487,15 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         if clock is None:
             seconds[k] = 0.0
             continue
-        h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
-        short, has_fraction = s is None, has_fraction or bool(clock["f"])
-        if s is None:
-            h, m, s = 0, h, str(m)
-            if clock["f"] is None:
-                raise InputError(
-                    f"{table.place_of(k, places[0])}: "
-                    f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and does not resolve the rows; write "
-                    "hh:mm:ss.fff"
-                )
-        if clock["f"] and len(clock["f"]) < 3 and clock[0][clock.start("f") - clock.start() - 1] == ":":
-            raise InputError(
-                f"{table.place_of(k, places[0])}: {printable(clock[0], 40)} may end with hundredths, with frames or "
-                "with ms; write hh:mm:ss.fff"
-            )
-        if letter := clock["half"] or (row[half][0] if half >= 0 else ""):
-            h = h % 12 + 12 * (letter in "pP")
-        widths.add(len(clock["f"] or ""))
-        hours.add(h)
-        zones.add((clock["zone"] or "").strip())
-        passed = int(clock["days"] or clock["span"] or 0)
-        seconds[k] = _DAY * passed + 3600.0 * h + 60.0 * m + int(s) + float(f"0.{clock['f'] or 0}")
+        clocks.append(_clock_time(table, k, places[0], clock, row[half] if half >= 0 else ""))
+        seconds[k] = clocks[-1].seconds
+    zones, widths = ({getattr(time, name) for time in clocks} for name in ("zone", "digits"))
     if len(zones) > 1:
         raise InputError(
             f"{table.file}, column {table.heads[places[0]]}: has times of {len(zones)} zones "
             f"({', '.join(sorted(map(repr, zones)))}); write all in one"
         )
-    for place, factor in beside.items() if not has_fraction else ():
+    for place, factor in beside.items() if not any(widths) else ():
         seconds += factor * np.array([float(row[place]) for row in table.rows])
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
@@ -476,15 +504,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         source = f"time from {count} columns" if count > 1 else "time from dates and clock"
         source += f", from {days[0]} on, as 0 s" + (f" ({zone})" if zone else "")
     else:
-        before = seconds
-        order = -1 if np.nanmedian(np.diff(seconds)) < 0.0 else 1
-        seconds = _over_midnight(seconds[::order], 3600.0 if short else _DAY)
-        if hours <= set(range(1, 13)) and not short:
-            seconds = _over_midnight(seconds, 0.5 * _DAY)
-        seconds = seconds[::order]
-        source = "time from a clock, the first row as 0 s"
-        if not np.array_equal(before, seconds, equal_nan=True):
-            source += f", over {'the full hour' if short else 'midnight'}"
+        seconds, source = _without_dates(seconds, clocks)
     has_time = np.isfinite(seconds)
     steps = np.diff(seconds[has_time])
     if len(widths) > 1 and np.any(steps < 0.0) and np.any(steps > 0.0):
@@ -493,6 +513,22 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             "digits, and the times run backwards; write ms with zeros before them, such as .024, or sort the rows"
         )
     return seconds - seconds[np.flatnonzero(has_time)[0]], source
+
+
+def _without_dates(seconds: Any, clocks: Sequence[_ClockTime]) -> tuple[Any, str]:
+    """Times of a clock [s], shape (rows,), that go on after midnight, or after the full hour; and words on their
+    source. A clock that shows the hours 1 to 12 alone begins anew at noon, too. The rows may fall from the last time
+    to the first one."""
+    short = bool(clocks) and clocks[-1].short
+    order = -1 if np.nanmedian(np.diff(seconds)) < 0.0 else 1
+    rising = _over_midnight(seconds[::order], 3600.0 if short else _DAY)
+    if {time.hour for time in clocks} <= set(range(1, 13)) and not short:
+        rising = _over_midnight(rising, 0.5 * _DAY)
+    goes_on = rising[::order]
+    source = "time from a clock, the first row as 0 s"
+    if not np.array_equal(seconds, goes_on, equal_nan=True):
+        source += f", over {'the full hour' if short else 'midnight'}"
+    return goes_on, source
 
 
 def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:

@@ -305,7 +305,14 @@ class _Plan:
         return [(name, outputs) for name, outputs in steps if outputs]
 
     def start(self) -> list[tuple[str, list[str] | None]]:
-        """The order of the start: components, whose states start, and outputs that such a start depends on."""
+        """The steps of the start in their order: the name of a component and None, if its states start, or else its
+        output, in a list, which the start of other components depends on.
+
+        Raises
+        ------
+        InputError
+            for states that depend on each other.
+        """
         steps: list[tuple[str, list[str] | None]] = []
         self._started_by: dict[str, set[str]] = {}
 

@@ -83,8 +83,9 @@ class MeshData(NamedTuple):
         return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
-        """See `JointData`: the force turns with the arm, and so does its lever on the link, which starts from its
-        centre."""
+        """The changes by q of the load of the mesh on both of its links, at a constant size of the force: it turns
+        with the arm. On `link`, which starts from its centre, its lever turns as the force does, so that the moment
+        stays; on the `carrier` the moment changes, too."""
         turn = 0.0 if self.rolling.arm is None else m.links[self.rolling.arm].t1
         more = reaction.turned() * turn
         yield self.link, (more, 0.0)

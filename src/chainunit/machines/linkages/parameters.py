@@ -146,7 +146,9 @@ class ParameterReader(EntryReader):
         self.used |= {*parsed.names}
 
     def quantities(self, kind: str) -> list[dict[str, Any]]:
-        """Parameters or inputs; parameters that are expressions of others are taken up apart."""
+        """The entries of the parameters or the inputs, each with name, value [SI], unit, description, limits and
+        whether it is tunable. The unit is None if the first use of the name tells it. Parameters that are expressions
+        of others are no entries: `expressions` takes them up."""
         entries = []
         table = self.table(kind)
         self.fault_reserved_names(kind, table)
