@@ -333,9 +333,11 @@ class EntryReader(Entry):
                 )
             return self.number("", entry, fits[0]), fits[0]
         parts = units.split(entry) if isinstance(entry, str) else None
-        for si_unit in UNITS if parts is not None and parts[1] else ():
-            if units.converts(parts[1], si_unit):
-                return within(units.convert(*parts, si_unit), entry), si_unit
+        # what begins with a sign after the number is an expression
+        if parts is not None and parts[1][:1] not in ("", "+", "-", "*", "/"):
+            for si_unit in UNITS:
+                if units.converts(parts[1], si_unit):
+                    return within(units.convert(*parts, si_unit), entry), si_unit
         if isinstance(entry, str) and words_in(entry) & {*self.units, *self.table("parameters")}:
             raise InputError(
                 f"is {shown(entry)}; must be a number with a unit; a parameter may be an expression"
