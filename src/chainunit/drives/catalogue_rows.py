@@ -345,7 +345,8 @@ def _with_unit(cell: str, unit: str) -> str:
 def _toml_rows(
     text: str, file: str, kinds: Sequence[CatalogueKind], faults: Faults
 ) -> Iterator[tuple[CatalogueKind, Iterable[CatalogueRow]]]:
-    """The tables of a TOML file, by kind."""
+    """By kind, the tables [[kind]] of a TOML text as rows, with the lines of their keys. What is no such table is
+    refused, with the name of the `file`."""
     brackets = [f"[[{kind.name}]]" for kind in kinds]
     each_is = f"each thing is a table {' or '.join(brackets)}"
     with in_file(file, lambda: toml_lines.lines_of(text)):

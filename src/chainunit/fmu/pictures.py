@@ -27,7 +27,7 @@ def icon_svg(sketch: Sketch) -> bytes:
 
 
 def icon_png(sketch: Sketch) -> bytes:
-    """The same icon as PNG."""
+    """The icon of a sketch as PNG, as `icon_svg` draws it."""
     from PIL import Image, ImageDraw
 
     scale = 4 * _SIZE / 100.0  # drawn larger and reduced: so its lines are smooth

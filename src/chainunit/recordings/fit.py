@@ -93,7 +93,9 @@ def normal_equations(
 def assemble(
     problem: Problem, z: Any, comparisons: tuple[Comparison, ...], scales: Scales | None = None
 ) -> NormalEquations:
-    """The same from the `comparisons` at these values."""
+    """The normal equations at the unknowns `z`, shape (unknowns,), from the `comparisons` there and from the prior:
+    cost, gradient and matrix. Residuals are divided by the `scales` of their columns, and those beyond `OUTLIER`
+    count less (Huber)."""
     deviations = problem.prior_deviations
     size = len(deviations)
     fisher, gradient = np.zeros((size, size)), (problem.start_values - z) / deviations**2

@@ -408,7 +408,7 @@ def _may_end(cells: Sequence[str], key: int, width: int, is_last: bool) -> bool:
 
 
 def _cells(file: Path, lines: Sequence[tuple[int, str]], mark: str) -> Iterator[tuple[int, str, list[str]]]:
-    """Each line with its number and its cells."""
+    """Each line with its number and its cells: between blanks, or as CSV with quotation marks."""
     if mark in (" ", "  "):
         yield from ((number, line, cells_of_line(line, mark)) for number, line in lines)
         return

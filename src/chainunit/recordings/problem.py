@@ -345,7 +345,8 @@ class Problem:
     def _compare_columns(
         self, simulation: SimulatedRun, value: Mapping[str, float], with_slopes: bool
     ) -> Iterator[Comparison]:
-        """Measured over simulated, column by column."""
+        """The comparisons of measured and simulated values, column by column, at the rows that the plant describes:
+        the residuals in parts of the size of the column, and, `with_slopes`, their derivatives by the unknowns."""
         run, response = simulation.run, simulation.response
         recording, names = run.recording, simulation.names if with_slopes else ()
         time, rates = self._simulation_times(run, recording.time, value)

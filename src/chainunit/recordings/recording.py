@@ -216,7 +216,8 @@ def _text(file: Path) -> str:
 
 
 def _places(table: LoggerTable, names: Mapping[str, str], faults: Faults) -> dict[str, int]:
-    """By quantity, the place of its column."""
+    """By quantity, the place of its column: the one with the head of `names`, or else with the name of the quantity.
+    Two such columns, and names without a column, go to the `faults`."""
     file, heads = table.file, table.heads
     places = dict[str, int]()
     for quantity in COLUMNS:

@@ -130,7 +130,9 @@ def input_starts(system: System, model: Model) -> dict[str, float]:
 
 
 def _description(system: System, models: Mapping[str, Model], name: str, title: str) -> dict[str, Any]:
-    """The description of a system that a `chainunit.core.system_description.SystemDescription` takes."""
+    """The description of a system as `chainunit.core.system_description.SystemDescription` takes it, in types of
+    JSON: the exact connections, in place of the slopes of load ports; what is left out or shown in addition; and the
+    order in which outputs, rates and the start are computed."""
     exact = hold_loads(system).connections
     influences = {component: _influences(model) for component, model in models.items()}
     free = _free_terminals(system)

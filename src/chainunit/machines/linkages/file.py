@@ -155,7 +155,7 @@ class _LinkageReader(LoadReader):
     """The reader of one file."""
 
     def description(self) -> dict[str, Any]:
-        """The description."""
+        """The description of the machine, as `LinkageDescription` takes it."""
         study_fault(self.data)
         self.fault_drivers()
         data = self.data
@@ -402,7 +402,8 @@ class _LinkageReader(LoadReader):
     def slide(
         self, table: Mapping[str, Any], joints: list[dict[str, Any]]
     ) -> tuple[dict[str, Any], list[float] | None]:
-        """A driver that slides, and its range."""
+        """The driver that slides in the prismatic joint that its table names, with the link that moves, and its range
+        [m]; nothing and None, with a fault, for another joint."""
         for name in ("link", "zero", "positive"):
             if name in table:
                 self.fault(
@@ -520,7 +521,8 @@ class _LinkageReader(LoadReader):
                 self.doubt(variable, table["inertia"], number(link["inertia"]))
 
     def given_pose(self, table: Mapping[str, Any], pose: StartPose) -> None:
-        """Points, angles and poses that the file gives."""
+        """Take what the table of the start gives into the `pose`: places of points, angles of links, and whole poses.
+        A point by its name alone is that point of every link that has it."""
         links = {name: points for name, points in self.points.items() if name != GROUND}
         for name, entry in self.table("start.points", table).items():
             key = f"start.points.{name}"

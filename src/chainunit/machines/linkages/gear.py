@@ -189,7 +189,7 @@ class GearKind(SingleLinkKind):
     alone = "geared link"
 
     def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
-        """Add the teeth."""
+        """Add to the `joint` the teeth of both wheels, and whether one is a ring (internal)."""
         teeth: Any = table.get("teeth")
         internal = table.get("internal", False)
         whole = isinstance(teeth, list) and len(teeth) == 2 and all(type(z) is int and z > 0 for z in teeth)

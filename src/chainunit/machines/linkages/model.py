@@ -179,7 +179,8 @@ class LinkageDescription(LinkageOutputs):
         return name, Value, quantity(q.unit, description, default=0.5 * (low + high), min=low, max=high)
 
     def values(self, xp: Any, p: Any, u: Any) -> dict[str, Any]:
-        """The quantities that expressions may name."""
+        """By name, the values of all that expressions may name: parameters and inputs of the file, quantities of
+        links, extremes, tables as curves, and the parameters that are expressions of others."""
         values = {entry["name"]: getattr(p, entry["name"]) for entry in self.data.get("parameters", ())}
         values |= {entry["name"]: getattr(u, entry["name"]) for entry in self.data.get("inputs", ())}
         for link in self.data["links"]:
@@ -375,7 +376,7 @@ class LinkageDescription(LinkageOutputs):
         return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 
     def model(self) -> InverseMachine:
-        """The model."""
+        """The model of the machine."""
         data = self.data
         receivers = self.at_start.parts.receivers
         variables = {name: self.variable("joint", name) for name in self.structure.joints}
