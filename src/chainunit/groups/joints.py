@@ -262,8 +262,8 @@ class Hinge(Placed):
         return [x, y]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """The right sides of the two rows: what the known motion gives to the next order of the pin, see
-        `Joint.right`."""
+        """See `Joint`: the known derivative of the pin before the group, if it is one, and on both links the part of
+        the next derivative of the pin that the lower ones give, such as the centripetal acceleration."""
         e, base = ZERO, self._base
         if base is not None:
             e = before[0] if before is not None else base.p2 if rates else base.p1
@@ -330,8 +330,8 @@ class Guide(Hinge):
         return [x, y, {k + 2: 1, UNKNOWNS * other + 2: -1} if isinstance(other, int) else {k + 2: 1}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """The right sides of the two rows of the gap and of the row of the angle: those of a pin, and what a line
-        that turns while the block slides adds (Coriolis)."""
+        """See `Joint`: for the two rows of the point those of a pin, and what a line that turns while the block
+        slides adds (Coriolis); for the row of the angle the turn of the line, if it is known before the group."""
         other, angle, order, d = self._other, 0.0, len(rates), self._d
         if isinstance(other, int):
             turns = [z[UNKNOWNS * other + 2] for z in rates]

@@ -136,6 +136,7 @@ def _description(system: System, models: Mapping[str, Model], name: str, title: 
     exact = hold_loads(system).connections
     influences = {component: _influences(model) for component, model in models.items()}
     free = _free_terminals(system)
+    # variables of terminals that are not joined
     members = {
         f"{full.partition('.')[0]}.{variable}"
         for full in free
@@ -145,9 +146,11 @@ def _description(system: System, models: Mapping[str, Model], name: str, title: 
     gears = {
         component: influences[component] for component, model in models.items() if not model.state_layout
     }
+    # slopes that a part without states needs to pass them on to a free terminal
     passed = _passed_on(slopes, members, gears)
     connections = [*exact, *passed]
     left_out = {full for connection in slopes - set(passed) for full in connection}
+    # outputs of further parts of the models, such as slopes, are extra ones of the system, if they are needed
     further = {
         f"{name}.{output}"
         for name, model in models.items()
