@@ -734,9 +734,9 @@ def complete_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, 
     count = int(np.sum(~whole))
     if not count:
         return whole, []
-    kinds = [kind for place, x in columns.items() for kind in _kinds_of(table, place, np.isnan(x))]
+    cells = [cell for place, x in columns.items() for cell in _kinds_of(table, place, np.isnan(x))]
     rows = "row" if count == 1 else "rows"
-    return whole, [f"{count} {rows} without a number ({', '.join(dict.fromkeys(kinds))})"]
+    return whole, [f"{count} {rows} without a number ({', '.join(dict.fromkeys(cells))})"]
 
 
 def _kinds_of(table: LoggerTable, place: int, missing: Any) -> Iterator[str]:
