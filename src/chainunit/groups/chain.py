@@ -60,7 +60,7 @@ class _Matrix:
         return Vec2((self.yy * v.x - self.xy * v.y) / det, (self.xx * v.y - self.xy * v.x) / det)
 
 
-class _Step(NamedTuple):
+class _RodStep(NamedTuple):
     """A rod in the recursion: the normal `n` of its direction, and what its angular acceleration and the force and
     acceleration at its start are by the force f at its end.
 
@@ -118,7 +118,7 @@ class Recursion:
         self._half, quarter = 0.5 / kappa, 0.25 / kappa
         zero = 0.0 * theta[0]
         self.compliance, self._free_end = _Matrix(zero, zero, zero), Vec2(zero, zero)
-        self._steps: list[_Step] = []
+        self._steps: list[_RodStep] = []
         for k, (l, m) in enumerate(zip(rods.lengths, rods.masses, strict=True)):
             s, c = xp.sin(theta[k]), xp.cos(theta[k])
             u, n = Vec2(s, -c), Vec2(c, s)
@@ -135,7 +135,7 @@ class Recursion:
             #   = E^T a_before + (l^2/j) n (n . f) + l n turn - l u spin
             self._go_on(l, step, u * (l * spin[k]))
 
-    def _step(self, quarter: Any, m: Any, n: Vec2, pull: Vec2, turn: Any, j: Any) -> _Step:
+    def _step(self, quarter: Any, m: Any, n: Vec2, pull: Vec2, turn: Any, j: Any) -> _RodStep:
         """The step of a rod on the chain before it, whose end has the acceleration a_before = Phi f_before + beta. As
         f_before = pull + E f - B a_before, with B = m (1 - n n/(4 kappa)), the acceleration solves
         (1 + Phi B) a_before = Phi (pull + E f) + beta. `quarter` is 1/(4 kappa)."""
@@ -155,9 +155,9 @@ class Recursion:
             (k11 * phi.yy - k21 * phi.xy) / det,
         )
         rest = Vec2((k22 * beta.x - k12 * beta.y) / det, (k11 * beta.y - k21 * beta.x) / det)
-        return _Step(n, pull, b, S, rest + S.times(pull), turn, j)
+        return _RodStep(n, pull, b, S, rest + S.times(pull), turn, j)
 
-    def _go_on(self, l: Any, step: _Step, inward: Vec2) -> None:
+    def _go_on(self, l: Any, step: _RodStep, inward: Vec2) -> None:
         """Add the rod of a step to the chain: Phi = E S E + (l^2/j) n n, with E = 1 - n n/(2 kappa), and beta.
         `inward` is the acceleration of its end towards its start by its angular speed [m/s2]."""
         n, S, half = step.n, step.S, self._half
