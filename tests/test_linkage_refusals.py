@@ -92,3 +92,14 @@ def test_names_of_parameters_may_hold_units(tmp_path):
 
     one, two = (Machine(read_linkage(each)).outputs(1.0, 2.0, 3.0) for each in (file, plain))
     assert float(one.tau) == pytest.approx(float(two.tau), rel=1e-12)
+
+
+def test_an_input_has_its_unit_beside_a_parameter_of_that_name(tmp_path):
+    """Else ``2.5 kN`` would be an expression of the parameter kN; a true expression of it is refused."""
+    file = tmp_path / "mine.toml"
+    named = [('l = "360 mm"', 'kN = "360 mm"'), ('["l", 0]', '["kN", 0]')]
+    file.write_text(changed(named), "utf-8")
+    assert read_linkage(file).Inputs().press_force == pytest.approx(2500.0, rel=1e-15)
+    file.write_text(changed([*named, ('"2.5 kN"', '"2.5 * kN"')]), "utf-8")
+    with pytest.raises(InputError, match="must be a number with a unit; a parameter may be an expression"):
+        read_linkage(file)

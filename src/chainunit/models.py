@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .core.errors import InputError, UnknownNameError, meant, near_name, shown
-from .core.inputs import TOML, file_text
 from .core.register import Register
 
 if TYPE_CHECKING:
@@ -35,17 +34,19 @@ MODELS: Mapping[str, Model] = _Models(Register("chainunit.models"), MOTORS, MACH
 """All models."""
 
 
-def is_study_file(name: str) -> bool:
-    """Whether the name is that of a study file: a file in TOML without the tables of a linkage."""
-    if not name.lower().endswith(".toml"):
-        return False
-    from .reading.tables import toml  # a model with a name needs no reader of files
+def linkage_named(name: str) -> InverseMachine | None:
+    """The machine of the linkage file of that name; None for a study file, and for a name that is no file in TOML.
 
-    try:
-        data = toml(file_text(Path(name), TOML))
-    except InputError:
-        return False  # whoever reads the file says what is wrong
-    return not {"links", "ground", "driver", "joints"} & set(data)
+    Raises
+    ------
+    InputError
+        for a file that is wrong.
+    """
+    if not name.lower().endswith(".toml"):
+        return None
+    from .machines.linkages.file import linkage_unless_study  # a model with a name needs no reader of files
+
+    return linkage_unless_study(Path(name))
 
 
 def model_named(name: str, direct: bool = False, rods: int | None = None) -> Model:

@@ -88,10 +88,11 @@ def export(
 ) -> None:
     """Write a model as an FMU; of a study file its whole system as one FMU, or as an SSP package of FMUs."""
     from ..fmu.backends import export as write
-    from ..models import is_study_file, model_named
+    from ..models import linkage_named, model_named
 
     file = output
-    whole = is_study_file(name)
+    linkage = linkage_named(name)
+    whole = linkage is None and name.lower().endswith(".toml")
     if file and file.suffix == ".ssp" and whole:
         if config or direct or platforms or fmi != 2:
             raise InputError(
@@ -119,6 +120,8 @@ def export(
             model, start = model_and_start(
                 name, loaded, rods, direct=direct, backend=kind, progress=status.update
             )
+        elif linkage:
+            model, start = linkage.direct() if direct else linkage, {}
         else:
             model, start = model_named(name, direct, rods), {}
         file = file or Path(f"{model.name}.fmu")

@@ -92,7 +92,9 @@ def by_numpy(
 
 
 def _mark(out: Any, reason: Any, not_finite: int) -> None:
-    """Results of states with a reason are NaN, and states with a result that is not finite have a reason."""
+    """Write NaN into the results of states that have a reason, and the reason `not_finite` for states of which a
+    result is not finite. `out` has an array for each result, of the shape of `reason`, which is 0 for a good
+    state."""
     finite = np.ones(reason.shape, bool)
     for y in out:
         finite &= np.isfinite(y)

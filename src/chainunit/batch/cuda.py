@@ -70,7 +70,7 @@ def namespace(x: Any) -> Any:
 
 
 def source(equations: Equations, code: VectorCode, reductions: Reductions) -> str:
-    """The source of the kernels."""
+    """The source of the kernels in CUDA: the sizes as defines, the code of the states, and the loop over them."""
     has_counts = any(column.name == "histogram" for column in reductions)
     sizes = {
         "BLOCK": _BLOCK,

@@ -367,7 +367,8 @@ class Grid:
         return values
 
     def compute(self, memory: Memory, workers: int) -> None:
-        """Fill the memory with results and reasons."""
+        """Fill the memory with results, reduced if reductions are asked for, and with the reasons of states without a
+        result: by a compiled kernel if there is one, else by numpy."""
         traced = self._equations
         if not self.size[0]:
             return

@@ -108,6 +108,7 @@ class NativeKernel:
         ]
 
         def piece(ends: tuple[int, int, int, int]) -> None:
+            """Compute the states of a piece: begin and end of its rows, begin and end of its columns."""
             self._library.batch(
                 *map(ctypes.c_long, (*ends, inner)),
                 pointers[0],

@@ -36,6 +36,7 @@ def _fields(instance: Any, depth: int) -> str:
 
 
 def _brief(value: Any, depth: int) -> str:
+    """The value in a few characters; entries of entries are left out beyond a `depth`."""
     if isinstance(value, str):
         return repr(value if len(value) <= _LETTERS else f"{value[:_LETTERS]}...")
     if isinstance(value, bool | int | float | complex | None):

@@ -193,6 +193,7 @@ class FileList:
         self._write()
 
     def _write(self) -> None:
+        """Write the lines in the order of their names, or take the file away if there are none."""
         if not self._lines:
             self._file.unlink(missing_ok=True)
             return

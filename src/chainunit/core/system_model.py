@@ -199,7 +199,8 @@ def system_model(data: Mapping[str, Any], models: Mapping[str, Model]) -> System
 
 
 def _outputs_of(declared: Any) -> Callable[..., Any]:
-    """The equations of a part with this declaration."""
+    """The equations of a part of the system with this declaration, whose names are ``component.output``: they take
+    each value from its component at the point of the system."""
     layout = Layout(declared)
     names: dict[str, list[str]] = {}
     for full in layout.names:

@@ -266,6 +266,7 @@ def csv_rows(
         faults.add([InputError(f"{file}:{first}: column {name}: {message}", placed=True)])
 
     def rows() -> Iterator[CatalogueRow]:
+        """The rows of the table; one with more or fewer cells than headings is a fault."""
         for line, row in others:
             if len(row) == len(columns):
                 cells = zip(columns, map(str.strip, row), strict=True)
@@ -344,7 +345,8 @@ def _with_unit(cell: str, unit: str) -> str:
 def _toml_rows(
     text: str, file: str, kinds: Sequence[CatalogueKind], faults: Faults
 ) -> Iterator[tuple[CatalogueKind, Iterable[CatalogueRow]]]:
-    """The tables of a TOML file, by kind."""
+    """By kind, the tables [[kind]] of a TOML text as rows, with the lines of their keys. What is no such table is
+    refused, with the name of the `file`."""
     brackets = [f"[[{kind.name}]]" for kind in kinds]
     each_is = f"each thing is a table {' or '.join(brackets)}"
     with in_file(file, lambda: toml_lines.lines_of(text)):

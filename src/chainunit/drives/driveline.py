@@ -130,6 +130,7 @@ class _Point:
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
+    """The outputs at both ends: the load port of the motor, twists and torques of the shafts, and the driven end."""
     line, tau = s.twist, s.twist.tau1 / p.ratio
     return Outputs(
         tau_bias=tau,
@@ -152,6 +153,8 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
 
 
 def _slopes(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> PortSlopes:
+    """The slopes of the load port, along the motion of both ends; near rest, at `W_SMALL`, the part of the driven end
+    goes to 0."""
     phi1, w1, phi4, w4 = s.ends
     engine = dual(xp)
 

@@ -333,6 +333,7 @@ class InductionMotorPoint(MotorPoint):
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: InductionMotorPoint) -> Outputs:
+    """The outputs of the motor: those of every motor, RMS of current and voltages, powers and stored energy."""
     psi = x.stator.psi
     squared = psi.d * psi.d + psi.q * psi.q
     b = p.main.beta * p.main.beta * squared

@@ -57,6 +57,7 @@ def form(declared: type[ShaftLine], title: str, prefix: str, **others: Any) -> t
 
 
 def _shaft(title: str, prefix: str) -> type[BaseModel]:
+    """The form of the table of a shaft by its geometry."""
     corner = replace(CORNER, name=prefix + CORNER.name)
     coordinate = Annotated[float, BeforeValidator(lambda entry: to_number(corner, entry))]
     outline = list[tuple[coordinate, coordinate]]

@@ -313,7 +313,11 @@ class _Fit:
         return InductionMotor.parameter_layout.instance([*(self.constants | values).values()])
 
     def start(self) -> Any:
-        """The logarithms of the circuit in closed form, without skin effect in rated running and at breakdown."""
+        """The circuit to start from, in closed form, shape (6,): the logarithms of the resistances of stator and
+        rotor when cold [Ohm], of the leakage and the main inductance [H], and of the factors of the rotor's
+        resistance and of the leakage with locked rotor. Resistance and power at rated load give the stator and, with
+        the breakdown torque, rotor and leakage, in rounds; current and torque at rest give the factors. There is no
+        skin effect in rated running and at breakdown."""
         n = self.n
         w_s, phase_v, phase_i = _TURN * n.frequency, n.voltage / math.sqrt(3.0), n.rated_current
         air_gap = n.power * (1.0 + self.assumptions.friction) / (1.0 - n.slip)

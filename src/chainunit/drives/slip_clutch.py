@@ -61,6 +61,7 @@ class _Friction:
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Friction) -> Outputs:
+    """The outputs at both ends: the load port of the motor without inertia, the slip, and the driven end."""
     none = 0.0 * s.tau
     return Outputs(
         tau_bias=s.tau,

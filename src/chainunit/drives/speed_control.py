@@ -109,38 +109,45 @@ def loop(motor: Any, inertia: float) -> Loop:
     [kg m2]. With the current loop C/D the loop, cut at the measured speed, and the response to the load are
 
         G = k (kp s + ki) C/(J s^2 D),    w/T_load = -s D/(J s^2 D + k (kp s + ki) C)
-
-    A test has the same of python-control.
     """
-    from scipy.linalg import expm
-
-    armature, current = motor.armature, motor.current_control
-    control = np.array([current.kp, current.ki])
-    closed = np.polyadd(np.array([armature.L, armature.R, 0.0]), control)
-    rise = armature.k * np.polymul([motor.speed_control.kp, motor.speed_control.ki], control)
-    plant = inertia * np.polymul([1.0, 0.0, 0.0], closed)
-    phase, crossover = _margin(rise, plant)
+    armature, current, speed = motor.armature, motor.current_control, motor.speed_control
+    current_control = np.array([current.kp, current.ki])  # C
+    current_loop = np.polyadd(np.array([armature.L, armature.R, 0.0]), current_control)  # D
+    rise = armature.k * np.polymul([speed.kp, speed.ki], current_control)
+    plant = inertia * np.polymul([1.0, 0.0, 0.0], current_loop)
+    phase_margin, crossover = _margin(rise, plant)
     time = np.linspace(0.0, 40.0 / crossover, 2001)
-    deviation = np.zeros(time.size)
-    poles = np.polyadd(plant, rise)
-    step = expm(np.vstack([-poles[1:] / poles[0], np.eye(3, 4)]) * time[1])
-    state = np.array([1.0, 0.0, 0.0, 0.0])  # after an impulse: a step is an impulse of w/T_load/s
-    for k in range(time.size):
-        deviation[k] = -(closed @ state[1:]) / poles[0]
-        state = step @ state
-    dip = float(np.max(np.abs(deviation)))
-    outside = np.flatnonzero(np.abs(deviation) > 0.05 * dip)
+    deviation = _after_step(current_loop, np.polyadd(plant, rise), time)
+    largest = float(np.max(np.abs(deviation)))
+    outside = np.flatnonzero(np.abs(deviation) > 0.05 * largest)
     frequency = np.logspace(-2.0, 1.5, 200) * crossover
     gain = np.polyval(rise, 1j * frequency) / np.polyval(plant, 1j * frequency)
     return Loop(
-        inertia,
-        phase,
-        crossover,
-        dip,
-        float(time[outside[-1]]),
-        frequency,
-        np.abs(gain),
-        np.degrees(np.unwrap(np.angle(gain))),
-        time,
-        deviation,
+        inertia=inertia,
+        phase_margin=phase_margin,
+        crossover=crossover,
+        largest_deviation=largest,
+        settling=float(time[outside[-1]]),
+        frequency=frequency,
+        gain=np.abs(gain),
+        phase=np.degrees(np.unwrap(np.angle(gain))),
+        time=time,
+        deviation=deviation,
     )
+
+
+def _after_step(current_loop: Any, poles: Any, time: Any) -> Any:
+    """The deviation of the speed after a step of the load torque [(rad/s)/(N m)], at the even times `time` [s], shape
+    (m,): the response of -s D/poles to a step, with D the `current_loop`, both as polynomials in s of the degrees 2
+    and 4, the highest power first."""
+    from scipy.linalg import expm
+
+    companion = np.vstack([-poles[1:] / poles[0], np.eye(3, 4)])
+    step = expm(companion * time[1])
+    # a step has the transform 1/s, so that this is the response of -D/poles to an impulse
+    state = np.array([1.0, 0.0, 0.0, 0.0])
+    deviation = np.zeros(time.size)
+    for k in range(time.size):
+        deviation[k] = -(current_loop @ state[1:]) / poles[0]
+        state = step @ state
+    return deviation

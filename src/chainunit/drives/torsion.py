@@ -61,6 +61,7 @@ def expand(p: Cardan, n: int) -> Cardan:
 
 
 def _pick(p: Cardan, places: Any) -> Cardan:
+    """The lines at some `places` of arrays of lines."""
     return dataclasses.replace(p, **{f.name: getattr(p, f.name)[places] for f in dataclasses.fields(p)})
 
 
@@ -89,6 +90,8 @@ class _LineRates:
         self.torque3: list[Any] = []
 
     def __call__(self, time: float, x: Sequence[Any]) -> list[Any]:
+        """The derivatives of the states phi1, w1, phi4, w4 `x` by the time, which is in parts of the duration; the
+        states are numbers, or dual numbers for slopes."""
         phi1, w1, phi4, w4 = x
         is_dual = isinstance(phi1, Dual)
         near = value(phi1) - self.twist
@@ -189,7 +192,7 @@ def steady(
     p, load = expand(p, n), np.broadcast_to(np.asarray(load, dtype=float), (n,))
     phi3, ratio, _ = two_joints(numpy_(), p, np.zeros(n))
     guess = np.stack([np.zeros(n), speed, phi3 - load / p.c3, speed * np.sqrt(ratio), load])
-    motion = _all(p, speed, load, guess, chunk, _ITERATIONS, lambda x: progress(0.8 * x))
+    motion = _in_batches(p, speed, load, guess, chunk, _ITERATIONS, lambda x: progress(0.8 * x))
     # near a resonance Newton's method has to start from a neighbour and go to the speed in steps
     for walk in _WALKS:
         for side in (-1, 1):
@@ -202,7 +205,7 @@ def steady(
             guess = np.concatenate([motion.start[:, beside], motion.drive[None, beside]])
             for stage in range(1, walk + 1):
                 there = speed[beside] + stage / walk * (speed[gaps] - speed[beside])
-                again = _all(q, there, load[gaps], guess, chunk, _AGAIN, _nothing)
+                again = _in_batches(q, there, load[gaps], guess, chunk, _AGAIN, _nothing)
                 guess = np.concatenate([again.start, again.drive[None]])
             for name, whole in vars(motion).items():
                 whole[..., gaps] = getattr(again, name)
@@ -210,42 +213,54 @@ def steady(
     return motion
 
 
-def _all(
+def _in_batches(
     p: Cardan, speed: Any, load: Any, guess: Any, chunk: int, iterations: int, progress: Progress
 ) -> SteadyMotion:
+    """The motions of all points, as `_shoot` has them: batches of at most `chunk` points with similar numbers of
+    steps, each with the largest one of them."""
     counts = half_turn_steps(p, speed)
     order = np.argsort(counts, kind="stable")
-    parts, before = [], 0.0
+    motions, before = [], 0.0
     for first in range(0, len(speed), chunk):
         batch = order[first : first + chunk]
         share, count = len(batch) / len(speed), int(max(counts[batch]))
-        of_batch = partial(lambda before, share, x: progress(before + share * x), before, share)
-        parts.append(
-            _shoot(_pick(p, batch), speed[batch], load[batch], guess[:, batch], count, iterations, of_batch)
+        batch_progress = partial(lambda before, share, x: progress(before + share * x), before, share)
+        line = _pick(p, batch)
+        motions.append(
+            _shoot(line, speed[batch], load[batch], guess[:, batch], count, iterations, batch_progress)
         )
         before += share
-    back = np.argsort(order, kind="stable")
-    return SteadyMotion.joined(parts, back)
+    return SteadyMotion.joined(motions, np.argsort(order, kind="stable"))
 
 
 def _shoot(
     p: Cardan, speed: Any, load: Any, guess: Any, count: int, iterations: int, progress: Progress
 ) -> SteadyMotion:
+    """The motions of n lines that repeat themselves after half a turn, by Newton's method on the states at its begin
+    (multiple lines at once: those that are done, or have no finite values, take part no longer).
+
+    Parameters
+    ----------
+    p, speed, load : of shape (n,), see `steady`
+    guess : phi1, w1, phi4, w4 and the torque on J1 to start from, shape (5, n)
+    count : number of steps of a half turn
+    iterations : most iterations
+    """
     n = len(speed)
     period = math.pi / speed
     scale = np.stack([np.ones(n), speed, np.ones(n), speed])
     # phi1 = 0 fixes the phase; the unknowns are the other states and the torque on J1
+    weights = np.concatenate([scale[1:], np.maximum(np.abs(load), p.J1 * speed**2)[None]])
     x, drive = guess[:4].copy(), guess[4].copy()
-    reference = np.maximum(np.abs(load), p.J1 * speed**2)
     exists = np.zeros(n, dtype=bool)
     active = np.arange(n)
     extremes = {name: np.full(n, np.nan) for name in ("largest2", "least2", "largest3", "least3")}
     monodromy, held = np.full((4, 4, n), np.nan), np.full((2, 2, n), np.nan)
     with np.errstate(all="ignore"):
         for iteration in range(iterations):
-            q = _pick(p, active)
+            line = _pick(p, active)
             end, by, equations = _half_turn(
-                q, x[:, active], drive[active], load[active], period[active], count
+                line, x[:, active], drive[active], load[active], period[active], count
             )
             error = (end - x[:, active] - HALF_TURN[:, None]) / scale[:, active]
             at_goal = np.max(np.abs(error), axis=0) < _CLOSED
@@ -262,14 +277,10 @@ def _shoot(
             rest = ~at_goal & np.all(np.isfinite(error), axis=0) & np.all(np.isfinite(by), axis=(0, 1))
             if not np.any(rest):
                 break
-            active, error, by = active[rest], error[:, rest], by[:, :5, rest]
-            weights = np.concatenate([scale[1:, active], reference[None, active]])
-            matrix = by[:, 1:, :] - np.eye(4, 5)[:, 1:, None]
-            matrix = np.moveaxis(matrix * weights[None] / scale[:, None, active], 2, 0)
-            change = -(np.linalg.pinv(matrix) @ error.T[:, :, None])[:, :, 0].T
-            change *= np.minimum(1.0, _LARGEST_STEP / np.max(np.abs(change[:3]), axis=0))
-            x[1:, active] += change[:3] * weights[:3]
-            drive[active] += change[3] * weights[3]
+            active = active[rest]
+            change = _newton_step(error[:, rest], by[:, 1:5, rest], scale[:, active], weights[:, active])
+            x[1:, active] += change[:3]
+            drive[active] += change[3]
     progress(1.0)
     x[:, ~exists], drive[~exists] = np.nan, np.nan
     multiplier, angle, free = np.full((3, n), np.nan)
@@ -277,20 +288,39 @@ def _shoot(
         torsional = np.linalg.eigvals(np.moveaxis(held[:, :, exists], 2, 0))
         multiplier[exists] = np.max(np.abs(torsional), axis=1)
         angle[exists] = np.abs(np.angle(torsional[:, 0]))
-        q = _pick(p, exists)
-        free[exists] = _free(q, x[:, exists], drive[exists], load[exists], monodromy[:, :, exists])
+        line = _pick(p, exists)
+        free[exists] = _free(line, x[:, exists], drive[exists], load[exists], monodromy[:, :, exists])
     k = frozen_frequency(numpy_(), p, 1.0)
     return SteadyMotion(
         exists=exists,
         start=x,
         drive=drive,
-        **{name: np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x) for name, x in extremes.items()},
+        **{
+            name: np.where(np.abs(torque) < ROUNDOFF_TORQUE, 0.0, torque) for name, torque in extremes.items()
+        },
         multiplier=multiplier,
         growth=np.log(multiplier) / period,
         frequency=_branch(angle, k * period) / period,
         free_growth=np.log(free) / period,
         monodromy=monodromy,
     )
+
+
+def _newton_step(error: Any, by: Any, scale: Any, weights: Any) -> Any:
+    """The change of w1, phi4, w4 and the torque on J1, shape (4, n), that takes the `error` of the states after half
+    a turn away, shape (4, n), by least squares; of the states at most `_LARGEST_STEP` of their weights.
+
+    Parameters
+    ----------
+    error : in parts of `scale`, the sizes of the states, shape (4, n)
+    by : the slopes of the states after half a turn by w1, phi4, w4 and the torque, shape (4, 4, n)
+    weights : the sizes of what changes, shape (4, n)
+    """
+    matrix = by - np.eye(4, 5)[:, 1:, None]
+    matrix = np.moveaxis(matrix * weights[None] / scale[:, None], 2, 0)
+    change = -(np.linalg.pinv(matrix) @ error.T[:, :, None])[:, :, 0].T
+    change *= np.minimum(1.0, _LARGEST_STEP / np.max(np.abs(change[:3]), axis=0))
+    return change * weights
 
 
 def _branch(angle: Any, near: Any) -> Any:

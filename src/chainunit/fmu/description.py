@@ -141,6 +141,7 @@ class Interface:
 
     @cached_property
     def _dependencies(self) -> list[tuple[list[int], list[int]]]:
+        """See `dependencies`, by the equations of this interface."""
         model = self.model
         t = self.trace
         rows = rows_at_start = [*t.outputs, *t.derivatives]
@@ -186,6 +187,7 @@ class Interface:
 
     @cached_property
     def _reinitialized(self) -> frozenset[str]:
+        """See `reinitialized`, by the equations of this interface."""
         import casadi
 
         if not (self.model.state_layout and self.model.controlled):

@@ -69,6 +69,7 @@ def _origin(about: About | None) -> str:
 
 
 def _table(signals: list[Signal], causality: str) -> str:
+    """A table in HTML of the signals of one causality."""
     settable = causality != "output"
     head = (
         "<tr><th>name</th><th>unit or type</th>"

@@ -27,7 +27,7 @@ def icon_svg(sketch: Sketch) -> bytes:
 
 
 def icon_png(sketch: Sketch) -> bytes:
-    """The same icon as PNG."""
+    """The icon of a sketch as PNG, as `icon_svg` draws it."""
     from PIL import Image, ImageDraw
 
     scale = 4 * _SIZE / 100.0  # drawn larger and reduced: so its lines are smooth
@@ -149,6 +149,7 @@ def _pins(
 
 
 def _lines(sketch: Sketch, positions: Mapping[str, Place], width: float) -> list[str]:
+    """The links of a sketch as paths of SVG of a `width`, with the driven one in its own colour."""
     return [
         f'<path d="M{" L".join(f"{x:.1f} {y:.1f}" for x, y in points)}" fill="none" '
         f'stroke="{_DRIVEN if name == sketch.driven else _DARK}" stroke-width="{width:g}" stroke-linecap="round" '

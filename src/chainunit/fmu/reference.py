@@ -240,6 +240,7 @@ def _march(interface: Interface, p: Any) -> Any:
     )
 
     def march(t: float, u: Sequence[float], x: Sequence[float]) -> list[float]:
+        """The states one step after `t` [s]; an event at `t` comes first, and may lead to another."""
         if model.controlled:
             for _ in range(2):
                 values, states = model.input_layout.instance(list(u)), layout.instance(list(x))

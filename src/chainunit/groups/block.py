@@ -69,7 +69,8 @@ class GroupMatrix:
         self._inverse = [[c * minus_per for c in row] for row in minus]
 
     def solve(self, right: Sequence[Any]) -> list[Any]:
-        """The unknowns, from the right sides of the rows."""
+        """The unknowns, shape (size,), from the right sides of the rows, shape (rows,): down the pivots, Cramer's
+        rule for the rest, and back up the pivots."""
         b, x = [*right], [0.0] * self._size
         for (i, _, _, k), _, _, lost, (p, q) in self._steps:
             if k >= 0:

@@ -13,7 +13,7 @@ the frame, pin N against the rocker. Two rods that fold up against each other me
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.planar import ZERO, Motion, Vec2
 
@@ -60,6 +60,23 @@ class _Matrix:
         return Vec2((self.yy * v.x - self.xy * v.y) / det, (self.xx * v.y - self.xy * v.x) / det)
 
 
+class _RodStep(NamedTuple):
+    """A rod in the recursion: the normal `n` of its direction, and what its angular acceleration and the force and
+    acceleration at its start are by the force f at its end.
+
+    With across = n . f, E f = f - n across/(2 kappa) and a = S E f + rest, the acceleration of its start is a, its
+    angular acceleration turn + l/j across - m l/(2 j) n . a, and the force at its start pull + E f - B a.
+    """
+
+    n: Vec2
+    pull: Vec2
+    B: _Matrix
+    S: _Matrix
+    rest: Vec2
+    turn: Any
+    j: Any
+
+
 class Recursion:
     """A recursion over a chain at given angles: accelerations and pin forces from the acceleration of A2.
 
@@ -70,9 +87,11 @@ class Recursion:
 
     With speeds and loads zero the recursion maps a displacement of A2 to the smallest change of the angles in the
     metric of the masses: the projection that closes a chain after a drift (`close`).
+
+    `compliance` is Phi_N, the acceleration at A2 by the force there [1/kg].
     """
 
-    __slots__ = ("_beta", "_n", "_phi", "_rods", "_steps", "_u")
+    __slots__ = ("_free_end", "_half", "_rods", "_steps", "compliance")
 
     def __init__(
         self,
@@ -96,10 +115,10 @@ class Recursion:
         self._rods = rods
         # the inertia about an end is kappa m l^2
         kappa = 0.25 + rods.inertia * (1.0 / 12.0)
-        half, quarter = 0.5 / kappa, 0.25 / kappa
+        self._half, quarter = 0.5 / kappa, 0.25 / kappa
         zero = 0.0 * theta[0]
-        phi, beta = _Matrix(zero, zero, zero), Vec2(zero, zero)
-        self._phi, self._beta, self._steps, self._u, self._n = [phi], [beta], [], [], []
+        self.compliance, self._free_end = _Matrix(zero, zero, zero), Vec2(zero, zero)
+        self._steps: list[_RodStep] = []
         for k, (l, m) in enumerate(zip(rods.lengths, rods.masses, strict=True)):
             s, c = xp.sin(theta[k]), xp.cos(theta[k])
             u, n = Vec2(s, -c), Vec2(c, s)
@@ -110,62 +129,63 @@ class Recursion:
             pull = free[k] + u * (0.5 * m * l * spin[k]) - n * (0.5 * m * l * turn)
             if at_start is not None:
                 pull = pull + at_start[k]
-            # f_before = pull + E f - B a_before, B = m (1 - n n/(4 kappa)), E = 1 - n n/(2 kappa)
-            b = _Matrix(
-                m * (1.0 - quarter * n.x * n.x), -quarter * m * n.x * n.y, m * (1.0 - quarter * n.y * n.y)
-            )
-            # (1 + Phi B) a_before = Phi (pull + E f) + beta
-            k11 = 1.0 + phi.xx * b.xx + phi.xy * b.xy
-            k12 = phi.xx * b.xy + phi.xy * b.yy
-            k21 = phi.xy * b.xx + phi.yy * b.xy
-            k22 = 1.0 + phi.xy * b.xy + phi.yy * b.yy
-            det = k11 * k22 - k12 * k21
-            # S = (1 + Phi B)^-1 Phi is symmetric
-            sxx = (k22 * phi.xx - k12 * phi.xy) / det
-            sxy = (k22 * phi.xy - k12 * phi.yy) / det
-            syy = (k11 * phi.yy - k21 * phi.xy) / det
-            S = _Matrix(sxx, sxy, syy)
-            rest = Vec2((k22 * beta.x - k12 * beta.y) / det, (k11 * beta.y - k21 * beta.x) / det)
-            rest = rest + S.times(pull)
-            self._steps.append((pull, b, S, rest, turn, j))
-            self._u.append(u)
-            self._n.append(n)
+            step = self._step(quarter, m, n, pull, turn, j)
+            self._steps.append(step)
             # a = a_before + l n alpha - l u spin, alpha = turn + (l/j) n . f - (m l/(2 j)) n . a_before
             #   = E^T a_before + (l^2/j) n (n . f) + l n turn - l u spin
-            q = l * l / j
-            ex, exy, ey = 1.0 - half * n.x * n.x, -half * n.x * n.y, 1.0 - half * n.y * n.y
-            e = _Matrix(ex, exy, ey)
-            # Phi_k = E S E + q n n
-            ax, ay = ex * sxx + exy * sxy, ex * sxy + exy * syy
-            bx, by = exy * sxx + ey * sxy, exy * sxy + ey * syy
-            phi = _Matrix(
-                ax * ex + ay * exy + q * n.x * n.x,
-                ax * exy + ay * ey + q * n.x * n.y,
-                bx * exy + by * ey + q * n.y * n.y,
-            )
-            beta = e.times(rest) + n * (l * turn) - u * (l * spin[k])
-            self._phi.append(phi)
-            self._beta.append(beta)
+            self._go_on(l, step, u * (l * spin[k]))
 
-    @property
-    def compliance(self) -> _Matrix:
-        """The chain's acceleration at A2 by the force there [1/kg]."""
-        return self._phi[-1]
+    def _step(self, quarter: Any, m: Any, n: Vec2, pull: Vec2, turn: Any, j: Any) -> _RodStep:
+        """The step of a rod on the chain before it, whose end has the acceleration a_before = Phi f_before + beta. As
+        f_before = pull + E f - B a_before, with B = m (1 - n n/(4 kappa)), the acceleration solves
+        (1 + Phi B) a_before = Phi (pull + E f) + beta. `quarter` is 1/(4 kappa)."""
+        phi, beta = self.compliance, self._free_end
+        b = _Matrix(
+            m * (1.0 - quarter * n.x * n.x), -quarter * m * n.x * n.y, m * (1.0 - quarter * n.y * n.y)
+        )
+        k11 = 1.0 + phi.xx * b.xx + phi.xy * b.xy
+        k12 = phi.xx * b.xy + phi.xy * b.yy
+        k21 = phi.xy * b.xx + phi.yy * b.xy
+        k22 = 1.0 + phi.xy * b.xy + phi.yy * b.yy
+        det = k11 * k22 - k12 * k21
+        # S = (1 + Phi B)^-1 Phi is symmetric
+        S = _Matrix(
+            (k22 * phi.xx - k12 * phi.xy) / det,
+            (k22 * phi.xy - k12 * phi.yy) / det,
+            (k11 * phi.yy - k21 * phi.xy) / det,
+        )
+        rest = Vec2((k22 * beta.x - k12 * beta.y) / det, (k11 * beta.y - k21 * beta.x) / det)
+        return _RodStep(n, pull, b, S, rest + S.times(pull), turn, j)
+
+    def _go_on(self, l: Any, step: _RodStep, inward: Vec2) -> None:
+        """Add the rod of a step to the chain: Phi = E S E + (l^2/j) n n, with E = 1 - n n/(2 kappa), and beta.
+        `inward` is the acceleration of its end towards its start by its angular speed [m/s2]."""
+        n, S, half = step.n, step.S, self._half
+        q = l * l / step.j
+        e = _Matrix(1.0 - half * n.x * n.x, -half * n.x * n.y, 1.0 - half * n.y * n.y)
+        ax, ay = e.xx * S.xx + e.xy * S.xy, e.xx * S.xy + e.xy * S.yy
+        bx, by = e.xy * S.xx + e.yy * S.xy, e.xy * S.xy + e.yy * S.yy
+        self.compliance = _Matrix(
+            ax * e.xx + ay * e.xy + q * n.x * n.x,
+            ax * e.xy + ay * e.yy + q * n.x * n.y,
+            bx * e.xy + by * e.yy + q * n.y * n.y,
+        )
+        self._free_end = e.times(step.rest) + n * (l * step.turn) - inward
 
     def force(self, end: Vec2) -> Vec2:
-        """Force on the last rod at A2 [N] where A2 has the acceleration `end`."""
-        return self._phi[-1].solve(end - self._beta[-1])
+        """Force on the last rod at A2 [N] if A2 has the acceleration `end` [m/s2]."""
+        return self.compliance.solve(end - self._free_end)
 
     def back(self, force: Vec2) -> tuple[list[Any], list[Vec2]]:
         """Angular accelerations of the rods and the forces f_0 .. f_N at the pins, from the force at A2; f_0 acts on
         the support."""
-        half = 0.5 / (0.25 + self._rods.inertia * (1.0 / 12.0))
+        half = self._half
         accelerations: list[Any] = []
         forces = [force]
         for k in reversed(range(len(self._rods))):
-            pull, b, S, rest, turn, j = self._steps[k]
+            n, pull, b, S, rest, turn, j = self._steps[k]
             l, m = self._rods.lengths[k], self._rods.masses[k]
-            n, f = self._n[k], forces[-1]
+            f = forces[-1]
             across = n.dot(f)
             Ef = f - n * (half * across)
             before = S.times(Ef) + rest

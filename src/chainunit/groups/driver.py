@@ -142,7 +142,8 @@ class Cylinder(Driver):
         return 0.0 if self.rod.mass is None else self.rod.mass.m
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The cylinder at the way `q` [m]."""
+        """The cylinder at the way `q` of its rod [m]: its three pins make a triangle, of which q gives the length of
+        one side; the inner pin stands on one of two sides of the line between the other pins."""
         p, o = linkage.pins[self.bar.pin], linkage.pins[self.lever.pin]
         way, h, b = q + self.shift, self.offset, self.lever.length
         square = way * way + h * h

@@ -95,6 +95,7 @@ class RRP(Group):
         )
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The slider stands where the line meets the circle of the first bar about its pin, on one of two sides."""
         start, rail, a = linkage.pins[self.first.pin], self.rail.at_position(linkage.links), self.first.length
         d, w = rail.u, rail.pin.p - start.p
         across = w.cross(d)
@@ -137,6 +138,8 @@ class RPR(Group):
         )
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The line of the second bar goes past the pin of the first one at the `offset`; it has one of two
+        directions."""
         start, end, h = linkage.pins[self.first.pin], linkage.pins[self.second.pin], self.offset
         v = start.p - end.p  # way d + offset n
         square = v.squared()
@@ -172,6 +175,7 @@ class PRP(Group):
         )
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The pin stands where the two lines meet."""
         a, b = self.first_rail.at_position(linkage.links), self.second_rail.at_position(linkage.links)
         per, gap = 1.0 / a.u.cross(b.u), b.pin.p - a.pin.p
         # a.u x - b.u y = gap
@@ -209,6 +213,7 @@ class RPP(Group):
         )
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The yoke stands where the slot, whose direction is fixed to the line, goes through the pin of the block."""
         start, rail, slot = linkage.pins[self.block.pin], self.rail.at_position(linkage.links), self.slot
         d = rail.u
         e = d * slot.x + d.turned() * slot.y

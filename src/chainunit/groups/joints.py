@@ -139,6 +139,8 @@ class GuideData(NamedTuple):
     def third_before(
         self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
     ) -> Third | None:
+        """Third derivatives by q of the start of the line of a sliding joint in a link before the group, and of its
+        angle; those of a line in the ground are 0, and None stands for a line in the group."""
         if not isinstance(self.by, Rail):
             return None
         if self.by.of is None:
@@ -260,6 +262,8 @@ class Hinge(Placed):
         return [x, y]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """See `Joint`: the known derivative of the pin before the group, if it is one, and on both links the part of
+        the next derivative of the pin that the lower ones give, such as the centripetal acceleration."""
         e, base = ZERO, self._base
         if base is not None:
             e = before[0] if before is not None else base.p2 if rates else base.p1
@@ -326,6 +330,8 @@ class Guide(Hinge):
         return [x, y, {k + 2: 1, UNKNOWNS * other + 2: -1} if isinstance(other, int) else {k + 2: 1}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """See `Joint`: for the two rows of the point those of a pin, and what a line that turns while the block
+        slides adds (Coriolis); for the row of the angle the turn of the line, if it is known before the group."""
         other, angle, order, d = self._other, 0.0, len(rates), self._d
         if isinstance(other, int):
             turns = [z[UNKNOWNS * other + 2] for z in rates]

@@ -260,6 +260,7 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
     c, e = arms[0] - arms[1], arms[2] - arms[1]
 
     def parts(theta: Any) -> tuple[Any, ...]:
+        """The vectors u and v, and the right sides a, b of u . d = a and v . d = b, at the angle `theta`."""
         cos, sin = np.cos(theta), np.sin(theta)
         u = Vec2(cos * e.x - sin * e.y, sin * e.x + cos * e.y) - (p3 - p2)
         v = Vec2(cos * c.x - sin * c.y, sin * c.x + cos * c.y) - (p1 - p2)

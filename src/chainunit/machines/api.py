@@ -215,6 +215,7 @@ class ChainUnitMachine(Machine):
         return loads, motion["psi"], motion["w"], motion["a"]
 
     def _check_assembly(self, psi: float) -> None:
+        """Refuse an angle `psi` of the rocker [rad] at which an organ does not reach from pin to pin."""
         p = self.p
         for side in ("left", "right"):
             span = float(np.hypot(*self._reach(side, psi)))

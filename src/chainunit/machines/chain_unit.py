@@ -383,6 +383,8 @@ def organ_pulls(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Pu
 
 
 def _organs_on_rocker(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any) -> MachineState:
+    """The organs alone on the rocker, as a machine that the rocker drives: at its angle `psi` from the downward
+    vertical and its speed `psi_w` [rad, rad/s]."""
     linkage = Linkage(
         {"C": ZERO, **supports(p)},
         Crank(Bar("rocker", "C", p.e), "A2"),
@@ -469,6 +471,7 @@ def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]
 
 
 def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+    """The own outputs of the machine: motion of the rocker, loads of the organs by side, and forces of the drive."""
     reactions = s.reactions(a)
     organs = _on_sides(xp, p, s, a, reactions)
     return {

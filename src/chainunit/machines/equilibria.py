@@ -290,7 +290,9 @@ class _Judged(NamedTuple):
 
 
 def _equilibrium(resting: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibrium:
-    """The equilibrium at a zero of the holding torque."""
+    """The equilibrium at a `zero` of the holding torque: its kind by the signs of the torque before and after it, and
+    by stops and jumps; its stiffness, the slope of the torque; and, if it is stable, its natural frequency. `rest`
+    has inertia, energy and friction at the places, `way` the sizes below which a number counts as 0."""
     kind = {(-1.0, 1.0): STABLE, (1.0, -1.0): UNSTABLE}.get((zero.before, zero.behind), SADDLE)
     (holding,), (slope,) = resting.torque(np.array([zero.begin]))
     k = int(np.searchsorted(rest.q, zero.begin))

@@ -71,7 +71,7 @@ def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
                 f"horizontal distance of the pins = {abs(reach[0]):g} m: rod {k + 1} of {len(l)} ({l[k]:g} m) would "
                 "lie across between two parts that hang straight, without force; must be larger, or the rods shorter"
             )
-    p = _least(parts, reach, float(np.sum(l)), float(np.sum(W)))
+    p = _pull_at_rest(parts, reach, float(np.sum(l)), float(np.sum(W)))
     m, size = means(p)
     total = float(np.sum(W))
     return Hanging(p, np.array([-p[0], total - p[1]]), np.arctan2(-m[0], m[1]), size)
@@ -90,6 +90,7 @@ def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
     w = W / l
 
     def parts(p: Any) -> tuple[float, Any, Any]:
+        """Value, gradient and second derivatives of f at the pull `p`: integrals over the pieces in closed form."""
         H = abs(p[0])
         v = p[1] - ends
         size = np.hypot(H, v)
@@ -107,14 +108,26 @@ def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
             np.array([[xx, xy], [xy, yy]]),
         )
 
-    p = _least(parts, np.asarray(reach, float), float(np.sum(l)), float(np.sum(W)))
+    p = _pull_at_rest(parts, np.asarray(reach, float), float(np.sum(l)), float(np.sum(W)))
     total = float(np.sum(W))
     return Hanging(p, np.array([-p[0], total - p[1]]), np.empty(0), np.array(abs(p[0])))
 
 
-def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
-    """The p at the minimum of the function f(p) + p . reach; `parts` gives value, gradient and second derivatives of
-    f."""
+def _pull_at_rest(parts: Any, reach: Any, length: float, weight: float) -> Any:
+    """The pull at the first pin of a hanging chain [N], shape (2,): the p at the minimum of f(p) + p . reach, at
+    which the vectors of all rods add up to `reach`.
+
+    Parameters
+    ----------
+    parts : gives value, gradient, shape (2,), and second derivatives, shape (2, 2), of f at p
+    reach : from the first pin to the last [m], shape (2,)
+    length, weight : of the whole chain [m, N]
+
+    Raises
+    ------
+    GeometryError
+        for a chain that is too short, or hangs as no minimum shows.
+    """
     from scipy.optimize import minimize
 
     distance = float(np.hypot(*reach))
@@ -127,6 +140,7 @@ def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
     pull = across / np.sqrt(24.0 * max(length - distance, 1e-9 * length) * length)
     start = np.array([-np.copysign(pull, reach[0] or 1.0), 0.5])
 
+    # all in parts of the weight and of the length
     def value(x: Any) -> float:
         return float(parts(weight * x)[0] / weight + x @ reach) / length
 
@@ -136,24 +150,11 @@ def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
     def curvature(x: Any) -> Any:
         return parts(weight * x)[2] * weight / length
 
+    search = {"method": "trust-exact", "options": {"gtol": 1e-7, "maxiter": 500}}
     with np.errstate(invalid="ignore", divide="ignore"):
-        x = minimize(
-            value,
-            start,
-            jac=gradient,
-            hess=curvature,
-            method="trust-exact",
-            options={"gtol": 1e-7, "maxiter": 500},
-        ).x
-        # near the minimum the values differ by less than rounding, but the gradient is still accurate
-        wrong = gradient(x)
-        for _ in range(_POLISH):
-            trial = x - np.linalg.solve(curvature(x), wrong)
-            after = gradient(trial)
-            if not np.hypot(*after) < np.hypot(*wrong):
-                break
-            x, wrong = trial, after
-    if not np.hypot(*wrong) < 1e-11:
+        rough = minimize(value, start, jac=gradient, hess=curvature, **search).x
+        x, residual = _polished(rough, gradient, curvature)
+    if not residual < 1e-11:
         raise GeometryError(
             f"a chain of {length:g} m between pins {distance:g} m apart: no hanging position was found; must be "
             "neither stretched nor folded up"
@@ -209,3 +210,16 @@ def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
     share = round(number * first / (first + second))
     mine = min(max(1, share), most)
     return mine, number - mine
+
+
+def _polished(x: Any, gradient: Any, curvature: Any) -> tuple[Any, float]:
+    """The place at which the gradient vanishes, from `x` near it by Newton's steps, shape (2,), and the size of the
+    gradient there. Near a minimum the values differ by less than rounding, but the gradient is still accurate."""
+    residual = gradient(x)
+    for _ in range(_POLISH):
+        trial = x - np.linalg.solve(curvature(x), residual)
+        after = gradient(trial)
+        if not np.hypot(*after) < np.hypot(*residual):
+            break
+        x, residual = trial, after
+    return x, float(np.hypot(*residual))

@@ -199,6 +199,7 @@ PINS = {title: output for title, output, _, _ in _BEARINGS}
 
 
 def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+    """The own outputs of the machine: motion and cut of the blade, and the forces in the joints."""
     edge, knife, reactions = s.m.pins["blade"], s.m.links["knife"], s.reactions(a)
     (cut,) = s.effects["cut"].wrenches
     return {

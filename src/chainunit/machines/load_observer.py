@@ -65,6 +65,8 @@ GATE = 6.0
 """Mean deviation of the speed from which a load has jumped, in standard deviations."""
 FEED_JUMP = 3.0
 """Jump of the feed in parts of its spread; the jump of the force is its spread."""
+FEED, FORCE = 1, 3
+"""Places in `UNKNOWNS` of feed and force of the left side; the right side stands after each."""
 DIFFUSION = 0.3
 """Diffusion of an estimated imbalance that makes alarms, in parts of the square of the `change` of a load. The whole
 square is that of the innovations; as they come in bursts at some angles of the crank, and a second alarm within a
@@ -270,42 +272,34 @@ def _jump(xp: Any, p: Any, x: Any, b: Balance) -> Any:
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, b: Balance) -> Outputs:
-    at_crank = b.acceleration / p.ratio
-    left_loads, right_loads = (
-        SideLoads(material_mass=side.material_mass, processing_force=side.processing_force)
-        for side in (x.left, x.right)
-    )
-    of_machine = ChamberForces.probes(
-        xp, p, machine_inputs(u, x.speed, left_loads, right_loads, b.acceleration), b.machine, at_crank
-    )
-    feed_imbalance = x.left.material_mass - x.right.material_mass
-    force_imbalance = x.left.processing_force - x.right.processing_force
+    """The outputs at the states `x`: the differences of the sides, left less right, each with its threshold; by side
+    the uncertainty of its loads, the pull of its web and the probability of an overload; and the alarm, the side (+1
+    or -1) on which a difference passes its threshold, else 0."""
+    probes = _probes_of_machine(xp, p, u, x, b)
     natural, limits = p.feed.fluctuation * p.feed.expected, p.imbalance
-    feed = _judge(xp, p, x, 1, feed_imbalance, p.feed, natural, limits.uncertainty)
-    force = _judge(xp, p, x, 3, force_imbalance, p.force, p.force.fluctuation, limits.force_uncertainty)
+    feed_difference = x.left.material_mass - x.right.material_mass
+    force_difference = x.left.processing_force - x.right.processing_force
+    feed = _judge(xp, p, x, FEED, feed_difference, p.feed, natural, limits.uncertainty)
+    force = _judge(xp, p, x, FORCE, force_difference, p.force, p.force.fluctuation, limits.force_uncertainty)
     left = xp.maximum(feed.share, force.share)
     right = xp.maximum(-feed.share, -force.share)
     side = 2.0 * step(xp, left, right) - 1.0
 
-    def of_side(name: str, hand: float) -> SideJudgement:
-        place = 1 if hand > 0.0 else 2
-        variances = [getattr(x.covariance, f"{UNKNOWNS[k]}_{UNKNOWNS[k]}") for k in (place, place + 2)]
-        deviations = [
-            xp.sqrt(xp.maximum(v, _LEAST)) * spread
-            for v, spread in zip(variances, (p.feed.spread, p.force.spread), strict=True)
-        ]
-        by_feed = (hand * feed.value - limits.overload) / feed.deviation
-        by_force = (hand * force.value - limits.force_overload) / force.deviation
+    def judged(name: str, sign: float) -> SideJudgement:
+        """The judgement of a side; with its `sign` a difference counts as more load on it."""
+        beside = 0 if sign > 0.0 else 1
+        by_feed = (sign * feed.value - limits.overload) / feed.deviation
+        by_force = (sign * force.value - limits.force_overload) / force.deviation
         return SideJudgement(
-            material_mass_deviation=deviations[0],
-            processing_force_deviation=deviations[1],
-            web_pull=of_machine[name].web_pull,
+            material_mass_deviation=_deviation(xp, x, FEED + beside, p.feed.spread),
+            processing_force_deviation=_deviation(xp, x, FORCE + beside, p.force.spread),
+            web_pull=probes[name].web_pull,
             overload=normal_probability(xp, xp.maximum(by_feed, by_force)),
         )
 
     return Outputs(
-        left=of_side("left", 1.0),
-        right=of_side("right", -1.0),
+        left=judged("left", 1.0),
+        right=judged("right", -1.0),
         imbalance=Imbalance(
             feed=feed.value,
             feed_deviation=feed.deviation,
@@ -314,10 +308,26 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, b: Balance) -> Outputs:
             force_deviation=force.deviation,
             force_threshold=force.threshold,
         ),
-        rocker=RockerEstimate(tau=of_machine["rocker"].tau),
+        rocker=RockerEstimate(tau=probes["rocker"].tau),
         grounds=Grounds(feed=feed.share, force=force.share),
         alarm=side * step(xp, xp.maximum(left, right), 1.0),
     )
+
+
+def _probes_of_machine(xp: Any, p: Any, u: Any, x: Any, b: Balance) -> dict[str, Any]:
+    """The outputs of the machine with the estimated loads, by name, see `ChamberForces.probes`."""
+    left, right = (
+        SideLoads(material_mass=side.material_mass, processing_force=side.processing_force)
+        for side in (x.left, x.right)
+    )
+    inputs = machine_inputs(u, x.speed, left, right, b.acceleration)
+    return ChamberForces.probes(xp, p, inputs, b.machine, b.acceleration / p.ratio)
+
+
+def _deviation(xp: Any, x: Any, unknown: int, spread: Any) -> Any:
+    """The standard deviation of an estimated load, by its place in `UNKNOWNS`, in the unit of its `spread`."""
+    name = UNKNOWNS[unknown]
+    return xp.sqrt(xp.maximum(getattr(x.covariance, f"{name}_{name}"), _LEAST)) * spread
 
 
 def _rates(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:

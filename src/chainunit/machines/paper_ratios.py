@@ -62,6 +62,7 @@ def of_ratios(make: Callable[[dict[str, float]], M], ratios: Mapping[str, float]
         reason = error
 
     def admitted(trial: Mapping[str, float]) -> bool:
+        """Whether the ratios are in their ranges and make a machine."""
         try:
             return all(RATIOS[name].quantity.admits(x) for name, x in trial.items()) and bool(
                 make(lengths(**trial))

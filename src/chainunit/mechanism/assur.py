@@ -89,34 +89,42 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> l
 def in_order_of_motion(
     pins: Mapping[str, Sequence[str]], links: Sequence[str], joints: Sequence[JointOf], driver: str
 ) -> dict[str, list[str]]:
-    """The links that meet in each of the `pins`, those first whose motion is known first: the others hang on the
-    first one.
+    """By pin, the links that meet in it, in the order in which their motion is known: the first one carries the pin,
+    and the others hang on it.
 
     Which of three links in a pin are said to be joined with each other is arbitrary, but the groups depend on it.
-    Here the pin is an unknown point of its own, which all links in it share.
+    So the order is found for a linkage in which each pin is an unknown point of its own, joined with all of its
+    links: a link or point comes after all that it depends on.
+
+    Parameters
+    ----------
+    pins : by pin, the names of the links in it
+    links, joints : all links, and the other joints
+    driver : the link whose motion is given
     """
-    first_ranks = {GROUND: -2, driver: -1}
-    room = {link: 3 for link in links if link not in first_ranks} | {f"{pin}.": 2 for pin in pins}
-    every = [joint for joint in joints if not {joint.on, joint.by} <= first_ranks.keys()]
-    for pin, those in pins.items():
-        # ground and driver both say where the pin of the driver is
-        placed = [link for link in those if link in first_ranks]
-        meeting = [link for link in those if link not in first_ranks] + placed[:1]
-        every += [JointOf(pin, REVOLUTE, link, f"{pin}.") for link in meeting]
+    ranks = {GROUND: -2, driver: -1}
+    points = {pin: f"{pin}." for pin in pins}  # no link has a name with a point
+    unknowns = {link: 3 for link in links if link not in ranks} | dict.fromkeys(points.values(), 2)
+    all_joints = [joint for joint in joints if not {joint.on, joint.by} <= ranks.keys()]
+    for pin, meeting in pins.items():
+        # ground and driver both say where the pin of the driver is: one of them is enough
+        placed = [link for link in meeting if link in ranks]
+        joined = [link for link in meeting if link not in ranks] + placed[:1]
+        all_joints += [JointOf(pin, REVOLUTE, link, points[pin]) for link in joined]
     try:
-        depends = _dependences([*room], every, _matching(room, every))
+        depends = _dependences([*unknowns], all_joints, _matching(unknowns, all_joints))
     except InputError:  # the decomposition says why
-        return {pin: list(those) for pin, those in pins.items()}
-    rank = dict(first_ranks)
+        return {pin: list(meeting) for pin, meeting in pins.items()}
     for k, part in enumerate(_strong_parts(depends)):
-        rank |= dict.fromkeys(part, k)
-    return {pin: sorted(those, key=rank.__getitem__) for pin, those in pins.items()}
+        ranks |= dict.fromkeys(part, k)
+    return {pin: sorted(meeting, key=ranks.__getitem__) for pin, meeting in pins.items()}
 
 
 def _dependences(
     unknown: Sequence[str], joints: Sequence[JointOf], matched: Mapping[tuple[int, int], str]
 ) -> dict[str, dict[str, None]]:
-    """For each link the others on which its equations depend."""
+    """By link, the others on which it depends: those in the joints whose equations are `matched` with it. The inner
+    dicts are sets that keep the order."""
     depends: dict[str, dict[str, None]] = {link: {} for link in unknown}
     for (k, _), link in matched.items():
         for other in joints[k].links:
@@ -126,17 +134,20 @@ def _dependences(
 
 
 def _matching(room: Mapping[str, int], joints: Sequence[JointOf]) -> dict[tuple[int, int], str]:
-    """Each equation, by joint and number, with the link that it determines; `room` are the unknowns of each link.
+    """By equation (joint and number), the link that it determines; a link has `room` for as many equations as it has
+    unknowns.
 
     Raises
     ------
     InputError
-        where an equation finds none.
+        if an equation finds no link with room: these links are fixed more than once.
     """
     matched: dict[tuple[int, int], str] = {}
     owners: dict[str, list[tuple[int, int]]] = {link: [] for link in room}
 
     def augment(equation: tuple[int, int], seen: set[str]) -> bool:
+        """Whether the equation has found a link: one with room, or one that hands on another equation of its own; the
+        links in `seen` were tried."""
         for link in joints[equation[0]].links:
             if link in owners and link not in seen:
                 seen.add(link)
@@ -197,13 +208,14 @@ def _freedoms(
 
 
 def _strong_parts(depends: Mapping[str, Mapping[str, None]]) -> Iterator[list[str]]:
-    """The strongly connected parts, each behind all that it depends on (Tarjan)."""
+    """The strongly connected parts, each after all that it depends on (Tarjan)."""
     order: dict[str, int] = {}
     low: dict[str, int] = {}
     stack: list[str] = []
     held: set[str] = set()
 
     def visit(link: str) -> Iterator[list[str]]:
+        """The parts that are complete once the link and all that it depends on are seen."""
         order[link] = low[link] = len(order)
         stack.append(link)
         held.add(link)
@@ -271,6 +283,14 @@ DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
 
 
 def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -> AssurGroup:
+    """The dyad of two links, with an `inner` joint between them and an `outer` joint of each link with one before it.
+    Its kind names the joints in a row, such as RRP.
+
+    Raises
+    ------
+    InputError
+        for three sliding joints.
+    """
     first, second = part
     kind = "".join(_LETTERS[j.kind] for j in (outer[first], inner, outer[second]))
     # a revolute outer joint comes first; of an oscillating slide the block, which the guide acts on
@@ -288,6 +308,14 @@ def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -
 def _triad(
     ternary: str, legs: Sequence[str], outer: Sequence[JointOf], inner: Sequence[JointOf]
 ) -> AssurGroup:
+    """The triad of a `ternary` link on three legs; by leg, an `inner` joint with the ternary link and an `outer` one
+    with a link before the group.
+
+    Raises
+    ------
+    InputError
+        for a leg that slides in both joints.
+    """
     for leg, a, b in zip(legs, outer, inner, strict=True):
         if a.kind == b.kind == PRISMATIC:
             raise InputError(

@@ -66,6 +66,9 @@ class ChainedState(MachineState):
         return self._along()[:2]
 
     def _along(self) -> tuple[Any, Any, Any]:
+        """Derivatives along the motion: of `bias` by the crank angle and the crank speed, and of `J` by the crank
+        angle. They are rates by time over the speed; near rest, at `W_SMALL`, the share that stands for 1/w goes to
+        0."""
         if self._slopes is None:
             w, engine = self.w, dual(self._xp)
             rates = {name: chain.chain.rates for name, chain in self.chains.items()}
@@ -74,6 +77,7 @@ class ChainedState(MachineState):
             by_a = {}
             for name, chain in self.chains.items():
                 at_one, _ = chain.at(1.0)
+                # what an acceleration of 1 rad/s2 of the crank adds to the rates
                 by_a[name] = None, [one - rate for one, rate in zip(at_one, rates[name], strict=True)]
             quicker = MachineState(engine, self.m, Dual(w, 1.0), self._moving(by_a))
             w2 = w * w

@@ -64,6 +64,7 @@ def stop_action(xp: Any, law: EndStops, span: tuple[float, float], q: Any, w: An
     width = CONTACT * (high - low)
 
     def action_of_stop(depth: Any, speed: Any) -> StopAction:
+        """Force, energy and loss of one stop, `depth` [rad, m] beyond its end of the range."""
         # the force begins smoothly, over the width beyond the end of the range
         depth = depth - 0.5 * width
         spring = law.stiffness * positive(xp, depth, width)

@@ -168,6 +168,8 @@ class Expression:
         return Term(lambda xp, quantities: number)
 
     def _compiled(self, node: ast.AST) -> Term:
+        """The term of a node by its kind: a number, a name, a sign, a power, a sum or product, a function. Any other
+        node is refused, with what to write in its place."""
         match node:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
                 return Term(lambda xp, quantities: as_float(number))
@@ -253,6 +255,7 @@ class Expression:
         return Term.of(value, *terms)
 
     def _keep_width(self, call: ast.AST, width: Term, falls: bool = False) -> None:
+        """Keep the `width` over which the function of a `call` changes, and refuse a number that is wrong."""
         kept = Width(self.words(call), width, falls)
         if width.is_number and (wrong := kept.fault(width.number({}))):
             raise InputError(f"{shown(self.text)}: {wrong}")
@@ -260,6 +263,8 @@ class Expression:
 
     @staticmethod
     def _power(base: Term, power: int) -> Term:
+        """A whole power, as a product: `xp` may have symbols."""
+
         def value(xp: Any, quantities: Mapping[str, Any]) -> Any:
             x = result = base.value(xp, quantities)
             for _ in range(power - 1):
@@ -269,6 +274,8 @@ class Expression:
         return Term.of(value, base)
 
     def _extreme(self, name: str, place: ast.AST) -> Term:
+        """The extreme of a place of the motion by its function, such as ``max(ram.C.y)``: a quantity by that name. A
+        stroke is the difference of two."""
         cited = self.words(place)
         text = cited.replace(" ", "")
         if not _PLACE.fullmatch(text):
@@ -285,6 +292,8 @@ class Expression:
         return Term(lambda xp, quantities: quantities[f"{name}({text})"], extremes=(f"{name}({text})",))
 
     def _where(self, condition: ast.AST, rest: Sequence[Term]) -> Term:
+        """The term of ``where(a > b, then, other, width)``: it goes smoothly from `other` to `then` while a - b goes
+        over the width; `rest` are the last three arguments."""
         match condition:
             case ast.Compare(left=left, ops=[ast.Gt() | ast.GtE()], comparators=[right]):
                 above, below = self._term(left), self._term(right)
@@ -307,6 +316,8 @@ class Expression:
         return Term.of(value, above, below, then, other, width)
 
     def _table(self, x: Term, rest: Sequence[ast.AST]) -> Term:
+        """The term of a table at `x`: one of the file, if `rest` is its name, or one of the pairs of numbers in
+        `rest`."""
         if len(rest) == 1 and isinstance(rest[0], ast.Name):
             name = rest[0].id
             self.lookups.append(name)
@@ -331,6 +342,7 @@ class Expression:
         return Term.of(lambda xp, quantities: curve.value(xp, x.value(xp, quantities)), x)
 
     def _call(self, name: str, args: list[Term]) -> Term:
+        """The term of a function of other terms: a smooth one, of two numbers, or one of the engine's."""
         if name not in FUNCTIONS:
             raise InputError(
                 f"{shown(self.text)}: no function {name}{meant(name, FUNCTIONS)} known here: "
@@ -378,7 +390,7 @@ def parts_of_chain(node: ast.AST) -> tuple[ast.AST, list[tuple[ast.AST, ast.oper
 
 
 def as_float(number: float) -> float:
-    """A number as a float; infinite where it is too large."""
+    """A number as a float; infinite if it is too large."""
     try:
         return float(number)
     except OverflowError:

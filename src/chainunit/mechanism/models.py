@@ -184,6 +184,7 @@ class InverseMachine(LinkageModel, MachineModel):
         return self.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
     def _outputs(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+        """The outputs at the motor: torque, load port, energies, and the own ones of the machine."""
         a = u.a / p.ratio
         return self.Outputs(
             tau=s.torque(a) / p.ratio,
@@ -362,6 +363,8 @@ class DirectMachine(LinkageModel):
         return stop_action(xp, p.end_stops, self.inverse.span, x.phi / p.ratio, x.w / p.ratio)
 
     def _outputs(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+        """The outputs at the motor: the acceleration, energies with the added inertia and the end stops, and the own
+        ones of the machine."""
         stops = self._stops(xp, p, x)
         a = acceleration(p, u, s, stops.force if stops else 0.0)
         at_crank = a / p.ratio

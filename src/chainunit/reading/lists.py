@@ -63,9 +63,10 @@ class Entry(Faults):
         with self.at(name, " = "):
             raise InputError(f"{shown(value)}: {message}{self.more}")
 
-    def keys(self, name: str, table: Mapping[str, Any], allowed: Collection[str]) -> None:
-        """Collect the faults of the unknown keys of a `table` in it, or, with an empty name, of the table itself."""
-        for key in table:
+    def keys(self, name: str, keys: Iterable[str], allowed: Collection[str]) -> None:
+        """Collect the faults of the unknown `keys` of the table `name` in it, or, with an empty name, of the table
+        itself."""
+        for key in keys:
             if key not in allowed:
                 full_name = ".".join(filter(None, (name, str(key))))
                 self.fault(
@@ -187,6 +188,7 @@ class TableList:
         present: set[str] = set()
 
         def named_result(entry: Entry, number: int) -> tuple[str, T]:
+            """The name of an entry and what `read` gives for it; a name that stands there twice is a fault."""
             self._read_form(entry)
             name = entry.given.get(self.named_by, usual and f"{usual}{number}")
             self._check(entry, name, names, fixed or {})

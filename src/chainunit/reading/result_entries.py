@@ -20,6 +20,7 @@ class ResultEntries(dict[str, Any]):
     an earlier version, in which parts of the same name were one."""
 
     def __missing__(self, name: str) -> Any:
+        """The entries by that name of all parts, merged into one; it may be given without its part."""
         nodes = [part[name] for part in map(as_mapping, map(super().get, PARTS)) if name in part]
         if not nodes:
             raise KeyError(name)

@@ -11,6 +11,7 @@ import dataclasses
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, dataclass_transform
 
@@ -111,6 +112,7 @@ def derived(
     description. A type checker takes the property for an attribute of the type that it gives."""
 
     def declared(function: Callable[[Any], T]) -> Any:
+        """The property of a function, whose docstring is the description of the part."""
         derived_part = _Derived(function)
         description = " ".join((function.__doc__ or "").split()).removesuffix(".")
         description = description[:1].lower() + description[1:]
@@ -154,7 +156,7 @@ UnitOf = Callable[[str], str]
 
 
 class _Form(NamedTuple):
-    """How data are written, see `as_data`."""
+    """The arguments of `as_data` that say how data are written."""
 
     titled: bool
     driver: str
@@ -188,6 +190,8 @@ def part_unit(x: Any, declared: ResultPart, unit_of: UnitOf) -> tuple[str, str]:
 
 
 def _data(x: Any, unit: str, kind: str, form: _Form) -> Any:
+    """A value as JSON has it: a number in its `unit` as an entry with it, a result as a table of its parts, and a
+    mapping or a sequence value by value. `kind` says how a number is shown."""
     if isinstance(x, InUnit):
         return _number(x.value, x.unit, x.kind) | ({"title": x.title} if x.title else {})
     if isinstance(x, Estimate):
@@ -214,13 +218,13 @@ def _data(x: Any, unit: str, kind: str, form: _Form) -> Any:
 
 
 def _table(x: Any, form: _Form) -> dict[str, Any]:
-    """The data of a result: its parts by name."""
+    """The data of a result `x` by the names of its declared parts: a number with its unit, and with its description
+    as `title` if the form asks for titles; an inner result as a table of its own, or, `inline`, with its parts among
+    those of `x`. A part that is optional and None is left out."""
     data: dict[str, Any] = {}
     result_type: Any = type(x)
     for member in parts(result_type):
-        value = x
-        for attribute in member.attribute.split("."):
-            value = getattr(value, attribute)
+        value = attrgetter(member.attribute)(x)
         if value is None and member.optional:
             continue
         unit, kind = part_unit(x, member, form.unit_of)

@@ -375,7 +375,8 @@ def toml(text: str, most: int = MOST_KEYS) -> dict[str, Any]:
     Raises
     ------
     InputError
-        if the text is no TOML, each fault with its line, has more than so many keys, and for `text_faults`.
+        if the text is no TOML, each fault with its line, has more than so many keys, or a character that is no sign
+        of a text.
     """
     try:
         data = tomllib.loads(text)
@@ -431,13 +432,15 @@ def _wrong_texts(data: Any, key: str) -> Iterator[InputError]:
         for k, value in enumerate(data, 1):
             yield from _wrong_texts(value, f"{key}.{k}" if isinstance(value, Mapping) else key)
     elif isinstance(data, str):
-        yield from _wrong_text(data, key, shown(data))
+        yield from _wrong_text(data, key)
 
 
-def _wrong_text(text: str, key: str, subject: str) -> Iterator[InputError]:
+def _wrong_text(text: str, key: str, subject: str = "") -> Iterator[InputError]:
+    """The fault of a text with a character that is no sign; the refusal names it by `subject`, or
+    cites it."""
     if wrong := _NO_SIGNS.search(text):
         message = f"has U+{ord(wrong[0]):04X}, which is no sign of a text; take it out"
-        yield InputError(f"{printable(key)}: {subject} {message}", key)
+        yield InputError(f"{printable(key)}: {subject or shown(text)} {message}", key)
 
 
 _DEEPEST = 30

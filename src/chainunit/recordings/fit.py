@@ -93,7 +93,9 @@ def normal_equations(
 def assemble(
     problem: Problem, z: Any, comparisons: tuple[Comparison, ...], scales: Scales | None = None
 ) -> NormalEquations:
-    """The same from the `comparisons` at these values."""
+    """The normal equations at the unknowns `z`, shape (unknowns,), from the `comparisons` there and from the prior:
+    cost, gradient and matrix. Residuals are divided by the `scales` of their columns, and those beyond `OUTLIER`
+    count less (Huber)."""
     deviations = problem.prior_deviations
     size = len(deviations)
     fisher, gradient = np.zeros((size, size)), (problem.start_values - z) / deviations**2
@@ -327,7 +329,9 @@ def _solve(matrix: Any, gradient: Any) -> Any:
 
 
 def _next_point(problem: Problem, point: NormalEquations, damping: float) -> Any:
-    """The next point. Unknowns that would pass a bound stop there, and the others follow."""
+    """The next point of Levenberg and Marquardt's method, shape (unknowns,): the least squares of the linear
+    residuals at `point`, with a `damping` of the unknowns that need a simulation. Unknowns that would pass a bound
+    stop there, and the others are solved for again."""
     low, high = problem.bounds
     step, moving = np.zeros(len(point.z)), np.ones(len(point.z), bool)
     damped = point.matrix + np.diag(

@@ -287,6 +287,7 @@ def _turn(recording: Recording, name: str, stated: float) -> tuple[float, float]
         return np.array([np.corrcoef(x[:-lag], x[lag:])[0, 1] if np.ptp(x) else 0.0 for lag in lags])
 
     def best(low: float, high: float, size: int) -> tuple[float, float]:
+        """The largest correlation, and its lag in rows, of `size` lags between two."""
         low_lag, high_lag = max(1, math.floor(low)), min(math.ceil(high), len(x) // 2)
         if low_lag >= high_lag:
             return 0.0, low
@@ -365,7 +366,7 @@ def inspect_steadiness(
 
 
 def inspect_work(recording: Recording, ratio: float, off: float | None = None) -> list[InputError]:
-    """That no turn of a steady run takes work of the other sign than the run, by the mean torque or power of each.
+    """The faults of turns of a steady run whose mean torque or power has another sign than in most turns.
 
     Parameters
     ----------
@@ -448,6 +449,8 @@ def _of_column(
 
 
 def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
+    """The faults of the rows: too few in a turn of the crank, too few or too many turns, and rows that are
+    missing."""
     step, turn = recording.step, 2.0 * math.pi / crank_speed
     span, longest = float(recording.time[-1] - recording.time[0]), max(LONGEST, LONGEST_TURNS * turn)
     if turn / step < LEAST_ROWS or span < FEWEST_TURNS * turn:
@@ -521,7 +524,7 @@ def _marks(recording: Recording, speeds: tuple[float, float], ratio: float) -> I
 
 
 def _counted(recording: Recording) -> Iterator[InputError]:
-    """That an encoder counts down, or begins anew."""
+    """The fault of an encoder that counts down, or begins anew."""
     count = recording.columns.get("motor.count")
     if count is None:
         return
@@ -553,26 +556,13 @@ def _kept(recording: Recording, name: str, rows: tuple[int, int]) -> str:
 
 
 def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: float) -> list[InputError]:
-    """That the machine does not turn, by the first column that tells; `driven` is the part before the motor is
-    switched off."""
-    count, passed = driven.columns.get("motor.count"), mark_times(driven)
-    counts = 0.0 if count is None else float(np.ptp(count))
-    for name, factor in (("motor.w", ratio), ("crank.w", 1.0)):
-        if (
-            name in driven.columns
-            and abs(float(np.mean(driven.columns[name]))) < STANDS * crank_speed * factor
-        ):
-            finding = f"mean of {_size(name, float(np.mean(driven.columns[name])))}"
-            other = _with_speed(driven, name, crank_speed * factor)
-            if other:
-                sizes = {quantity: rms(driven.columns[quantity]) for quantity in (name, other)}
-                return [_exchanged(recording, name, other, sizes)]
-            if len(passed) > FEWEST_TURNS or counts > FEWEST_TURNS * COUNTS * ratio:
-                turns = f"the mark is passed {len(passed)} times" if len(passed) else "the encoder counts"
-                remedy = "the sensor is not connected, or the column is another one; mend it, or leave it out"
-                return [_fault(recording, name, f"{finding}, although {turns}: {remedy}")]
-            return [_standing(recording, name, finding)]
-    if count is not None and counts < 4.0:
+    """The fault of a machine that does not turn, by the first column that shows it, or none; `driven` is the part
+    before the motor is switched off, and the crank should turn at `crank_speed` [rad/s]."""
+    for name, speed in (("motor.w", ratio * crank_speed), ("crank.w", crank_speed)):
+        if name in driven.columns and abs(float(np.mean(driven.columns[name]))) < STANDS * speed:
+            return [_too_slow(recording, driven, name, speed, ratio)]
+    count = driven.columns.get("motor.count")
+    if count is not None and np.ptp(count) < 4.0:
         return [_standing(recording, "motor.count", "does not change")]
     if "mark" in recording.columns and not np.any(recording.columns["mark"]):
         turns = (recording.time[-1] - recording.time[0]) * crank_speed / (2.0 * math.pi)
@@ -581,9 +571,26 @@ def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: 
     return []
 
 
+def _too_slow(recording: Recording, driven: Recording, name: str, speed: float, ratio: float) -> InputError:
+    """The fault of the column `name` of a speed that should be `speed` [rad/s], and is nearly 0: it is swapped with
+    another column, or its sensor is not connected while mark or encoder show turns, or the machine stands."""
+    finding = f"mean of {_size(name, float(np.mean(driven.columns[name])))}"
+    other = _with_speed(driven, name, speed)
+    if other:
+        sizes = {quantity: rms(driven.columns[quantity]) for quantity in (name, other)}
+        return _exchanged(recording, name, other, sizes)
+    passes = len(mark_times(driven))
+    counts = float(np.ptp(driven.columns["motor.count"])) if "motor.count" in driven.columns else 0.0
+    if passes <= FEWEST_TURNS and counts <= FEWEST_TURNS * COUNTS * ratio:
+        return _standing(recording, name, finding)
+    turns = f"the mark is passed {passes} times" if passes else "the encoder counts"
+    remedy = "the sensor is not connected, or the column is another one; mend it, or leave it out"
+    return _fault(recording, name, f"{finding}, although {turns}: {remedy}")
+
+
 def _with_speed(recording: Recording, name: str, speed: float) -> str:
-    """The column of another quantity that has the values of a speed, where the column `name` of the speed has values
-    that are neither a speed nor the zero of a sensor; empty without one."""
+    """The column of another quantity that has the values of a `speed` [rad/s], if the column `name` of the speed has
+    values that are neither a speed nor the zero of a sensor; empty without one."""
     x = recording.columns[name]
     if abs(float(np.mean(x))) < SIGNAL * rms(x) or not np.any(x):
         return ""
@@ -596,6 +603,7 @@ def _with_speed(recording: Recording, name: str, speed: float) -> str:
 
 
 def _standing(recording: Recording, name: str, finding: str) -> InputError:
+    """The fault of a machine that stands, by the `finding` in a column."""
     return _fault(
         recording,
         name,
@@ -613,6 +621,8 @@ def _exchanged(recording: Recording, first: str, second: str, sizes: Mapping[str
 
 
 def _scale_words(name: str, head: str, size: float, expected: Expectation) -> str:
+    """Words on a column whose RMS `size` [SI unit] is not the `expected` one: the unit that its values look like, or
+    else what to check."""
     finding = f"RMS of {_size(name, size)}"
     limit = f"must be from {_size(name, expected.low)} to {_size(name, expected.high)} ({expected.words})"
     unit = MEASURANDS[name].unit
@@ -628,7 +638,7 @@ def _scale_words(name: str, head: str, size: float, expected: Expectation) -> st
 
 
 def _swapped(sizes: Mapping[str, float], expected: Mapping[str, Expectation]) -> tuple[str, str] | None:
-    """Two columns of which neither can have its size, and each can have that of the other one."""
+    """Two columns of which neither can have its size, and each can have the size of the other one."""
     wrong = [name for name, size in sizes.items() if name in expected and not expected[name].admits(size)]
     for k, first in enumerate(wrong):
         for second in wrong[k + 1 :]:

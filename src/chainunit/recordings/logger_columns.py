@@ -135,6 +135,7 @@ def _fits(text: str, unit: str) -> bool:
 
 
 def _number(cell: str, boolean: bool) -> float:
+    """The number in a cell, in a `boolean` column of a word such as "on", too; NaN without one."""
     if boolean and cell.lower() in _BOOLEANS:
         return _BOOLEANS[cell.lower()]
     try:
@@ -166,7 +167,22 @@ def decimal_signs(cells: Sequence[str]) -> frozenset[str]:
 
 
 def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
-    """The cells of a column with a decimal point and without marks of thousands."""
+    """The cells of a column with a decimal point and without marks of thousands; `others` are the decimal signs of
+    other columns."""
+    text = _usual_numbers(table, place)
+    decimal, has_thousands = _decimal_sign(table, place, text, others)
+    if has_thousands:
+        text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
+    text = text.replace(",", ".") if decimal == "," else text
+    plain = _without_absent(text.split("\n")) if _ABSENT.search(text) else text.split("\n")
+    _refuse_left_out(table, place, plain)
+    _refuse_added(table, place, plain)
+    return plain
+
+
+def _usual_numbers(table: LoggerTable, place: int) -> str:
+    """The cells of a column, line by line: signs without a blank after them, exponents by an e, negative numbers with
+    their sign before them, and thousands without blanks between."""
     # Python takes an underscore for a mark of thousands
     text = "\n".join(table.column(place)).replace("_", "?")
     if " " in text:
@@ -175,12 +191,16 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
         text = _OF_FORTRAN.sub("e", text)
     if len(_OF_ACCOUNTS.findall(text)) > max(1.0, LEFT_OUT * len(table.rows)):
         text = _OF_ACCOUNTS.sub(r"-\1\2", text)
-    if (
-        any(sign in text for sign in _BLANKS)
-        and _GROUP.search(text)
-        and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE)
-    ):
+    has_groups = any(sign in text for sign in _BLANKS) and _GROUP.search(text)
+    if has_groups and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE):
         text = _GROUP.sub("", text)
+    return text
+
+
+def _decimal_sign(table: LoggerTable, place: int, text: str, others: frozenset[str]) -> tuple[str, bool]:
+    """The decimal sign of the cells in `text`, empty without one, and whether they have marks of thousands. A sign
+    whose cells may have either is the decimal one if `others` have it, or else if it is usual with the mark between
+    columns; any other doubt is refused."""
     present = {sign: shapes for sign, shapes in _SHAPES.items() if sign in text}
     decimals = {sign for sign, (decimal, _, _) in present.items() if decimal.search(text)}
     maybe = {sign for sign, (_, _, either) in present.items() if either.search(text)}
@@ -197,14 +217,7 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
         decimals = maybe
     if decimals and (maybe - decimals) - grouped:
         raise _doubtful(table, place, maybe - decimals)
-    decimal = next(iter(decimals), "")
-    if grouped:
-        text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
-    text = text.replace(",", ".") if decimal == "," else text
-    plain = _without_absent(text.split("\n")) if _ABSENT.search(text) else text.split("\n")
-    _refuse_left_out(table, place, plain)
-    _refuse_added(table, place, plain)
-    return plain
+    return next(iter(decimals), ""), bool(grouped)
 
 
 def _without_absent(cells: list[str]) -> list[str]:
@@ -357,7 +370,7 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
     if has_times(table, places[0]):
         time, source = _of_clock(table, places)
     elif len(places) > 1:
-        time, source = _of_parts(table, places, others)
+        time, source = _time_of_parts(table, places, others)
     else:
         x = numbers(table, places[0], others, "time")
         factor, source = _unit_of_time(table, head, table.units[places[0]], x)
@@ -366,10 +379,18 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
         time = x * factor
         if wraps:
             source += f" (the counter begins anew {wraps} {'time' if wraps == 1 else 'times'})"
-    return _ordered(table, time, source, head)
+    return _rising(table, time, source, head)
 
 
 def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[float, str]:
+    """The factor from the numbers `x` of a column to seconds, and words on its unit: the `unit` of the head, or the
+    one in which the numbers are dates.
+
+    Raises
+    ------
+    InputError
+        for numbers without a unit that are no dates.
+    """
     if unit and not is_time(unit):
         return scale(unit, "s")[0], f"time in {unit}"
     for unit_text, low, high in _EPOCHS:
@@ -383,7 +404,9 @@ def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[flo
     )
 
 
-def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> tuple[Any, str]:
+def _time_of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> tuple[Any, str]:
+    """The times from the first one on [s], shape (rows,), by columns of hour, minute and second, and of the date if
+    there is one; and words on their source. Without a date, a clock that falls has passed midnight."""
     names = [name_and_unit(table.heads[k])[0].lower().rstrip("s") for k in places]
     columns = {name: numbers(table, k, others) for name, k in zip(names, places, strict=True)}
     time = 3600.0 * columns["hour"] + 60.0 * columns["minute"] + columns["second"]
@@ -401,10 +424,45 @@ def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str])
     return time - np.nanmin(time), f"time from {len(places)} columns"
 
 
+class _ClockTime(NamedTuple):
+    """A time of a clock [s], with the days that stand before it; whether it is `short`, from the full hour on, else
+    it is from midnight on; and its hour, the digits of its fraction of a second, and its zone."""
+
+    seconds: float
+    short: bool
+    hour: int
+    digits: int
+    zone: str
+
+
+def _clock_time(table: LoggerTable, row: int, place: int, clock: Any, half: str) -> _ClockTime:
+    """The time of a row by the match of its `clock`; `half` is the cell with the half of the day, if the clock has
+    none. Refuse a time whose minutes or whose fraction may mean two things."""
+    h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
+    if s is None:
+        h, m, s = 0, h, str(m)
+        if clock["f"] is None:
+            raise InputError(
+                f"{table.place_of(row, place)}: {printable(clock[0], 40)} may be hh:mm or mm:ss, and does not "
+                "resolve the rows; write hh:mm:ss.fff"
+            )
+    fraction = clock["f"] or ""
+    if fraction and len(fraction) < 3 and clock[0][clock.start("f") - clock.start() - 1] == ":":
+        raise InputError(
+            f"{table.place_of(row, place)}: {printable(clock[0], 40)} may end with hundredths, with frames or with "
+            "ms; write hh:mm:ss.fff"
+        )
+    if letter := clock["half"] or half[:1]:
+        h = h % 12 + 12 * (letter in "pP")
+    days = int(clock["days"] or clock["span"] or 0)
+    seconds = _DAY * days + 3600.0 * h + 60.0 * m + int(s) + float(f"0.{fraction or 0}")
+    return _ClockTime(seconds, clock["s"] is None, h, len(fraction), (clock["zone"] or "").strip())
+
+
 def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
-    """The times from the first row on, by dates and times of the day."""
-    seconds, days = np.full(len(table.rows), np.nan), list[str]()
-    short, has_fraction, hours, zones, widths = False, False, set[int](), set[str](), set[int]()
+    """The times from the first row on [s], shape (rows,), by dates and times of the day; and words on their source.
+    The columns at `places` have dates, times, the half of the day, and parts of a second."""
+    seconds, days, clocks = np.full(len(table.rows), np.nan), list[str](), list[_ClockTime]()
     half = next((place for place in places if _is_half(table, place)), -1)
     beside = {place: factor for place in places if (factor := _fraction(table, place))}
     places = [place for place in places if place not in beside and place != half]
@@ -429,34 +487,15 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         if clock is None:
             seconds[k] = 0.0
             continue
-        h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
-        short, has_fraction = s is None, has_fraction or bool(clock["f"])
-        if s is None:
-            h, m, s = 0, h, str(m)
-            if clock["f"] is None:
-                raise InputError(
-                    f"{table.place_of(k, places[0])}: "
-                    f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and does not resolve the rows; write "
-                    "hh:mm:ss.fff"
-                )
-        if clock["f"] and len(clock["f"]) < 3 and clock[0][clock.start("f") - clock.start() - 1] == ":":
-            raise InputError(
-                f"{table.place_of(k, places[0])}: {printable(clock[0], 40)} may end with hundredths, with frames or "
-                "with ms; write hh:mm:ss.fff"
-            )
-        if letter := clock["half"] or (row[half][0] if half >= 0 else ""):
-            h = h % 12 + 12 * (letter in "pP")
-        widths.add(len(clock["f"] or ""))
-        hours.add(h)
-        zones.add((clock["zone"] or "").strip())
-        passed = int(clock["days"] or clock["span"] or 0)
-        seconds[k] = _DAY * passed + 3600.0 * h + 60.0 * m + int(s) + float(f"0.{clock['f'] or 0}")
+        clocks.append(_clock_time(table, k, places[0], clock, row[half] if half >= 0 else ""))
+        seconds[k] = clocks[-1].seconds
+    zones, widths = ({getattr(time, name) for time in clocks} for name in ("zone", "digits"))
     if len(zones) > 1:
         raise InputError(
             f"{table.file}, column {table.heads[places[0]]}: has times of {len(zones)} zones "
             f"({', '.join(sorted(map(repr, zones)))}); write all in one"
         )
-    for place, factor in beside.items() if not has_fraction else ():
+    for place, factor in beside.items() if not any(widths) else ():
         seconds += factor * np.array([float(row[place]) for row in table.rows])
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
@@ -465,15 +504,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         source = f"time from {count} columns" if count > 1 else "time from dates and clock"
         source += f", from {days[0]} on, as 0 s" + (f" ({zone})" if zone else "")
     else:
-        before = seconds
-        order = -1 if np.nanmedian(np.diff(seconds)) < 0.0 else 1
-        seconds = _over_midnight(seconds[::order], 3600.0 if short else _DAY)
-        if hours <= set(range(1, 13)) and not short:
-            seconds = _over_midnight(seconds, 0.5 * _DAY)
-        seconds = seconds[::order]
-        source = "time from a clock, the first row as 0 s"
-        if not np.array_equal(before, seconds, equal_nan=True):
-            source += f", over {'the full hour' if short else 'midnight'}"
+        seconds, source = _without_dates(seconds, clocks)
     has_time = np.isfinite(seconds)
     steps = np.diff(seconds[has_time])
     if len(widths) > 1 and np.any(steps < 0.0) and np.any(steps > 0.0):
@@ -484,7 +515,24 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     return seconds - seconds[np.flatnonzero(has_time)[0]], source
 
 
+def _without_dates(seconds: Any, clocks: Sequence[_ClockTime]) -> tuple[Any, str]:
+    """Times of a clock [s], shape (rows,), that go on after midnight, or after the full hour; and words on their
+    source. A clock that shows the hours 1 to 12 alone begins anew at noon, too. The rows may fall from the last time
+    to the first one."""
+    short = bool(clocks) and clocks[-1].short
+    order = -1 if np.nanmedian(np.diff(seconds)) < 0.0 else 1
+    rising = _over_midnight(seconds[::order], 3600.0 if short else _DAY)
+    if {time.hour for time in clocks} <= set(range(1, 13)) and not short:
+        rising = _over_midnight(rising, 0.5 * _DAY)
+    goes_on = rising[::order]
+    source = "time from a clock, the first row as 0 s"
+    if not np.array_equal(seconds, goes_on, equal_nan=True):
+        source += f", over {'the full hour' if short else 'midnight'}"
+    return goes_on, source
+
+
 def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:
+    """The refusal of a row whose cells at `places` are no time."""
     cells = " ".join(table.rows[row][place] for place in places)
     return InputError(
         f"{table.place_of(row, places[0])}: "
@@ -558,31 +606,27 @@ def unwrapped(x: Any, sizes: Sequence[float] = WRAPS) -> tuple[Any, int]:
     return x, 0
 
 
-def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
-    """Rising times; those of a coarse clock are spread evenly."""
+def _rising(table: LoggerTable, time: Any, source: str, head: str) -> Times:
+    """The times of the rows in rising order, from the `time` of each row [s], shape (rows,), NaN without one. If the
+    last row is the first one in time, the rows are turned round; times of a coarse clock are spread evenly; of rows
+    that stand there twice one is left out. Any other times that do not rise are refused."""
     remarks: list[str] = []
-    has_time = np.flatnonzero(np.isfinite(time))
-    if len(has_time) < 2:
+    timed = np.flatnonzero(np.isfinite(time))
+    if len(timed) < 2:
         raise InputError(f"{table.file}, column {head}: has no times")
-    order = -1 if np.all(np.diff(time[has_time]) <= 0.0) and time[has_time[0]] > time[has_time[-1]] else 1
-    if order < 0:
+    falls = time[timed[0]] > time[timed[-1]] and bool(np.all(np.diff(time[timed]) <= 0.0))
+    if falls:
         remarks.append("the last row is the first one in time")
-    has_time = has_time[::order]
-    t = time[has_time]
-    if order < 0 and not source.startswith("time in"):
+        timed = timed[::-1]
+    t = time[timed]
+    if falls and not source.startswith("time in"):
         t = t - t[0]
     steps = np.diff(t)
-    back = np.flatnonzero(steps < 0.0)
-    _refuse_names(table, has_time, np.flatnonzero(steps <= 0.0))
-    if len(back):
-        remedy = "delete the rows before this line, or those from it on"
-        if len(back) > SOME * len(steps):
-            remedy = f"the times run backwards at {len(back)} rows: sort the rows by time"
-        raise _not_later(table, int(has_time[back[0] + 1]), t[back[0] : back[0] + 2], remedy)
+    _refuse_names(table, timed, np.flatnonzero(steps <= 0.0))
+    _refuse_falls(table, timed, t)
     still = np.flatnonzero(steps == 0.0)
-    rows = [table.rows[k] for k in has_time] if len(still) else []
-    different = [int(k) for k in still if rows[k] != rows[k + 1]]
     share, even = len(still) / len(steps), _even(t)
+    different = [k for k in still if table.rows[timed[k]] != table.rows[timed[k + 1]]]
     if share > SOME and even is not None and (different or share > COARSE):
         t = even
         longest = 1 + _longest(steps == 0.0)
@@ -591,16 +635,29 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
         raise _coarse(table, t, head)
     elif different:
         k = different[0]
-        raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
+        raise _not_later(table, int(timed[k + 1]), t[k : k + 2], "delete one of the two rows")
     elif len(still):
         keep = np.append(True, steps > 0.0)
         remarks.append(f"{len(still)} doubled rows left out")
-        has_time, t = has_time[keep], t[keep]
-    return Times(t, has_time, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
+        timed, t = timed[keep], t[keep]
+    return Times(t, timed, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
+
+
+def _refuse_falls(table: LoggerTable, rows: Any, t: Any) -> None:
+    """Refuse times `t` of the `rows` that fall [s]: of many falls the rows are to be sorted, of a few deleted."""
+    steps = np.diff(t)
+    falls = np.flatnonzero(steps < 0.0)
+    if not len(falls):
+        return
+    remedy = "delete the rows before this line, or those from it on"
+    if len(falls) > SOME * len(steps):
+        remedy = f"the times run backwards at {len(falls)} rows: sort the rows by time"
+    raise _not_later(table, int(rows[falls[0] + 1]), t[falls[0] : falls[0] + 2], remedy)
 
 
 def _refuse_names(table: LoggerTable, rows: Any, places: Any) -> None:
-    """Refuse a table in which another name stands in each row whose time does not go on."""
+    """Refuse a table in which another name stands in each row whose time does not go on: `rows` are its rows in the
+    order of time, `places` the places among them after which the time does not rise."""
     for k, cell in enumerate(table.rows[rows[0]] if len(places) else []):
         if is_data(cell) or MISSING.fullmatch(cell):
             continue
@@ -619,15 +676,15 @@ def _not_later(table: LoggerTable, row: int, pair: Any, remedy: str) -> InputErr
     )
 
 
-def _longest(are: Any) -> int:
-    """The length of the longest series of true values."""
-    ends = np.flatnonzero(np.concatenate([[True], ~are, [True]]))
+def _longest(flags: Any) -> int:
+    """The length of the longest series of true values among `flags`, shape (n,)."""
+    ends = np.flatnonzero(np.concatenate([[True], ~flags, [True]]))
     return int(np.max(np.diff(ends))) - 1
 
 
 def _even(t: Any) -> Any:
-    """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on. None
-    for rows that are not even."""
+    """Even times of rows whose clock is coarse, from the times `t` [s], shape (rows,): they lie on a line through the
+    rows at which the clock goes on. None for rows that are not even."""
     ticks = 1 + np.flatnonzero(np.diff(t) > 0.0)
     if len(ticks) < 3:
         return None
@@ -654,8 +711,9 @@ def _coarse(table: LoggerTable, t: Any, head: str) -> InputError:
     )
 
 
-def lost_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list[str]]:
-    """Which rows have a number in all columns, and words on the others.
+def complete_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list[str]]:
+    """Whether a row has a number in all `columns` (numbers by the place of the column), shape (rows,); and words on
+    the rows that have not, if there are such.
 
     Raises
     ------
@@ -673,17 +731,16 @@ def lost_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list
                 "that it is left out"
             )
         whole &= ~missing
-    lost = ~whole
-    places = [place for place, x in columns.items() if np.isnan(x).any()]
-    kinds = ", ".join(
-        dict.fromkeys(kind for k in places for kind in _kinds_of(table, k, np.isnan(columns[k])))
-    )
-    count = int(lost.sum())
-    return whole, [f"{count} {'row' if count == 1 else 'rows'} without a number ({kinds})"] if count else []
+    count = int(np.sum(~whole))
+    if not count:
+        return whole, []
+    cells = [cell for place, x in columns.items() for cell in _kinds_of(table, place, np.isnan(x))]
+    rows = "row" if count == 1 else "rows"
+    return whole, [f"{count} {rows} without a number ({', '.join(dict.fromkeys(cells))})"]
 
 
 def _kinds_of(table: LoggerTable, place: int, missing: Any) -> Iterator[str]:
-    """The different cells without a number."""
+    """The different cells of a column in the rows that are `missing`, shape (rows,)."""
     yield from dict.fromkeys(printable(table.rows[k][place], 20) or "empty" for k in np.flatnonzero(missing))
 
 

@@ -271,8 +271,9 @@ def _mark_of(lines: Sequence[str]) -> str:
 
 
 def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> tuple[int, tuple[bool, ...]]:
-    """The place of the first row of measurements, which has data where most rows have them, and where these are; -1
-    without one."""
+    """The place of the first row of measurements in a `sample` of lines, each with its number, and by column whether
+    it has data; -1 and nothing without such a row. Columns with data are those of most rows: the first row has data
+    in each of them, or the sign of a missing number."""
     rows = [cells_of_line(line, mark) for _, line in sample]
     shapes = [
         tuple(map(is_data, row)) if _is_row(row) and not row[0].startswith(_COMMENTS) else () for row in rows
@@ -280,17 +281,16 @@ def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> tuple[int, tuple
     usual = Counter(shape for shape in shapes if shape).most_common(1)
     if not usual:
         return -1, ()
-    wanted = usual[0][0]
-    place = next(
-        k
-        for k, (row, shape) in enumerate(zip(rows, shapes, strict=True))
-        if len(shape) == len(wanted)
-        and all(
-            has or not needs or MISSING.fullmatch(cell)
-            for cell, has, needs in zip(row, shape, wanted, strict=True)
-        )
-    )
-    return place, wanted
+    columns = usual[0][0]
+
+    def is_first(row: Sequence[str], shape: Sequence[bool]) -> bool:
+        if len(shape) != len(columns):
+            return False
+        pairs = zip(row, shape, columns, strict=True)
+        return all(has or not needs or MISSING.fullmatch(cell) for cell, has, needs in pairs)
+
+    pairs = zip(rows, shapes, strict=True)
+    return next(k for k, (row, shape) in enumerate(pairs) if is_first(row, shape)), columns
 
 
 def _head_of(
@@ -408,7 +408,7 @@ def _may_end(cells: Sequence[str], key: int, width: int, is_last: bool) -> bool:
 
 
 def _cells(file: Path, lines: Sequence[tuple[int, str]], mark: str) -> Iterator[tuple[int, str, list[str]]]:
-    """Each line with its number and its cells."""
+    """Each line with its number and its cells: between blanks, or as CSV with quotation marks."""
     if mark in (" ", "  "):
         yield from ((number, line, cells_of_line(line, mark)) for number, line in lines)
         return

@@ -291,10 +291,11 @@ class Plant(AnyPlant):
         self, scenario: Scenario, powered: Piece, changes: Sequence[tuple[str, float]],
         span: tuple[float, float], workers: int,
     ) -> Piece:  # fmt: skip
-        """The run from the time on at which the motor is switched off."""
+        """The run within `span` [s], from the time on at which the motor is switched off, with its `changes`: it
+        starts from the last states of the `powered` run. A change of that time itself changes the speed at the start:
+        with power, the motor goes on with another acceleration than without."""
         free = self._free
         states = {name: powered.states[name].copy() for name in free.states}
-        # later by dt, the speed has changed by the former acceleration, and not yet by the new one
         now = {name: x[:1] for name, x in states.items()}
         then = free.run(scenario.values, now, [], (span[0], span[0]), scenario.step)
         fall = powered.values["motor.a"][-1] - then.values["motor.a"][0]

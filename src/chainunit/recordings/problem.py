@@ -195,6 +195,8 @@ class Problem:
             yield _nuisance(MARK_ANGLE, "rad", 0.0, 0.2)
 
     def _run_unknowns(self, run: RecordedRun) -> Iterator[Unknown]:
+        """The unknowns of one run: what the plant needs, drift and start of its count, and the offsets of its
+        sensors."""
         columns = run.recording.columns
         for nuisance in self._nuisances(run):
             yield Unknown(
@@ -313,6 +315,8 @@ class Problem:
         )
 
     def _simulate(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> SimulatedRun:
+        """The run with the unknowns at these values by name, and its changes with each unknown that the run does not
+        fix, and with each nuisance of the run."""
         free = [u for u in self.sought if u.name not in run.values]
         directions = {u.name: (u.name, _CHANGE * u.prior_deviation) for u in free}
         directions |= {
@@ -341,7 +345,8 @@ class Problem:
     def _compare_columns(
         self, simulation: SimulatedRun, value: Mapping[str, float], with_slopes: bool
     ) -> Iterator[Comparison]:
-        """Measured over simulated, column by column."""
+        """The comparisons of measured and simulated values, column by column, at the rows that the plant describes:
+        the residuals in parts of the size of the column, and, `with_slopes`, their derivatives by the unknowns."""
         run, response = simulation.run, simulation.response
         recording, names = run.recording, simulation.names if with_slopes else ()
         time, rates = self._simulation_times(run, recording.time, value)

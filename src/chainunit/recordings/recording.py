@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,10 +19,10 @@ from ..drives.dc_motor import DcMotor
 from ..drives.induction_motor import InductionMotor
 from ..drives.motor import Motor
 from .logger_columns import (
+    complete_rows,
     decimal_signs,
     decimal_words,
     has_times,
-    lost_rows,
     numbers,
     time_places,
     unwrapped,
@@ -108,21 +108,9 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         return frozenset[str]().union(*(shown for other, shown in signs.items() if other != place))
 
     if not time_from and not any(_is_named(head, names.get("time", "time")) for head in table.heads):
-        text = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
-        may_be = [k for k, unit in enumerate(table.units) if not (unit and of_other_kind(unit, "s"))]
-        may_be = [k for k in {*may_be} - {*places.values()} if table.has_numbers(k) or has_times(table, k)]
-        may_be.sort(key=lambda k: (not has_times(table, k), "time" not in table.heads[k].lower()))
-        text += f"{remedy('time', [table.heads[k] for k in may_be])}{', or' if may_be else ';'} add it"
-        faults.add([InputError(f"{file}: has no column time [s]{text}")])
+        faults.add([_without_time(table, places.values())])
     if not places:
-        text = ", ".join(
-            f"{measurand.name} [{measurand.unit}]"
-            for measurand in MEASURANDS.values()
-            if measurand.name != "time"
-        )
-        likely = [head for k, head in enumerate(table.heads) if k not in time_from and table.has_numbers(k)]
-        text += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', (likely or table.heads)[::-1])}"
-        faults.add([InputError(f"{file}: has no column of a known quantity, such as {text}")])
+        faults.add([_without_quantities(table, time_from)])
     with faults.collected():
         if len(time_from) == 1 and table.units[time_from[0]] and not has_times(table, time_from[0]):
             _scale(table, time_from[0], MEASURANDS["time"])
@@ -130,7 +118,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     faults.refuse()
     assert times is not None
     raw = {place: numbers(table, place, others(place), name) for name, place in places.items()}
-    whole, lost = lost_rows(table, {time_from[0]: times.missing, **raw})
+    whole, lost = complete_rows(table, {time_from[0]: times.missing, **raw})
     kept = whole[times.kept]
     rows = times.kept[kept]
     if "mark" in places:
@@ -138,9 +126,9 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     scaled = {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in places.items()}
     _refuse_phases(table, places, scaled)
     columns, remarks = _quantities(scaled)
-    used = {*time_from, *places.values()}
     rate = f"{len(rows):,} rows, {1.0 / float(np.median(np.diff(times.time[kept]))):.4g} Hz"
     parts = [times.source, decimal_words(table, others(-1), places.values()), rate, *times.remarks, *remarks]
+    used = {*time_from, *places.values()}
     unused = [head for place, head in enumerate(table.heads) if head and place not in used]
     left_out = [*table.left_out, *lost]
     if unused:
@@ -228,7 +216,8 @@ def _text(file: Path) -> str:
 
 
 def _places(table: LoggerTable, names: Mapping[str, str], faults: Faults) -> dict[str, int]:
-    """By quantity, the place of its column."""
+    """By quantity, the place of its column: the one with the head of `names`, or else with the name of the quantity.
+    Two such columns, and names without a column, go to the `faults`."""
     file, heads = table.file, table.heads
     places = dict[str, int]()
     for quantity in COLUMNS:
@@ -350,6 +339,26 @@ BOTH_SIGNS = 0.5
 """Standard deviations on both sides of zero from which on a current is no RMS with the noise of its sensor."""
 
 
+def _without_time(table: LoggerTable, places: Iterable[int]) -> InputError:
+    """The fault of a table without a column of the time: it names those that may be it, besides the columns of
+    quantities at `places`."""
+    may_be = [k for k, unit in enumerate(table.units) if not (unit and of_other_kind(unit, "s"))]
+    may_be = [k for k in {*may_be} - {*places} if table.has_numbers(k) or has_times(table, k)]
+    may_be.sort(key=lambda k: (not has_times(table, k), "time" not in table.heads[k].lower()))
+    text = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
+    text += f"{remedy('time', [table.heads[k] for k in may_be])}{', or' if may_be else ';'} add it"
+    return InputError(f"{table.file}: has no column time [s]{text}")
+
+
+def _without_quantities(table: LoggerTable, time_from: Sequence[int]) -> InputError:
+    """The fault of a table without a column of a quantity; the columns `time_from` have the time."""
+    quantities = [f"{m.name} [{m.unit}]" for m in MEASURANDS.values() if m.name != "time"]
+    likely = [head for k, head in enumerate(table.heads) if k not in time_from and table.has_numbers(k)]
+    text = f"{', '.join(quantities)}; its heads are: {', '.join(table.heads)}"
+    text += remedy("motor.i", (likely or table.heads)[::-1])
+    return InputError(f"{table.file}: has no column of a known quantity, such as {text}")
+
+
 def with_rms(recording: Recording, turn: float, motor: Motor | None = None) -> Recording:
     """A recording of which an instantaneous current of one phase is replaced by its RMS over each period of the
     supply; `turn` is the time of a turn of the crank [s]. Each period makes a row. The current of a DC `motor` is the
@@ -388,6 +397,17 @@ def with_rms(recording: Recording, turn: float, motor: Motor | None = None) -> R
             f"{recording.source}, column {recording.heads['motor.i']}: is the instantaneous current of a phase, of "
             f"{frequency:.4g} Hz, with {rows:.2g} rows in a period; must have >= 8, or be the RMS"
         )
+    means = _by_periods(recording, frequency, rows)
+    remark = (
+        f"motor.i is instantaneous, of {frequency:.4g} Hz: its RMS over each of {len(means.time):,} periods"
+    )
+    return replace(means, understood=f"{recording.understood}, {remark}")
+
+
+def _by_periods(recording: Recording, frequency: float, rows: float) -> Recording:
+    """The recording with a row for each whole period of a `frequency` [Hz], which has `rows` rows: the RMS of the
+    current, without its mean over the recording, and the means of all other columns; a mark stays one row."""
+    current = recording.columns["motor.i"]
     period = np.floor((recording.time - recording.time[0]) * frequency).astype(int)
     # the RMS of a part of a period is another one
     whole = np.bincount(period) > 0.9 * rows
@@ -407,8 +427,7 @@ def with_rms(recording: Recording, turn: float, motor: Motor | None = None) -> R
         columns["mark"][rows_after[rows_after < len(time)]] = 1.0
     if "motor.count" in columns:
         columns["motor.count"] = np.floor(columns["motor.count"])
-    remark = f"motor.i is instantaneous, of {frequency:.4g} Hz: its RMS over each of {len(time):,} periods"
-    return replace(recording, time=time, columns=columns, understood=f"{recording.understood}, {remark}")
+    return replace(recording, time=time, columns=columns)
 
 
 def _alternating(time: Any, current: Any, turn: float) -> float:

@@ -155,10 +155,13 @@ def residual_tests(best: NormalEquations) -> list[ResidualTest]:
 
 
 def residual_test(comparison: Comparison, level: float) -> ResidualTest:
-    """The check of one column; noise is within the limit of its statistic with the probability `level`.
+    """The check of one column, whether its residuals go with the orders of the crank's turn or wander in the run;
+    noise is within the limit of its statistic with the probability `level`.
 
-    Over a part of a turn, such as a machine that swings after its motor was switched off, the orders are nearly one
-    another's sums. Their orthogonal combinations are looked at, as far as the angles resolve them.
+    The residuals are split by least squares into parts along cosine and sine of the orders, and a rest, whose size is
+    that of the noise: the squares of the parts over that of noise have the F distribution. Over a part of a turn, as
+    of a machine that swings after its motor was switched off, the orders are nearly one another's sums. So their
+    orthogonal combinations are taken, as far as the angles resolve them.
     """
     from scipy.stats import f
 

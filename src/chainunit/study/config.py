@@ -83,8 +83,6 @@ class FileContents:
     """values of an unusual size, also in the linkage file if the study does not replace them"""
     tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """the tables and keys as the file has them"""
-    lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
-    """the line of each key in the file"""
     text: str = dataclasses.field(default="", repr=False)
     """the file as it was read; empty for tables from Python"""
     linkage: str = ""
@@ -99,7 +97,12 @@ class FileContents:
     def refusals(self) -> AbstractContextManager[None]:
         """A context in which an InputError begins with the name of the study file and the line of its key; with
         tables from Python the error stays as it is."""
-        return in_file(self.source, lambda: self.lines) if self.lines else nullcontext()
+        return in_file(self.source, lambda: self.lines) if self.text else nullcontext()
+
+    @cached_property
+    def lines(self) -> Mapping[str, int]:
+        """The line of each key in the file."""
+        return lines_of(self.text)
 
     @property
     def slips(self) -> tuple[UnusualValue, ...]:
@@ -224,7 +227,7 @@ def parse(text: str, source: str = "config") -> Config:
     InputError
         see `load`.
     """
-    return of_tables(toml(text), source).with_file(lines=lines_of(text), text=text)
+    return of_tables(toml(text), source).with_file(text=text)
 
 
 def of_tables(data: Mapping[str, Any], source: str) -> Config:

@@ -13,7 +13,7 @@ from ..core.errors import InputError, RunError, check_kind, near_name, refusal_p
 from ..core.model import Model
 from ..core.quantities import Quantity, Variable
 from ..mechanism.models import DirectMachine, InverseMachine
-from ..models import is_study_file, model_named
+from ..models import linkage_named
 from ..reading.tables import to_number
 from ..system.compiled_simulation import CompiledSystem
 from ..system.linear import LinearModel, place
@@ -110,19 +110,18 @@ def linear_point(
 ) -> LinearPoint:
     """The point of a file or a model by its name; `operating_point` is `at` of `linearize`, and `values` the study
     file that gives the values of a named model."""
-    whole, is_file = is_study_file(name), name.lower().endswith(".toml")
+    machine = linkage_named(name)
+    whole = machine is None and name.lower().endswith(".toml")
     if whole and values is not None:
         raise InputError(
             f"config = {values}: is not of a study file, which has its own values; leave it out for {name}"
         )
-    if inverse and (whole or not is_file):
+    if inverse and machine is None:
         raise InputError(f"inverse: is of linkage files; leave it out for {name}")
     if whole:
         return _point_of_study(study_files.load(Path(name)), operating_point, progress)
-    if is_file:
-        machine = model_named(name)
+    if machine is not None:
         if asks_for_equilibrium(operating_point):
-            assert isinstance(machine, InverseMachine)
             point = _at_equilibrium(machine if inverse else machine.direct(), {}, operating_point)
             return point._replace(title=machine.noun)
         return _point_of_linkage(machine, operating_point, inverse)

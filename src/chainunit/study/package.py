@@ -19,7 +19,7 @@ from ..machines.chain_organs import USUAL
 from ..machines.flexible import ChainedModel, with_rods
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
-from ..models import is_study_file, model_named
+from ..models import model_named
 from ..reading.text import number
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
@@ -45,7 +45,7 @@ def study_system(drive: Drive, operation: OperatingConditions) -> System:
     for name, machine in (("machine", drive.driven_machine), ("model", drive.machine)):
         if name in drive.graph.components and not drive.foreign_machine:
             # a connected input needs no start value, but an FMU that runs alone needs one
-            values = _machine(operation, machine.model, machine)
+            values = _in_motion(operation, machine.model, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
     return replace(drive.graph, start=start)
 
@@ -67,7 +67,7 @@ def start_of(drive: Drive, operation: OperatingConditions, model: Model) -> dict
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
         machine = drive.simulated_machine if isinstance(model, ChainedModel) else drive.driven_machine
-        return _machine(operation, model, machine)
+        return machine.by_name | _in_motion(operation, model, machine)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -99,7 +99,7 @@ def model_and_start(
     RunError
         where no motor is found.
     """
-    if config and is_study_file(name):
+    if config and Path(name) == Path(config.file.source):
         drive = drive_to_export(config, backend, progress)
         return whole_system(drive, config.operation, config.title, config.file.labels)
     if config is None:
@@ -184,12 +184,12 @@ def _is_of(model: Model, drive: Drive) -> bool:
     return model is machine_model or chains or model is machine_model.direct()
 
 
-def _machine(operation: OperatingConditions, model: Model, machine: Machine) -> dict[str, float]:
-    """Start values of the machine with its feed and gear, at the speed of the study."""
+def _in_motion(operation: OperatingConditions, model: Model, machine: Machine) -> dict[str, float]:
+    """Start values of the feed and of the motion of a machine, at the speed of the study."""
     speed = operation.crank_speed * machine.ratio
     direct = isinstance(model, DirectMachine)
     motion = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
-    return machine.by_name | Layout(type(operation.feed)).by_name(operation.feed) | motion
+    return Layout(type(operation.feed)).by_name(operation.feed) | motion
 
 
 def drive_to_export(

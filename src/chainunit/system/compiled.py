@@ -130,10 +130,13 @@ def input_starts(system: System, model: Model) -> dict[str, float]:
 
 
 def _description(system: System, models: Mapping[str, Model], name: str, title: str) -> dict[str, Any]:
-    """The description of a system that a `chainunit.core.system_description.SystemDescription` takes."""
+    """The description of a system as `chainunit.core.system_description.SystemDescription` takes it, in types of
+    JSON: the exact connections, in place of the slopes of load ports; what is left out or shown in addition; and the
+    order in which outputs, rates and the start are computed."""
     exact = hold_loads(system).connections
     influences = {component: _influences(model) for component, model in models.items()}
     free = _free_terminals(system)
+    # variables of terminals that are not joined
     members = {
         f"{full.partition('.')[0]}.{variable}"
         for full in free
@@ -143,9 +146,11 @@ def _description(system: System, models: Mapping[str, Model], name: str, title: 
     gears = {
         component: influences[component] for component, model in models.items() if not model.state_layout
     }
+    # slopes that a part without states needs to pass them on to a free terminal
     passed = _passed_on(slopes, members, gears)
     connections = [*exact, *passed]
     left_out = {full for connection in slopes - set(passed) for full in connection}
+    # outputs of further parts of the models, such as slopes, are extra ones of the system, if they are needed
     further = {
         f"{name}.{output}"
         for name, model in models.items()
@@ -238,6 +243,7 @@ class _Influences:
 
 @lru_cache(maxsize=64)
 def _influences(model: Model) -> _Influences:
+    """The inputs on which outputs, derivatives and start of a model depend, by its equations."""
     interface = Interface(model, {})
     n_states, n_outputs = len(interface.states), len(interface.others)
 
@@ -257,6 +263,7 @@ def _influences(model: Model) -> _Influences:
 
 
 def _constraints(interface: Interface) -> set[str]:
+    """The inputs on which the states after an event depend, see `Model.constrained_states`."""
     import casadi
 
     t = interface.trace
@@ -303,11 +310,20 @@ class _Plan:
         return [(name, outputs) for name, outputs in steps if outputs]
 
     def start(self) -> list[tuple[str, list[str] | None]]:
-        """The order of the start: components, whose states start, and outputs that such a start depends on."""
+        """The steps of the start in their order: the name of a component and None, if its states start, or else its
+        output, in a list, which the start of other components depends on.
+
+        Raises
+        ------
+        InputError
+            for states that depend on each other.
+        """
         steps: list[tuple[str, list[str] | None]] = []
         self._started_by: dict[str, set[str]] = {}
 
         def begin(name: str, above: tuple[str, ...]) -> None:
+            """Add the start of a component to the steps, after all outputs that its states need; `above` are the
+            components that wait for it."""
             if name in above:
                 loop = " -> ".join((*above[above.index(name) :], name))
                 raise InputError(f"the states at the start depend on each other: {loop}")

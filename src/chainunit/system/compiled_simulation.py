@@ -95,6 +95,7 @@ class CompiledSimulation(Simulation):
         self._saved = self.time, self._states
 
     def _check_signals(self) -> None:
+        """Refuse a signal that is of no input, or neither a number nor a profile."""
         for full, signal in self.signals.items():
             if full not in self._compiled.inputs:
                 raise InputError(f"{full}: no such input of the system")
@@ -125,6 +126,8 @@ class CompiledSimulation(Simulation):
         return _advance([self], [options.stop], options)[0]
 
     def _dataset(self, times: Any, outputs: Mapping[str, Any], kept: Sequence[str], every: int) -> xr.Dataset:
+        """The run of the `kept` variables, of every so many rows and the last one; `outputs` have the shape of
+        `times`."""
         import xarray as xr
 
         chosen = np.arange(0, len(times), every)

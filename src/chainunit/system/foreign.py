@@ -182,7 +182,8 @@ def _with_units(
 
 
 def _by_names(connectors: Mapping[str, Connector]) -> list[Terminal]:
-    """Terminals that follow from the names of variables."""
+    """The terminals of an FMU that declares none, by the names of its variables: a shaft for each prefix with angle
+    and torque, and a load port for each prefix with the values of a load."""
     ends = {name for name, c in connectors.items() if c.causality != "parameter"}
     terminals = []
     for prefix in _prefixes(ends, _REQUIREMENTS[FLANGE]):

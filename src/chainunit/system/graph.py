@@ -273,6 +273,7 @@ class System:
         return pairs
 
     def _check_ends(self, source: str, target: str) -> None:
+        """Refuse a connection between variables of another dimension or type."""
         one, other = self.connector(source), self.connector(target)
         comparable = one.dimension is not None and other.dimension is not None
         if comparable and one.dimension != other.dimension:
@@ -378,6 +379,8 @@ def order(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, 
     level: dict[str, int] = {}
 
     def rank(output: str, above: tuple[str, ...]) -> int:
+        """The level of an output, one above the highest level of the outputs that feed it; `above` are the outputs
+        that wait for it."""
         if output in above:
             loop = " -> ".join((*above[above.index(output) :], output))
             raise InputError(f"algebraic loop: {loop}; break it with a load port or a state")

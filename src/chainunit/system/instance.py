@@ -196,6 +196,7 @@ class Instance:
         self.messages: list[str] = []
 
         def logger(_env: Any, _name: Any, status: int, _category: Any, message: bytes | None) -> None:
+            """Keep a message of the FMU that is no success, and hand it to the log."""
             if message and status > 0:
                 text = printable(message.decode(errors="replace"), 500)
                 self.messages.append(text)
@@ -227,6 +228,8 @@ class Instance:
         self._setters = {kind: getattr(self._library, f"fmi2Set{kind}") for kind in NUMBERS}
 
     def _call(self, what: str, function: Any, *args: Any) -> Any:
+        """The result of a function of the FMU; if its status is no success, the failure of `what`, the work in words,
+        is raised."""
         from fmpy.fmi1 import FMICallException
 
         try:

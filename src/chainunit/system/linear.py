@@ -162,6 +162,7 @@ class LinearModel:
         return control.ss(self.A, self.B, self.C, self.D, name=self.model, **names)
 
     def _refuse_undefined(self) -> None:
+        """Refuse a linear model with a derivative that is not defined."""
         for name in "ABCD":
             for row, column in np.argwhere(~np.isfinite(getattr(self, name)))[:1]:
                 row_name = (self.states if name in "AB" else self.outputs)[row].name
@@ -312,6 +313,7 @@ class _Derivatives(NamedTuple):
 
 @lru_cache(maxsize=8)
 def _derivatives(model: Model) -> _Derivatives:
+    """The equations of a model with their derivatives, by its symbols; counts and switches are no rows or columns."""
     import casadi
 
     traced = trace(model)
@@ -343,8 +345,16 @@ def _bends(
     slopes: np.ndarray,
     slopes_at: Callable[[np.ndarray], np.ndarray],
 ) -> Iterator[Bend]:
-    """The places near the columns `z` where slopes change faster than those of smooth powers. A slope that is not
-    defined there does not count."""
+    """By column, the rows that bend within a small distance of the point: their slopes by the column change as those
+    of no smooth power do, such as at the edge of a stop. A slope that is not defined there counts as a bend of its
+    row, but has no size.
+
+    Parameters
+    ----------
+    z : values of the columns, shape (columns,)
+    values, slopes : of the rows at the point, shapes (rows,) and (rows, columns)
+    slopes_at : the slopes at other values of the columns
+    """
     columns, rows = derivatives.columns, derivatives.rows
     sizes = np.array([_size(v, value) for v, value in zip(columns, z, strict=True)])
     least = _SLIGHT * (np.array([[v.quantity.nominal or 1.0] for v in rows]) + np.abs(values)[:, None])
@@ -360,26 +370,27 @@ def _bends(
         changes = np.abs([high - low, high - here, here - low])
         return np.max(changes, axis=0), np.max(np.abs([low, high, here]), axis=0)
 
-    for column, v in enumerate(columns):
-        for share in (AT, NEAR):
-            distance = float(share * sizes[column])
-            with np.errstate(all="ignore"):
-                change, most = jump(column, distance)
-                bent = ~(change <= CHANGE * most + least) & ~(
-                    jump(column, 0.1 * distance)[0] <= _SHARP * change
-                )
-            of_rows = bent.any(axis=1) | ~defined[:, column]
-            if of_rows.any():
-                largest = max((float(x) for x in change[bent] / most[bent] if np.isfinite(x)), default=1.0)
-                names = tuple(
-                    name for name, is_bent in zip(derivatives.row_names, of_rows, strict=True) if is_bent
-                )
-                yield Bend(v.name, share == AT, InUnit(distance, v.unit), names, largest)
-                break
+    def bend(column: int, share: float) -> Bend | None:
+        """The bend within this share of the size of a column; None without one."""
+        v, distance = columns[column], float(share * sizes[column])
+        with np.errstate(all="ignore"):
+            change, most = jump(column, distance)
+            # a smooth function has a small change, or one that shrinks with the distance
+            is_small = change <= CHANGE * most + least
+            bent = ~is_small & ~(jump(column, 0.1 * distance)[0] <= _SHARP * change)
+        bent_rows = bent.any(axis=1) | ~defined[:, column]
+        if not bent_rows.any():
+            return None
+        largest = max((float(x) for x in change[bent] / most[bent] if np.isfinite(x)), default=1.0)
+        names = tuple(name for name, is_bent in zip(derivatives.row_names, bent_rows, strict=True) if is_bent)
+        return Bend(v.name, share == AT, InUnit(distance, v.unit), names, largest)
+
+    for column in range(len(columns)):
+        yield from filter(None, [bend(column, AT) or bend(column, NEAR)])
 
 
 def _size(v: Variable, value: float) -> float:
-    """The size of a state or input: its value, or its nominal one where that is larger; of an angle, which may have
+    """The size of a state or input: its value, or its nominal one if that is larger; of an angle, which may have
     many turns, one turn at most."""
     size = max(v.quantity.nominal or 1.0, abs(value))
     return min(size, 2.0 * np.pi) if v.unit == "rad" else size

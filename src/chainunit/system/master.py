@@ -35,6 +35,8 @@ class CoSimulation(FmuSimulation):
         """Do nothing: a co-simulation cannot go back into a step."""
 
     def _steps(self, times: Any) -> Iterator[None]:
+        """The steps from time to time [s]: all FMUs go one step with the inputs that move inside it, then the outputs
+        are transferred."""
         points = self._signal_values(times)
         middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
         moves_inside, moves_over = _moves(points, middles, len(times) - 1)

@@ -63,6 +63,7 @@ class ModelExchange(FmuSimulation):
         super().__init__(system, signals, start_time)
 
     def _initialize(self) -> None:
+        """Initialize the FMUs, and put their states in series into one vector."""
         self._pace: float | None = None
         """next step of the solver [s]"""
         self._refusal: DiscardError | None = None
@@ -219,6 +220,7 @@ class ModelExchange(FmuSimulation):
         self._reached, self._crossed = high, True
 
     def _steps(self, times: Any) -> Iterator[None]:
+        """The steps from time to time [s]: the solver goes on with steps of its own, and the rows lie within them."""
         for after in times[1:].tolist():
             self._pieces = self._pieces[-1:]
             while self._reached < after:

@@ -52,6 +52,7 @@ class Rows:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """Write the last rows, unless the block failed, and close the file."""
         if self._file is not None:
             try:
                 if kind is None:
@@ -82,6 +83,7 @@ class Rows:
         return attributes
 
     def _create(self, file: Path) -> Any:
+        """A netCDF file with a variable of the time for each recorded one."""
         import netCDF4
 
         with netcdf():
@@ -95,6 +97,7 @@ class Rows:
         return out
 
     def _flush(self) -> None:
+        """Write the filled rows of the block to the file."""
         assert self._file is not None
         end = self._written + self._filled
         with netcdf():

@@ -258,6 +258,7 @@ class FmuSimulation(Simulation):
         return transfers
 
     def _initialize(self) -> None:
+        """Initialize the FMUs with the start values of the system and the signals at the start."""
         start: dict[str, dict[str, float]] = {name: {} for name in self._instances}
         for full, value in self.system.values.items():
             name, _, variable = full.partition(".")
@@ -472,6 +473,7 @@ class FmuSimulation(Simulation):
             _free(before["_instances"], before["_state"])
 
     def _run_again(self, runs: Sequence[_PastRun]) -> None:
+        """Start anew, and go through the same runs, for FMUs whose states cannot be kept."""
         signals, self._instances, self._state, self._past = self.signals, {}, {}, []
         self.time, first = self._start
         self.signals = dict(first)

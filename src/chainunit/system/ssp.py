@@ -191,6 +191,7 @@ def _parameter_file(instance: str) -> str:
 
 
 def _root(tag: str, name: str, prefixes: Iterable[str], description: str = "") -> Element:
+    """The root of a file of SSP, with the namespaces of its prefixes."""
     spaces = {f"xmlns:{prefix}": _NAMESPACES[prefix] for prefix in prefixes}
     root = Element(tag, {**spaces, "version": "1.0", "name": name})
     if description:
@@ -200,6 +201,7 @@ def _root(tag: str, name: str, prefixes: Iterable[str], description: str = "") -
 
 
 def _units(parent: Element, prefix: str, connectors: Iterable[Connector]) -> None:
+    """Add the definitions of the units of connectors."""
     dimensions = {c.unit: c.dimension for c in connectors if c.unit and c.type == "Real"}
     if not dimensions:
         return
@@ -267,6 +269,7 @@ def _description(
 
 
 def _component(elements: Element, name: str, part: _Part, shown: Iterable[Connector], source: str) -> None:
+    """Add a component with the `shown` connectors, its FMU at `source`, and its file of parameters."""
     component = SubElement(
         elements,
         "ssd:Component",

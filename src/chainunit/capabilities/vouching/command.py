@@ -90,10 +90,13 @@ def _model(file: Path | None, progress: Any) -> Any:
     """The model of a study file or linkage file."""
     if file is None:
         return None
-    from ...models import is_study_file
+    from ...models import linkage_named
     from ...study.package import model_and_start
 
-    loaded = study_file(file) if is_study_file(str(file)) else None
+    linkage = linkage_named(str(file))
+    if linkage is not None:
+        return linkage
+    loaded = study_file(file) if file.suffix.lower() == ".toml" else None
     return model_and_start(str(file), loaded, progress=progress)[0]
 
 

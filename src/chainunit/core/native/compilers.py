@@ -98,6 +98,7 @@ def compile_code(
     """
 
     def make() -> bytes:
+        """The code, compiled in a folder of its own."""
         with scratch() as work:
             for name, content in files.items():
                 (work / name).write_bytes(content)

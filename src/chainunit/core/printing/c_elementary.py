@@ -101,7 +101,8 @@ def header() -> str:
 
 
 def _function(function: Callable[..., Any], arguments: int) -> str:
-    """The definition of a function in C."""
+    """The definition in C of a function of so many numbers, from its operations as `recorded` has them; two results
+    are a `Two`."""
     recording = recorded(function, arguments)
 
     def value(place: int) -> str:

@@ -175,8 +175,14 @@ def arccosine(xp: Any, x: Any) -> Any:
 
 
 def _near_zero(xp: Any, x: Any) -> tuple[Any, Any, Any, Any]:
-    """Whether `x` is beyond 1/2 in size; its size; the number s to 1/2 whose arcsine is looked for, which is then
-    sqrt((1 - size)/2) and else the size; and what the arcsine has beyond s."""
+    """The reduction of an arcsine to a number s from 0 to 1/2, for which the polynomial is exact.
+
+    With size = |x| it is s = size up to 1/2, and beyond s = sqrt((1 - size)/2), as arcsin(size) = pi/2 - 2 arcsin(s).
+
+    Returns
+    -------
+    whether the size is beyond 1/2, the size, s, and arcsin(s) - s
+    """
     size = xp.abs(x)
     far = size > 0.5
     z = xp.choose(far, 0.5 * (1.0 - size), size * size)

@@ -302,7 +302,8 @@ def _form(kind: str) -> str:
 
 
 def _elementary() -> str:
-    """Sine, arctangent and the like (`chainunit.core.printing.elementary`)."""
+    """The definitions in JavaScript of the functions of `chainunit.core.printing.elementary`, such as sine. A second
+    result, as a cosine beside a sine, goes into the array `second`."""
     texts = {}
     for kind, (function, arguments, _) in OWN.items():
         traced = recording(kind)

@@ -76,18 +76,26 @@ def difference_groups(model: Model) -> set[int]:
 def kernels(
     t: Trace, derived: Sequence[Any], slopes: bool = True, columns: Sequence[str] | None = None
 ) -> Iterator[ModelFunction]:
-    """The functions of a traced model: its outputs and their derivatives in a direction (``values``, ``forward``),
-    and, if it has such, the ``derivatives`` of its states and all for their start, the requirements on its
-    parameters, and the values `derived` from them. With `columns`, by name, ``values`` gives these alone, in one
-    group."""
+    """The functions of a traced model, each with the values of the model's method of that name: ``values``, the
+    outputs in their groups, and ``forward``, their derivatives in a direction; with states, their ``derivatives``,
+    the functions of their start and the numbers of their integrator; the limits of the ``requirements``; and
+    ``derive``, the values derived from parameters.
+
+    Parameters
+    ----------
+    t : the model in symbols
+    derived : the derived values in symbols, shape (derived_count,)
+    slopes : whether to give ``forward``
+    columns : names of outputs; with them, ``values`` gives these alone, in one group
+    """
     import casadi
 
-    model, (ps, us, xs, ks) = t.model, t.symbols
-    zs = casadi.SX.sym("z", model.start_problem.unknowns)
-    du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
-    symbols = {"p": ps, "u": us, "x": xs, "k": ks, "z": zs, "d": du, "e": dx}
-    # derived values come last, and only if the model has them
-    k = "k" if model.derived_count else ""
+    model, (p, u, x, k) = t.model, t.symbols
+    z = casadi.SX.sym("z", model.start_problem.unknowns)
+    du, dx = casadi.SX.sym("du", u.shape[0]), casadi.SX.sym("dx", x.shape[0])
+    symbols = {"p": p, "u": u, "x": x, "k": k, "z": z, "d": du, "e": dx}
+    # derived values come last among the arguments, and only if the model has them
+    last = "k" if model.derived_count else ""
 
     def kernel(name: str, takes: str, groups: list[Any], offsets: list[int], frequency: str) -> ModelFunction:
         return ModelFunction(name, takes, [symbols[letter] for letter in takes], groups, offsets, frequency)
@@ -103,22 +111,22 @@ def kernels(
         places = [list(range(len(outputs)))]
     offsets = [sum(map(len, places[:g])) for g in range(len(places))]
     values = [casadi.vertcat(*(outputs[place] for place in group)) for group in places]
-    yield kernel("values", f"pux{k}", values, offsets, "OFTEN")
+    yield kernel("values", f"pux{last}", values, offsets, "OFTEN")
     if slopes:
         apart = groups_without_slopes(model)
         smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
         smooth.append(casadi.vertcat(*t.derivatives))
-        along = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
-        yield kernel("forward", f"puxde{k}", along, [*offsets, len(outputs)], "SELDOM")
+        along = [casadi.jtimes(row, casadi.vertcat(u, x), casadi.vertcat(du, dx)) for row in smooth]
+        yield kernel("forward", f"puxde{last}", along, [*offsets, len(outputs)], "SELDOM")
     if model.state_layout:
-        yield single("derivatives", f"pux{k}", t.derivatives, "OFTEN")
-        yield from _start(t, zs, single, k)
+        yield single("derivatives", f"pux{last}", t.derivatives, "OFTEN")
+        yield from _start(t, z, single, last)
         yield single("internal_step", "p", [model.internal_step(casadi_(), t.p)])
         if model.controlled:
             yield single("tolerance", "p", [model.tolerance(casadi_(), t.p)])
-            yield single("closed", f"pux{k}", model.constrained_states(casadi_(), t.p, t.u, t.x), "OFTEN")
+            yield single("closed", f"pux{last}", model.constrained_states(casadi_(), t.p, t.u, t.x), "OFTEN")
     if limits := [v for row in model.requirements(casadi_(), t.p) for v in row]:
-        yield single("requirements", f"p{k}", limits)
+        yield single("requirements", f"p{last}", limits)
     if model.derived_count:
         yield single("derive", "p", derived)
 
@@ -130,18 +138,20 @@ def groups_without_slopes(model: Model) -> set[int]:
     return difference_groups(model) | {g for g, group in enumerate(groups) if places[group[0]].type != "Real"}
 
 
-def _start(t: Trace, zs: Any, single: Callable[..., ModelFunction], k: str) -> Iterator[ModelFunction]:
-    """The functions that give the states at the start; `zs` are the unknowns in symbols, `single` makes a function
-    with one group, and `k` is the letter of the derived values, or empty."""
+def _start(
+    t: Trace, unknowns: Any, single: Callable[..., ModelFunction], last: str
+) -> Iterator[ModelFunction]:
+    """The functions that give the states at the start; `unknowns` are those of the start in symbols,
+    `single` makes a function with one group, and `last` is the letter of the derived values, or empty."""
     import casadi
 
     model = t.model
     assert model.state_layout is not None
-    z = casadi.vertsplit(zs) if model.start_problem.unknowns else []
+    z = casadi.vertsplit(unknowns) if model.start_problem.unknowns else []
     if z:
         yield single("guess", "pu", model.start_guess(casadi_(), t.p, t.u))
         yield single("improved", "puz", model.improve_start(casadi_(), t.p, t.u, z))
     yield single("initial", "puz", model.state_layout.values(model.start_states(casadi_(), t.p, t.u, z)))
     if model.start_problem.required:
         limits = [v for row in model.start_limits(casadi_(), t.p, t.u, t.x) for v in row]
-        yield single("start_limits", f"pux{k}", limits)
+        yield single("start_limits", f"pux{last}", limits)

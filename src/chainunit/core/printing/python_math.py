@@ -29,6 +29,7 @@ def _without_errors(function: Callable[..., float]) -> Callable[..., float]:
     """The function with NaN or inf in place of the errors of `math`."""
 
     def value(*x: float) -> float:
+        """The value, NaN beyond the domain of the function and infinite beyond the largest number."""
         try:
             return function(*x)
         except ValueError:

@@ -135,6 +135,7 @@ def export(
 
 
 def _build_description(identifier: str, names: Sequence[str]) -> bytes:
+    """The contents of buildDescription.xml of FMI 3.0, with the `names` of the sources to compile."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     files = SubElement(configuration, "SourceFileSet", language="C99")

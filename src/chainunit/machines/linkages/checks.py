@@ -10,6 +10,7 @@ from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
 from .declarations import RESERVED
+from .entries import Places
 from .joint_kind import JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
@@ -92,39 +93,6 @@ def freedom_faults(
         used |= {(link["name"], point) for link in links for point in link["masses"]}
         hint = alike_points(points, used) if isinstance(error, FreeLinksError) else ""
         yield f"links.{error.key}" if error.key in names else "joints", f"{error}{hint}"
-
-
-Places = Mapping[str, Mapping[str, tuple[float, float]]]
-
-
-def usual_distance(link: str, points: Places, ends: set[tuple[str, ...]]) -> float:
-    """The largest distance from the origin of a link [m] at which its points and its centroid are expected: that of
-    its farthest joint, and ten times the size of the linkage. `ends` are the names (link, point) of the points at
-    joints. The size is the largest distance of two joints on one link; without a size, the result is 0."""
-    joints = {
-        name: [place for point, place in places.items() if (name, point) in ends]
-        for name, places in points.items()
-    }
-    size = max((math.dist(a, b) for places in joints.values() for a in places for b in places), default=0.0)
-    farthest = max((math.hypot(*place) for place in joints[link]), default=0.0)
-    return farthest + 10.0 * size if size else 0.0
-
-
-_DENSITY = 8000.0
-"""[kg/m3], of steel: no usual part is denser."""
-
-
-def usual_inertia(mass: float, points: Iterable[tuple[float, float]]) -> tuple[float, float]:
-    """The least and the largest inertia [kg m2] that is expected of a `mass` [kg] with these points [m].
-
-    The radius of gyration is compared with that of a steel ball of the mass and with the size of the link: a slip of
-    mm2 or cm2 for m2 is a factor of 1000 or 100 in it. A disc on a short crank, and a drive that is reckoned to it,
-    have a large one.
-    """
-    ball = math.sqrt(0.4) * (0.75 * mass / (math.pi * _DENSITY)) ** (1.0 / 3.0)
-    places = list(points)
-    size = max((math.dist(a, b) for a in places for b in places), default=0.0)
-    return mass * max(ball / 30.0, size / 200.0) ** 2, mass * (100.0 * max(ball, size)) ** 2
 
 
 def length_faults(points: Places, joints: Entries, driver: str) -> Iterator[Fault]:

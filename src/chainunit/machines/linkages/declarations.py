@@ -145,19 +145,6 @@ def common_parameters(linear: bool, guides: bool, starts: Mapping[str, float]) -
     return with_starts(parameters, starts)
 
 
-def field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
-    """A quantity of the user's as a field of a declaration."""
-    bounds = {key: entry[key] for key in ("min", "max") if entry.get(key) is not None}
-    description = entry.get("description") or entry["name"]
-    return (
-        entry["name"],
-        Value,
-        quantity(
-            entry["unit"], description, default=entry["value"], tunable=entry.get("tunable", False), **bounds
-        ),
-    )
-
-
 def with_starts(declared: type, starts: Mapping[str, float]) -> type:
     """A declaration with other start values, by name."""
     flat, fields = Layout(declared).from_names(dict(starts)), []

@@ -45,6 +45,7 @@ def checked_dimension(text: str, dimensions: Dimensions, unit: str | None) -> Di
 
 
 def _dimension(node: ast.AST, dimensions: Dimensions, parsed: Expression) -> Dimension | None:
+    """The dimension of a node; None for a plain number, which fits any."""
     match node:
         case ast.Constant():
             return None
@@ -90,6 +91,7 @@ def _powered(dimension: Dimension | None, power: float) -> Dimension | None:
 def _of_function(
     name: str, args: list[Dimension | None], node: ast.AST, parsed: Expression
 ) -> Dimension | None:
+    """The dimension of the value of a function, by the dimensions of its arguments, which are checked."""
     first, *others = args
     if name == "sqrt":
         return _powered(first, 0.5)
@@ -110,6 +112,7 @@ def _of_function(
 
 
 def _same(a: Dimension | None, b: Dimension | None, node: ast.AST, parsed: Expression) -> Dimension | None:
+    """The common dimension of two sides of a sum, a comparison or a function; a plain number takes the other one."""
     if a is None or b is None:
         return b if a is None else a
     if a != b:

@@ -159,34 +159,45 @@ class EntryReader(Entry):
     def entry(
         self, key: str, entry: Any, unit: str, motion: NameUnits | None = None, inputs: bool = False
     ) -> Any:
-        """A number in SI units, or the text of an expression, with its unit checked; NaN if it is wrong. `motion` are
-        the units of the names that a load knows beside parameters and inputs."""
+        """The value of a key: a number in the SI `unit`, or the text of an expression whose names and unit are right;
+        NaN, with a fault, if it is wrong.
+
+        Parameters
+        ----------
+        motion : of the entry of a load, the units of the names that it knows beside parameters and inputs
+        inputs : whether an expression may name inputs
+        """
         with self.at(key):
             if not isinstance(entry, str) or _is_quantity(entry):
                 return self.number(key, entry, unit)
             if self.refused & words_in(entry):  # the name itself is faulted at its own key
                 return math.nan
-            parsed = expression(entry)
-            names = {**self.units, **(motion or {}), **self.further_units(parsed, motion is not None)}
-            self.check_names(parsed, names, inputs)
-            self.used |= {*parsed.names}
-            name = entry.strip()
-            if parsed.names == (name,) and self.units.get(name, "") is None:
-                self.units[name] = names[name] = unit
-                self.derived_dimensions = None
-            checked_dimension(parsed.text, self.dimensions(names), unit)
-            for width in parsed.widths:
-                moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
-                if moving:
-                    raise InputError(
-                        f"is {shown(entry)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
-                        "must be a number or an expression of parameters; a ramp that begins at such a value a is "
-                        "ramp(x - a, 0, width)"
-                    )
+            self.check_expression(expression(entry), unit, motion, inputs)
             if motion is None:
                 self.expressed[key, entry] = None
             return entry
         return math.nan
+
+    def check_expression(self, parsed: Expression, unit: str, motion: NameUnits | None, inputs: bool) -> None:
+        """Refuse an expression with a wrong name, of another unit, or with a width that changes in a run; the
+        arguments are as of `entry`. The parameters and inputs in it are used, and one that has no unit yet, and
+        stands alone in it, has this one."""
+        names = {**self.units, **(motion or {}), **self.further_units(parsed, motion is not None)}
+        self.check_names(parsed, names, inputs)
+        self.used |= {*parsed.names}
+        name = parsed.text.strip()
+        if parsed.names == (name,) and self.units.get(name, "") is None:
+            self.units[name] = names[name] = unit
+            self.derived_dimensions = None
+        checked_dimension(parsed.text, self.dimensions(names), unit)
+        for width in parsed.widths:
+            moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
+            if moving:
+                raise InputError(
+                    f"is {shown(parsed.text)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
+                    "must be a number or an expression of parameters; a ramp that begins at such a value a is "
+                    "ramp(x - a, 0, width)"
+                )
 
     def check_names(self, parsed: Expression, names: NameUnits, inputs: bool) -> None:
         """Refuse an expression with a name that is not among the `names`, or of an input without leave."""
@@ -321,16 +332,18 @@ class EntryReader(Entry):
                     f"unit = {shown(unit)}: no unit that a linkage knows; known: {', '.join(UNITS)}"
                 )
             return self.number("", entry, fits[0]), fits[0]
+        parts = units.split(entry) if isinstance(entry, str) else None
+        # what begins with a sign after the number is an expression
+        if parts is not None and parts[1][:1] not in ("", "+", "-", "*", "/"):
+            for si_unit in UNITS:
+                if units.converts(parts[1], si_unit):
+                    return within(units.convert(*parts, si_unit), entry), si_unit
         if isinstance(entry, str) and words_in(entry) & {*self.units, *self.table("parameters")}:
             raise InputError(
                 f"is {shown(entry)}; must be a number with a unit; a parameter may be an expression"
             )
-        parts = units.split(entry) if isinstance(entry, str) else None
         if parts is None or not parts[1]:
             return self.number("", entry, "1"), None
-        for si_unit in UNITS:
-            if units.converts(parts[1], si_unit):
-                return within(units.convert(*parts, si_unit), entry), si_unit
         hints = [units.spelling(entry, si_unit) for si_unit in UNITS]
         unknown = f"; the unit is not known; write it as in {_like('m')}"
         raise InputError(f"is {shown(entry)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
@@ -340,6 +353,40 @@ def sized(key: str, unit: str, usual: tuple[float, float] | None, description: s
     """The value of a key as a variable of these `usual` sizes, with this `description`."""
     description = description or units.kind_of(unit)
     return Variable(key, description, Quantity(unit, description, usual=usual))
+
+
+Places = Mapping[str, Mapping[str, tuple[float, float]]]
+"""By link, its points at the start values of the parameters [m]."""
+
+
+def usual_distance(link: str, points: Places, ends: set[tuple[str, ...]]) -> float:
+    """The largest distance from the origin of a link [m] at which its points and its centroid are expected: the
+    distance of its farthest joint, and ten times the size of the linkage. `ends` are the names (link, point) of the
+    points at joints. The size is the largest distance of two joints on one link; without a size, the result is 0."""
+    joints = {
+        name: [place for point, place in places.items() if (name, point) in ends]
+        for name, places in points.items()
+    }
+    size = max((math.dist(a, b) for places in joints.values() for a in places for b in places), default=0.0)
+    farthest = max((math.hypot(*place) for place in joints[link]), default=0.0)
+    return farthest + 10.0 * size if size else 0.0
+
+
+_DENSITY = 8000.0
+"""[kg/m3], of steel: no usual part is denser."""
+
+
+def usual_inertia(mass: float, points: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """The least and the largest inertia [kg m2] that is expected of a `mass` [kg] with these points [m].
+
+    The radius of gyration is compared with the radius of gyration of a steel ball of the mass, and with the size of
+    the link: a slip of mm2 or cm2 for m2 is a factor of 1000 or 100 in it. A disc on a short crank, and a drive that
+    is reckoned to it, have a large one.
+    """
+    ball = math.sqrt(0.4) * (0.75 * mass / (math.pi * _DENSITY)) ** (1.0 / 3.0)
+    places = list(points)
+    size = max((math.dist(a, b) for a in places for b in places), default=0.0)
+    return mass * max(ball / 30.0, size / 200.0) ** 2, mass * (100.0 * max(ball, size)) ** 2
 
 
 def _is_quantity(text: str) -> bool:
@@ -394,6 +441,7 @@ def _like(unit: str) -> str:
 
 
 def _same_unit(text: str, unit: str) -> bool:
+    """Whether a text is the name of the SI `unit`, as FMI or as an engineer writes it."""
     try:
         return units.convert(1.0, text, unit) == 1.0 if text != "1" else unit == "1"
     except ValueError:

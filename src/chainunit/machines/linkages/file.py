@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +29,8 @@ from .checks import (
     quantity_names,
     spring_faults,
     study_fault,
-    usual_distance,
-    usual_inertia,
 )
-from .entries import is_among, is_given, sized
+from .entries import is_among, is_given, sized, usual_distance, usual_inertia
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
@@ -69,8 +68,7 @@ def read_linkage(file: Path) -> InverseMachine:
         for a value that looks like a slip of its unit.
     """
     machine, unusual = linkage_in(file)
-    for value in slips_of(unusual):
-        warnings.warn(value.sentence, RemarkWarning, stacklevel=2)
+    _warn(unusual)
     return machine
 
 
@@ -82,9 +80,38 @@ def linkage_in(file: Path) -> tuple[InverseMachine, tuple[UnusualValue, ...]]:
     InputError
         as `read_linkage`.
     """
+    with _tables_of(file) as tables:
+        return linkage_from(tables, file.stem, file.parent)
+
+
+def linkage_unless_study(file: Path) -> InverseMachine | None:
+    """The model of the machine in a linkage file; None for a study file, which has none of its tables.
+
+    Raises
+    ------
+    InputError, RemarkWarning
+        as `read_linkage`.
+    """
+    with _tables_of(file) as tables:
+        if not {"links", "ground", "driver", "joints"} & tables.keys():
+            return None
+        machine, unusual = linkage_from(tables, file.stem, file.parent)
+    _warn(unusual)
+    return machine
+
+
+@contextmanager
+def _tables_of(file: Path) -> Iterator[dict[str, Any]]:
+    """The tables of a file; a refusal in the block names the file and the line of its key."""
     text = file_text(file, TOML)
     with in_file(str(file), lambda: toml_lines.lines_of(text)):
-        return linkage_from(toml(text), file.stem, file.parent)
+        yield toml(text)
+
+
+def _warn(unusual: Iterable[UnusualValue]) -> None:
+    """Warn of the values that look like a slip of their unit."""
+    for value in slips_of(unusual):
+        warnings.warn(value.sentence, RemarkWarning, stacklevel=3)
 
 
 def linkage_from(
@@ -128,7 +155,7 @@ class _LinkageReader(LoadReader):
     """The reader of one file."""
 
     def description(self) -> dict[str, Any]:
-        """The description."""
+        """The description of the machine, as `LinkageDescription` takes it."""
         study_fault(self.data)
         self.fault_drivers()
         data = self.data
@@ -375,7 +402,8 @@ class _LinkageReader(LoadReader):
     def slide(
         self, table: Mapping[str, Any], joints: list[dict[str, Any]]
     ) -> tuple[dict[str, Any], list[float] | None]:
-        """A driver that slides, and its range."""
+        """The driver that slides in the prismatic joint that its table names, with the link that moves, and its range
+        [m]; nothing and None, with a fault, for another joint."""
         for name in ("link", "zero", "positive"):
             if name in table:
                 self.fault(
@@ -493,7 +521,8 @@ class _LinkageReader(LoadReader):
                 self.doubt(variable, table["inertia"], number(link["inertia"]))
 
     def given_pose(self, table: Mapping[str, Any], pose: StartPose) -> None:
-        """Points, angles and poses that the file gives."""
+        """Take what the table of the start gives into the `pose`: places of points, angles of links, and whole poses.
+        A point by its name alone is that point of every link that has it."""
         links = {name: points for name, points in self.points.items() if name != GROUND}
         for name, entry in self.table("start.points", table).items():
             key = f"start.points.{name}"

@@ -197,30 +197,40 @@ class FollowedLinkage:
         return margins if all(margin > LEAST_MARGIN for margin in margins) else None
 
     def _range_end(self, signs: Sequence[float], start: float, limit: float) -> RangeEnd:
-        """The last good place on the way from the start to a limit, by halving, and the group that is good no
-        farther."""
+        """The end of the range from a good place `start` towards the `limit`: the last place [rad, m] at which all
+        groups close, clear of dead positions, and the group that does not beyond; the limit itself if all are good up
+        to it. The signs are as in `signed`."""
         places = [start + (limit - start) * k / _PLACES for k in range(_PLACES + 1)]
-        good_margins = takewhile(lambda m: m is not None, (self._good_margins(signs, q) for q in places))
-        margins = [margins for margins in good_margins if margins is not None]
-        passed = places[: len(margins)]
+        courses = (self._good_margins(signs, q) for q in places)
+        margins = [good for good in takewhile(lambda course: course is not None, courses) if good is not None]
+        passed, beyond = places[: len(margins)], places[len(margins) :]
         # a low between two places may be bad, too
         between = lows(partial(self._margins_at, signs), margins, passed)
-        all_bad = [q for _, q, least in between if not least > LEAST_MARGIN] + places[len(passed) :][:1]
-        if not all_bad:
+        bad_places = [q for _, q, least in between if not least > LEAST_MARGIN] + beyond[:1]
+        if not bad_places:
             return RangeEnd(limit, ())
-        bad = min(all_bad, key=lambda q: abs(q - start))
+        bad = min(bad_places, key=lambda q: abs(q - start))
         good = [q for q in passed if abs(q - start) < abs(bad - start)][-1]
+        good, bad = self._parted(signs, good, bad)
+        return RangeEnd(good, self.structure.groups[self._worst_group(signs, bad)].links)
+
+    def _parted(self, signs: Sequence[float], good: float, bad: float) -> tuple[float, float]:
+        """A good and a bad place next to each other between two such places, by halving."""
         for _ in range(_HALVINGS):
             middle = 0.5 * (good + bad)
             if self._good_margins(signs, middle) is None:
                 bad = middle
             else:
                 good = middle
+        return good, bad
+
+    def _worst_group(self, signs: Sequence[float], bad: float) -> int:
+        """The number of the group that does not close at a bad place, or else has the least margin there."""
         k = self._open_at(bad)
-        if k is None:
-            here = self._margins_at(signs, bad)
-            k = here.index(min(here))
-        return RangeEnd(good, self.structure.groups[k].links)
+        if k is not None:
+            return k
+        margins = self._margins_at(signs, bad)
+        return margins.index(min(margins))
 
 
 def lows(
@@ -248,6 +258,7 @@ def _lowest(
     open_places: list[float] = []
 
     def value(q: float) -> float:
+        """The margin at a place; NaN from the first place on at which the linkage does not close."""
         try:
             margin = math.nan if open_places else margins_at(q)[group]
         except (ArithmeticError, ValueError):

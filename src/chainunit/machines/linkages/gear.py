@@ -83,8 +83,9 @@ class MeshData(NamedTuple):
         return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
-        """See `JointData`: the force turns with the arm, and so does its lever on the link, which starts from its
-        centre."""
+        """The changes by q of the load of the mesh on both of its links, at a constant size of the force: it turns
+        with the arm. On `link`, which starts from its centre, its lever turns as the force does, so that the moment
+        stays; on the `carrier` the moment changes, too."""
         turn = 0.0 if self.rolling.arm is None else m.links[self.rolling.arm].t1
         more = reaction.turned() * turn
         yield self.link, (more, 0.0)
@@ -188,7 +189,7 @@ class GearKind(SingleLinkKind):
     alone = "geared link"
 
     def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
-        """Add the teeth."""
+        """Add to the `joint` the teeth of both wheels, and whether one is a ring (internal)."""
         teeth: Any = table.get("teeth")
         internal = table.get("internal", False)
         whole = isinstance(teeth, list) and len(teeth) == 2 and all(type(z) is int and z > 0 for z in teeth)
@@ -259,12 +260,14 @@ class GearKind(SingleLinkKind):
         return float(rate)
 
     def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
-        """The wheel with its mesh; an idler only hands on the turn of the wheel before it."""
+        """The wheel `link`, which turns on the arm in its `pin` and meshes with another wheel in the gear `joint`. If
+        the other wheel is itself driven by a gear on the same arm, it is an idler: the turn then follows from the
+        wheel that drives it, by the product of both ratios."""
         other, arm = joint.other_link(link), joint.third
-        before = next((g for g in parts.groups if isinstance(g, GearedLink) and g.bar.name == other), None)
+        idler = next((g for g in parts.groups if isinstance(g, GearedLink) and g.bar.name == other), None)
         rolling = Rolling(_moving(arm), _moving(other), _ratio(joint, link))
-        if before is not None and before.rolling.arm == rolling.arm:
-            rolling = before.rolling._replace(ratio=rolling.ratio * before.rolling.ratio)
+        if idler is not None and idler.rolling.arm == rolling.arm:
+            rolling = idler.rolling._replace(ratio=rolling.ratio * idler.rolling.ratio)
         bar, mesh = parts.hung(link, pin), parts.pin(arm, joint.name)
         parts.receive(joint, mesh, link)
         structure, centre = parts.structure, parts.pin(other, joint.at(other))

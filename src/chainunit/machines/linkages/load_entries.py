@@ -67,7 +67,14 @@ class LoadReader(ParameterReader):
         return curves
 
     def columns(self, key: str, table: Mapping[str, Any], over: str) -> tuple[Column, Column]:
-        """The two columns of a table."""
+        """The places and the values of a table, each with its unit: from its lists, or from the CSV file that it
+        names. `over` is phi or x.
+
+        Raises
+        ------
+        InputError
+            in one line, for lists of different or few numbers.
+        """
         if "file" in table:
             if {"phi", "x", "value"} & table.keys():
                 raise InputError("has file and lists: the file gives both columns; take one of both out")
@@ -142,7 +149,8 @@ class LoadReader(ParameterReader):
     # loads
 
     def load(self, name: str) -> dict[str, Any]:
-        """A load."""
+        """A load by its name: its kind, its point or link, both ends of a spring, and force or torque as numbers or
+        expressions; with faults, a part of this."""
         key = f"loads.{name}"
         table = self.table(key, self.table("loads"))
         kind = table.get("type", "force")

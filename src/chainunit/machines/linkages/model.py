@@ -34,7 +34,7 @@ from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, words_on_motion
 from .closing import LEAST_MARGIN
-from .declarations import LinkageMotion, LinkBody, common_parameters, field_of, with_differing
+from .declarations import LinkageMotion, LinkBody, common_parameters, with_differing
 from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
 from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
@@ -76,6 +76,14 @@ def _machine_of(text: str) -> InverseMachine:
     return LinkageDescription(json.loads(text)).model()
 
 
+def _field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
+    """A parameter or an input of the file as a field of a declaration."""
+    bounds = {key: entry[key] for key in ("min", "max") if entry.get(key) is not None}
+    name, start, tunable = entry["name"], entry["value"], entry.get("tunable", False)
+    described = entry.get("description") or name
+    return name, Value, quantity(entry["unit"], described, default=start, tunable=tunable, **bounds)
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FileMachine(InverseMachine):
     """The model of a linkage file."""
@@ -110,7 +118,7 @@ class LinkageDescription(LinkageOutputs):
         self.extremes = extremes_of(data["loads"])
         self.link_turns: dict[str, tuple[float, float]] = {}
         self.Parameters = self._parameters()
-        inputs = [field_of(entry) for entry in data.get("inputs", ())]
+        inputs = [_field_of(entry) for entry in data.get("inputs", ())]
         self.port, motion = ROTATING, cast("type", LinkageMotion)
         if self.way.linear:
             self.port, motion = SLIDING, SLIDING.motion
@@ -144,7 +152,7 @@ class LinkageDescription(LinkageOutputs):
     def _parameters(self) -> Any:
         """The declaration of the parameters: those of the file, bodies of links with quantities of their own, and the
         common ones of all machines. The ratio of a driver that swings has one allowed value, see `_FIXED_RATIO`."""
-        fields = [field_of(entry) for entry in self.data.get("parameters", ())]
+        fields = [_field_of(entry) for entry in self.data.get("parameters", ())]
         for link in self.data["links"]:
             if quantities := link.get("own", {}):
                 name, title = self.variable("link", link["name"]), f"link {link['name']}"
@@ -171,7 +179,8 @@ class LinkageDescription(LinkageOutputs):
         return name, Value, quantity(q.unit, description, default=0.5 * (low + high), min=low, max=high)
 
     def values(self, xp: Any, p: Any, u: Any) -> dict[str, Any]:
-        """The quantities that expressions may name."""
+        """By name, the values of all that expressions may name: parameters and inputs of the file, quantities of
+        links, extremes, tables as curves, and the parameters that are expressions of others."""
         values = {entry["name"]: getattr(p, entry["name"]) for entry in self.data.get("parameters", ())}
         values |= {entry["name"]: getattr(u, entry["name"]) for entry in self.data.get("inputs", ())}
         for link in self.data["links"]:
@@ -232,6 +241,8 @@ class LinkageDescription(LinkageOutputs):
         return MotionExtreme(coordinate, self.way.places(), 1.0 if kind == "max" else -1.0, ends)
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
+        """A load of the file on the links: a spring, a torque, or a force along the frame or along its link
+        (follower)."""
         kind, (link, *point), geometry = load["type"], load["on"], parts.geometry
         if kind == "spring":
             one, other = (
@@ -365,7 +376,7 @@ class LinkageDescription(LinkageOutputs):
         return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 
     def model(self) -> InverseMachine:
-        """The model."""
+        """The model of the machine."""
         data = self.data
         receivers = self.at_start.parts.receivers
         variables = {name: self.variable("joint", name) for name in self.structure.joints}

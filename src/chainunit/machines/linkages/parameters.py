@@ -146,7 +146,9 @@ class ParameterReader(EntryReader):
         self.used |= {*parsed.names}
 
     def quantities(self, kind: str) -> list[dict[str, Any]]:
-        """Parameters or inputs; parameters that are expressions of others are taken up apart."""
+        """The entries of the parameters or the inputs, each with name, value [SI], unit, description, limits and
+        whether it is tunable. The unit is None if the first use of the name tells it. Parameters that are expressions
+        of others are no entries: `expressions` takes them up."""
         entries = []
         table = self.table(kind)
         self.fault_reserved_names(kind, table)
@@ -156,7 +158,9 @@ class ParameterReader(EntryReader):
             if name in (*WORDS, *CONSTANTS, *MOTION):
                 self.refused.add(name)
             whole = entry if isinstance(entry, Mapping) else {"value": entry}
-            self.keys(f"{kind}.{name}", whole, ("value", "unit", "min", "max", "description", "tunable"))
+            self.keys(
+                f"{kind}.{name}", whole.keys(), ("value", "unit", "min", "max", "description", "tunable")
+            )
             with self.at(f"{kind}.{name}"):
                 value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
                 limits = {end: self.limit(end, whole, unit or "1") for end in ("min", "max") if end in whole}

@@ -37,6 +37,7 @@ class LinkageParts:
         self.frames: dict[str, LinkFrame] = {GROUND: OWN}
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
         self._carriers = {self.pin(GROUND, name): GROUND for name in self.structure.ground}
+        """by pin, the first link that has it: all others hang on this one there"""
         groups = list(self.structure.groups)
         cylinder = groups.pop(0) if groups and groups[0].kind == CYLINDER else None
         self.driver = self._driver() if cylinder is None else self._cylinder(cylinder)
@@ -61,7 +62,10 @@ class LinkageParts:
     # bars
 
     def bar(self, link: str, frame: LinkFrame, start: str = "", length: Any = None) -> Bar:
-        """The bar of a link in a frame; it starts from the pin `start`."""
+        """The bar of a link in a frame, with a `length` [m] if it has two joints; it starts from the pin `start`. It
+        carries the points that no link before it carries. A point that an earlier link carries is named anew, as
+        ``link.point``, if a load or a joint asks for the one of this very link (`Structure.marked`), and else left
+        out."""
         entry = self.structure.links[link]
         self.frames[link] = frame
         points = {}
@@ -110,6 +114,7 @@ class LinkageParts:
     # the driver and the groups
 
     def _driver(self) -> Driver:
+        """The driver: a crank about its pin, or a ram on its line in the ground."""
         entry, geometry = self.structure.driver, self.geometry
         joint, link = self.structure.joints[entry.joint], entry.link
         if not entry.linear:
@@ -125,6 +130,7 @@ class LinkageParts:
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)))
 
     def _cylinder(self, group: AssurGroup) -> Driver:
+        """The driver that is a cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
         barrel, rod, lever = group.links
         geometry, slide = self.geometry, self.structure.joints[self.structure.driver.joint]
         p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
@@ -147,6 +153,7 @@ class LinkageParts:
     # are guides on links before, s is the slot between two links
 
     def _group(self, group: AssurGroup) -> Group:
+        """The group of that kind with the numbers of its links."""
         joints = [self.structure.joints[j.name] for j in group.joints]
         if group.kind == "triad":
             return self._triad(group.links[0], group.links[1:], joints[:3], joints[3:])
@@ -186,6 +193,7 @@ class LinkageParts:
         return RRP(inner, rod, *self._slider(slider, g, c.at(slider)), self.sides[first])
 
     def _rpr(self, first: str, second: str, p: JointEntry, g: JointEntry, q: JointEntry) -> Group:
+        """The first link on its pin with a block, which slides on a line of the second link on its own pin."""
         geometry = self.geometry
         one = self.hung(first, p, geometry.direction(g, first))
         other = self.hung(second, q, geometry.direction(g, second))
@@ -201,6 +209,7 @@ class LinkageParts:
         return PRP(inner, one, other, one_rail, other_rail, (one_guide, other_guide))
 
     def _rpp(self, block: str, yoke: str, p: JointEntry, s: JointEntry, g: JointEntry) -> Group:
+        """A block on its pin, in the slot of a yoke that slides on a line in a link before."""
         geometry = self.geometry
         along = geometry.direction(g, yoke)
         origin = geometry.line_through(s, block, geometry.point(block, p.at(block)))
@@ -213,6 +222,7 @@ class LinkageParts:
     def _triad(
         self, ternary: str, legs: Sequence[str], outer: Sequence[JointEntry], inner: Sequence[JointEntry]
     ) -> Group:
+        """The ternary link on its three legs; it carries the pins between."""
         # the ternary link carries the pins
         self._carriers |= {self.pin(ternary, j.at(ternary)): ternary for j in inner if j.kind == REVOLUTE}
         # before the legs: one that slides in it may do so at a point of it
@@ -230,6 +240,8 @@ class LinkageParts:
         )
 
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
+        """A leg of a triad by its joints: a rod between two pins, a block on a line before it, or a slot in the
+        ternary link."""
         pin = self.pin(ternary, inner.at(ternary))
         if inner.kind == REVOLUTE:
             arm = self.geometry.point(ternary, inner.at(ternary))

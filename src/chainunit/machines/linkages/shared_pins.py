@@ -32,7 +32,7 @@ def shared_pins(
         [in_decomposition(JointEntry.from_table(j)) for j in named if j["name"] != driver.get("joint")],
         str(driver.get("link")),
     )
-    # of three or more links that one stands first on which the others hang
+    # of three or more links, the one on which the others hang stands first
     owners |= {point: links for point, links in ordered.items() if len(links) > 2}
     taken = {joint["name"] for joint in named}
     joints: list[dict[str, Any]] = []

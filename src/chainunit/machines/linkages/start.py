@@ -62,7 +62,8 @@ class StartPose:
         }
 
     def _spread(self) -> bool:
-        """Whether a round found anything new."""
+        """One round of conclusions: from points and angles to the pose of a link, from a pose to all points of its
+        link, and over the joints to other links. Returns whether it found anything new."""
         before = len(self.poses), len(self.places), len(self.angles)
         for link, points in self.points.items():
             if link not in self.poses:

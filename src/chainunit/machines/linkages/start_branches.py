@@ -38,11 +38,11 @@ def check_start(described: LinkageDescription) -> None:
 
 
 def _other_way(described: LinkageDescription, group: AssurGroup) -> Mechanism:
-    """The start of the linkage up to a dyad that is assembled in the other way."""
+    """The linkage at its start, up to a dyad, or a cylinder, that is assembled in the other way."""
     structure, linkage = described.structure, described.at_start
-    # a cylinder is the driver, and no group of the linkage
-    count = structure.groups.index(group) + 1 - (len(structure.groups) - len(linkage.groups))
-    part = linkage.before(count)
+    # a cylinder is the first group of the structure, and the driver of the linkage
+    drivers = len(structure.groups) - len(linkage.groups)
+    part = linkage.before(structure.groups.index(group) + 1 - drivers)
     if group.kind == CYLINDER:
         part = replace(part, driver=_turned(part.driver))
     else:

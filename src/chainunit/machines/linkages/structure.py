@@ -121,6 +121,7 @@ class Structure:
         joints = {joint["name"]: JointEntry.from_table(joint) for joint in data["joints"]}
         driver, ground, start = DriverEntry(**data["driver"]), data["ground"], data["start"]
         groups = groups_of([*links], [*joints.values()], driver)
+        # points by link that stay apart from others in the same pin: of loads, and of joints between groups
         loaded = (load[key] for load in data["loads"] for key in ("on", "by") if key in load)
         marked = {tuple(end) for end in loaded if len(end) == 2}
         for group in groups:

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from ... import __version__
 from ...core.errors import InputError
-from ...machines.linkages.file import read_linkage
 from ...machines.machine import Machine
-from ...models import is_study_file
+from ...models import linkage_named
 from ...study.choice import choose
 from ...study.config import Config
 from ...study.config import load as load_study
@@ -44,14 +43,15 @@ def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
     InputError
         for a file that is refused, an equation that cannot run in a page, and a speed for a study.
     """
-    if file is None or is_study_file(str(file)) or file.suffix.lower() != ".toml":
+    linkage = None if file is None else linkage_named(str(file))
+    if file is None or linkage is None:
         config = load_study(file)
         if speed is not None:
             raise InputError(
                 "--speed is for a linkage; leave it out: the speed of a study is run.crank_speed in its file"
             )
         return live_page_of_config(config, str(file or "packaged example"), folder)
-    machine = Machine(read_linkage(file))
+    machine = Machine(linkage)
     live = of_linkage(machine, speed_of_driver(machine, speed), file.name)
     return _report(machine.model.description, "Live linkage", "the file", live, str(file))
 

@@ -77,15 +77,19 @@ class LinkageDrawing(ForeignLinkage):
         return [name for name in names.values() if name]
 
     def fasten(self, title: str, node: Element) -> None:
-        """What is fastened to a link."""
-        link = self.names["Link"].get(node.get("fastenlink") or node.get("fasten") or "")
-        name = self.names[node.tag if node.tag == "connector" else "Link"].get(_id(node))
-        if link and name and node.tag == "connector":
+        """A connector or a link that is fastened to another link (its attribute names it by its id): a connector
+        becomes a pin of that link, and a link one body with it."""
+        link_id = node.get("fastenlink") or node.get("fasten") or ""
+        link = self.names["Link"].get(link_id)
+        is_connector = node.tag == "connector"
+        name = self.names["connector" if is_connector else "Link"].get(_id(node))
+        if not link or not name:
+            if link_id or node.get("fastenconnector"):
+                self.fault(title, "is fastened, but not to a link of the file; fasten it to one")
+        elif is_connector:
             self.links[link].pins.append(name)
-        elif link and name:
+        else:
             self.fastened.append((name, link))
-        elif node.get("fastenlink") or node.get("fasten") or node.get("fastenconnector"):
-            self.fault(title, "is fastened, but not to a link of the file; fasten it to one")
 
     def slide(self, title: str, node: Element) -> None:
         """A connector that slides between two others of one link."""
@@ -108,6 +112,7 @@ class LinkageDrawing(ForeignLinkage):
 
 
 def _is_mechanism(node: Element) -> bool:
+    """Whether an element is a part of the mechanism, and no drawing or measurement."""
     layer = node.get("layer", "0")[:9]
     on_layer = not layer.isdecimal() or int(layer) == 0 or bool(int(layer) & _MECHANISM)
     return on_layer and node.get("measurementelement") != "true"

@@ -79,7 +79,8 @@ class _Tables:
                 yield a, b
 
     def tables(self) -> dict[str, Any]:
-        """The tables, of which some may be empty."""
+        """The tables of a linkage file by name, of which some may be empty. Links of the drawing that do not move
+        against each other are one link; a remark says so, as it says which links have no mass."""
         ground = {pin: self.vector(self.places[pin]) for pin in self.pins[GROUND]}
         for body in [*self.pins][1:]:
             members = [
