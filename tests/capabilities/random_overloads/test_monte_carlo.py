@@ -209,7 +209,7 @@ def test_a_run_is_what_its_number_says(killed):
         for number in (7, 3, 20):
             drawn, run = draw(task, number), results.isel(run=number)
             (branch,) = branches(task, simulation, drawn)
-            got = monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, drawn, branch))
+            got = Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, drawn, branch))
             assert ("none", "left", "right")[int(run["side"])] == drawn.event.side
             assert float(run["drawn_force"]) == drawn.values["force"]
             assert {name: float(run[name]) for name in got} == got
@@ -221,7 +221,7 @@ def test_the_store_says_what_its_numbers_are(killed):
     assert results["side"].attrs["flag_meanings"] == "none left right"
     assert list(results["side"].attrs["flag_values"]) == [0, 1, 2]
     assert results["drawn_force"].attrs["units"] == "N" and results["trip_torque"].attrs["units"] == "N.m"
-    for v in monte_carlo.Layout(monte_carlo.Sample).variables:
+    for v in Layout(monte_carlo.Sample).variables:
         assert results[v.name].attrs == {"units": v.unit, "long_name": v.description}
 
 
@@ -352,7 +352,7 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     assert result.reasons == {2: "machine: it broke"} and result.failures == 1 and result.method == "cs"
     assert as_data(result)["failed"]["value"] == 1 and len(result.values("event")) == 4
     got, wanted = result.dataset, opened(killed[0]).dataset
-    for name in monte_carlo.Layout(monte_carlo.Sample).names:
+    for name in Layout(monte_carlo.Sample).names:
         assert np.isnan(got[name][2]), name
         np.testing.assert_array_equal(got[name][[0, 1, 3, 4]], wanted[name][[0, 1, 3, 4]])
     np.testing.assert_array_equal(got["drawn_force"], wanted["drawn_force"][:5])
@@ -516,8 +516,7 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
     for got, other, each in zip(task.block().runs(points), wanted, drawn, strict=True):
         assert got.fault is None and got.ended == other.ended and got.series.sizes == other.series.sizes
         a, b = (
-            monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, each, run))
-            for run in (got, other)
+            Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, each, run)) for run in (got, other)
         )
         for name, x in a.items():
             assert x == b[name] or abs(x - b[name]) < 1e-3 * max(abs(b[name]), 0.1), (name, x, b[name])

@@ -29,25 +29,16 @@ class FalseLoads:
     by_parameter: Mapping[str, Any]
 
     @property
-    def feed(self) -> tuple[float, float]:
-        """Standard deviations of the feed of the left and of the right side [kg]."""
-        return self._deviation(0), self._deviation(1)
-
-    @property
     def imbalance(self) -> float:
         """Standard deviation of the false imbalance of the feed [kg]: `imbalance.uncertainty` of the observer."""
-        return self._deviation(0, 1)
+        return self._deviation([1.0, -1.0, 0.0, 0.0, 0.0])
 
     @property
     def force_imbalance(self) -> float:
         """Standard deviation of the false imbalance of the forces [N]: `imbalance.force_uncertainty`."""
-        return self._deviation(2, 3)
+        return self._deviation([0.0, 0.0, 1.0, -1.0, 0.0])
 
-    def _deviation(self, plus: int, minus: int | None = None) -> float:
-        direction = np.zeros(len(LOADS))
-        direction[plus] = 1.0
-        if minus is not None:
-            direction[minus] = -1.0
+    def _deviation(self, direction: list[float]) -> float:
         return math.sqrt(max(float(direction @ self.covariance @ direction), 0.0))
 
 
@@ -105,16 +96,10 @@ def false_loads(
     missing = b.inertia * (b.acceleration - a * p.ratio)
     rows = casadi.horzcat(*(b.inertia * g for g in b.gradient[1:]), casadi.jacobian(missing, symbols))
     function = casadi.Function("rows", [symbols, phi, a], [rows])
-    values = layout.by_name(p)
-    angles = np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
-    accelerations = np.broadcast_to(np.asarray(acceleration, float), (ANGLES,))
-    numbers = [values[name] for name in names]
-    table = np.array(
-        [
-            np.asarray(function(numbers, q * p.ratio, x)).ravel()
-            for q, x in zip(angles, accelerations, strict=True)
-        ]
-    )
+    values, turn = layout.by_name(p), np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
+    accelerations = np.broadcast_to(np.asarray(acceleration, float), (1, ANGLES))
+    numbers = np.outer([values[name] for name in names], np.ones(ANGLES))
+    table = np.array(function.map(ANGLES)(numbers, turn[None] * p.ratio, accelerations)).reshape(ANGLES, -1)
     loads, errors = table[:, : len(LOADS)], table[:, len(LOADS) :]
     # the observer's machine has the error, the loads make up for it
     answer = -np.linalg.lstsq(loads, errors, rcond=None)[0]

@@ -18,7 +18,7 @@ from ...study.drive import Drive
 from ...study.plans import Estimates
 from ...system import ModelComponent
 from .false_loads import false_loads
-from .observer_table import ObserverTable
+from .tables import ObserverTable
 
 FEED_SPREAD = 0.5
 """Standard deviation of the feed of a side from the usual one, as a share."""

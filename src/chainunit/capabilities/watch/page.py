@@ -17,7 +17,7 @@ from ...report.lines import Name, filled, join, line
 from ...report.task import Task
 from ...study.config import Config
 from .result import WatchSummary, summary_of
-from .watch import WatchedRecording, watch
+from .watch import watch
 
 PICTURES = ("loads.png", "imbalance.png")
 _USUAL = {
@@ -34,13 +34,12 @@ _USUAL = {
 """The rows of the table of usual values."""
 
 
-def watch_report(watched: WatchedRecording) -> b.Report:
+def watch_report(summary: WatchSummary) -> b.Report:
     """The report on a watched recording."""
-    summary = summary_of(watched)
-    x = cited(summary)
-    with shown_in(watched.config.units):
+    x, config = cited(summary), summary.watched.config
+    with shown_in(config.units):
         return b.Report(
-            watched.config.title or "Watched recording",
+            config.title or "Watched recording",
             "Watch for one-sided overload",
             as_data(summary),
             tuple(_opening(x)),
@@ -50,20 +49,20 @@ def watch_report(watched: WatchedRecording) -> b.Report:
                 b.Section("basis", "Basis of the numbers", tuple(_basis(x))),
             ),
             source=source_line(x.heading),
-            units=watched.config.units,
+            units=config.units,
             opening_title="The answer",
             status="alarm" if summary.alarms else "no alarm",
         )
 
 
-TASK: Task[Config, WatchedRecording] = Task(
+TASK: Task[Config, WatchSummary] = Task(
     "watch",
-    lambda config, folder, progress: watch(config, progress),
+    lambda config, folder, progress: summary_of(watch(config, progress)),
     watch_report,
     files=PICTURES,
     content=WatchSummary,
-    shortfall=lambda watched: None if watched.is_described else "",
-    alarmed=lambda watched: bool(watched.alarms),
+    shortfall=lambda summary: None if summary.is_described else "",
+    alarmed=lambda summary: bool(summary.alarms),
 )
 
 
@@ -109,7 +108,7 @@ def _opening(x: WatchSummary) -> Iterator[b.Block]:
                 "feed is not that of its begin."
             )
         overload = "Overload of the {} side from {} on, by the {}."
-        yield b.Judgement("alarm", filled(overload, alarm.side, number(alarm.begin, 4), alarm.ground))
+        yield b.Judgement("alarm", filled(overload, alarm.side, number(alarm.begin, 4), alarm.imbalance))
     limits = x.thresholds
     yield b.Text(
         filled(
@@ -218,22 +217,22 @@ def _alarms(x: WatchSummary) -> Iterator[b.Block]:
         ("side", lambda alarm: alarm.side),
         ("from", lambda alarm: number(alarm.begin, 5)),
         ("to", lambda alarm: "the end" if alarm.lasts else number(alarm.end, 5)),
-        ("ground", lambda alarm: alarm.ground),
+        ("ground", lambda alarm: alarm.imbalance),
         (b.Column("largest at", form="long"), lambda alarm: number(alarm.at, 5)),
         (
             b.Column("imbalance of the feed", "imbalance"),
-            lambda alarm: number(alarm.values["imbalance.feed"], 3),
+            lambda alarm: number(alarm.outputs["imbalance.feed"], 3),
         ),
-        ("threshold", lambda alarm: number(alarm.values["imbalance.feed_threshold"], 3)),
+        ("threshold", lambda alarm: number(alarm.outputs["imbalance.feed_threshold"], 3)),
         (
             b.Column("imbalance of the forces", "forces", form="long"),
-            lambda alarm: number(alarm.values["imbalance.force"], 3),
+            lambda alarm: number(alarm.outputs["imbalance.force"], 3),
         ),
         (
             b.Column("threshold", form="long"),
-            lambda alarm: number(alarm.values["imbalance.force_threshold"], 3),
+            lambda alarm: number(alarm.outputs["imbalance.force_threshold"], 3),
         ),
-        (b.Column("rocker torque", form="long"), lambda alarm: number(alarm.values["rocker.tau"], 3)),
+        (b.Column("rocker torque", form="long"), lambda alarm: number(alarm.outputs["rocker.tau"], 3)),
         title="Alarms, with the values at the largest imbalance in parts of its threshold",
     )
 
