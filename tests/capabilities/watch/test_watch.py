@@ -15,8 +15,8 @@ from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit import InputError, Study
 from chainunit.capabilities.watch import page as watch_page
-from chainunit.capabilities.watch import watch as watching
 from chainunit.capabilities.watch.crank_motion import crank_motion
+from chainunit.capabilities.watch.watch import Begin
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.reading.result_entries import ResultEntries
@@ -245,7 +245,8 @@ def test_the_noise_of_columns_that_the_observer_does_not_use():
     )
     measured = {"motor.i": 3.0, "motor.u": 8.0, "motor.w": 0.9}
     checks = [SimpleNamespace(column=name, noise=x) for name, x in measured.items()]
-    assert watching.noises(checks, recording) == (3.0, 1.0)
+    problem = SimpleNamespace(runs=[SimpleNamespace(recording=recording)])
+    assert Begin(problem, None, checks).noises == (3.0, 1.0)
 
 
 @pytest.mark.second

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from ... import __version__
 from ...batch.evaluate import ReasonKind, StateReason, check_engine, reasons_of
 from ...core.brief import briefly_shown
 from ...core.errors import InputError
-from ...core.quantities import Layout, Quantity, Variable
+from ...core.quantities import Layout, Quantity, Variable, variables
 from ...machines.machine import Machine
 from ...reading.results import InUnit
 from ...study.block_runs import BlockRuns, Cause
@@ -35,7 +35,7 @@ from ...work.progress import TaskProgress
 from ...work.runner import check_scheduler
 from ...work.runner import run as run_job
 from .plan import SweepPlan
-from .runs import block_of, check_drive, measures
+from .runs import check_drive, measures, of_system
 from .table import SPEED
 
 if TYPE_CHECKING:
@@ -76,10 +76,21 @@ class SweepTask:
         return [cycle_quantity(name, self.machine.model) for name in self.plan.quantities]
 
     @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """Parameters, quantities and measures by name."""
+        declared = {parameter.name: parameter.variable for parameter in self.plan.parameters}
+        for q in self.quantities:
+            of_turn = Quantity(q.unit, q.description, kind=q.kind)
+            declared[q.name] = Variable(q.name, q.description, of_turn)
+        answers = {v.name: v for v in variables(Answers)}
+        return declared | {name: answers[name] for name in self.plan.measures}
+
+    @cached_property
     def block(self) -> BlockRuns:
-        """The runs of the measures."""
+        """The compiled system, in which the values of the sweep vary."""
         assert self.rig is not None and self.event is not None
-        return block_of(self.rig, self.plan, self.event)
+        varying = [full for parameter in self.plan.parameters for full in of_system(parameter.name)]
+        return BlockRuns(self.rig, [self.event], varying)
 
     @cached_property
     def reasons(self) -> list[StateReason]:
@@ -180,15 +191,9 @@ def batch_of(plan: SweepPlan) -> int:
 
 def result_variables(task: SweepTask) -> list[ResultVariable]:
     """The results of a point: its parameters, its quantities and measures, and the reason why it has none."""
-    plan, answers = task.plan, {v.name: v for v in Layout(Answers).variables}
     flags = [re.sub(r"[^\w.+@-]+", "_", str(reason)).strip("_") for reason in task.reasons]
     return [
-        *(
-            ResultVariable(plain_name(p.name), p.variable.unit, p.variable.description)
-            for p in plan.parameters
-        ),
-        *(ResultVariable(plain_name(q.name), q.unit, q.description) for q in task.quantities),
-        *(ResultVariable(name, answers[name].unit, answers[name].description) for name in plan.measures),
+        *(ResultVariable(plain_name(name), v.unit, v.description) for name, v in task.variables.items()),
         ResultVariable("reason", "1", "reason for which there is no result", "int16", flags=tuple(flags)),
     ]
 
@@ -211,12 +216,14 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
         results |= {name: np.full(end - begin, np.nan) for name in plan.measures}
         sound = np.flatnonzero(reason == 0)
         if len(sound):
-            sound_values = {name: x[sound] for name, x in values.items()}
             assert task.event is not None
-            measured, causes = measures(task.block, plan, task.event, sound_values)
-            for name, x in measured.items():
-                results[name][sound] = x
-            reason[sound] = [task.codes[cause, ""] if cause else 0 for cause in causes]
+            runs = measures(task.block, plan, task.event, {name: x[sound] for name, x in values.items()})
+            for k, measured in zip(sound, runs, strict=True):
+                if isinstance(measured, Cause):
+                    reason[k] = task.codes[measured, ""]
+                else:
+                    for name, value in measured.items():
+                        results[name][k] = value
     return results | {"reason": reason.astype(np.int16)}
 
 
@@ -257,19 +264,8 @@ def job_of(task: SweepTask) -> Job:
     )
 
 
-BEST = 10
-"""Number of best points."""
 _PART = 2**18
-
-
-class PassedPoints(NamedTuple):
-    """The points of a sweep as they went by: `counts` by the code of their reason; by result that has values, the
-    numbers of the points with its least and its largest value (`extremes`); the numbers of the `best` points, the
-    best first."""
-
-    counts: tuple[int, ...]
-    extremes: Mapping[str, tuple[int, int]]
-    best: tuple[int, ...]
+"""Number of points that are read at a time."""
 
 
 @briefly_shown
@@ -291,15 +287,10 @@ class SweepFindings:
         """The names of all quantities and measures."""
         return (*self.plan.quantities, *self.plan.measures)
 
-    @cached_property
+    @property
     def variables(self) -> dict[str, Variable]:
         """Parameters and results by name."""
-        declared = {parameter.name: parameter.variable for parameter in self.plan.parameters}
-        for quantity in self.task.quantities:
-            of_turn = Quantity(quantity.unit, quantity.description, kind=quantity.kind)
-            declared[quantity.name] = Variable(quantity.name, quantity.description, of_turn)
-        measures = {v.name: v for v in Layout(Answers).variables}
-        return declared | {name: measures[name] for name in self.plan.measures}
+        return self.task.variables
 
     def in_unit(self, name: str, value: float | None) -> InUnit:
         """A value of a parameter or result, with its unit."""
@@ -309,41 +300,15 @@ class SweepFindings:
     def points(self) -> xr.Dataset:
         """All points over the dimension ``point``, by the names of the study: parameters, results and ``reason``. The
         values are read when they are used."""
-        plan = self.plan
-        names = {plain_name(name): name for name in (*(p.name for p in plan.parameters), *self.results)}
-        dataset = self.outcome.dataset.rename(names)
+        dataset = self.outcome.dataset.rename({plain_name(name): name for name in self.variables})
         dataset["reason"].attrs["reasons"] = [str(reason) for reason in self.task.reasons]
-        return dataset.set_coords([parameter.name for parameter in plan.parameters])
+        return dataset.set_coords([parameter.name for parameter in self.plan.parameters])
 
     def parts(self, names: Sequence[str]) -> Iterator[tuple[int, xr.Dataset]]:
         """The variables `names` of all points in parts, each with the number of its first point."""
         points = self.points[[*names]]
         for begin in range(0, points.sizes["point"], _PART):
             yield begin, points.isel(point=slice(begin, begin + _PART)).load()
-
-    @cached_property
-    def passed(self) -> PassedPoints:
-        """Reasons, extremes and best points of all points."""
-        plan, sign = self.plan, -1.0 if self.plan.best_is == "largest" else 1.0
-        counts = np.zeros(len(self.task.reasons), np.int64)
-        ends: dict[str, list[tuple[float, int]]] = {name: [] for name in self.results}
-        best: list[tuple[float, int]] = []
-        for begin, part in self.parts([*self.results, "reason"]):
-            counts += np.bincount(part["reason"].values, minlength=len(counts))
-            for name in self.results:
-                x = part[name].values
-                if np.isfinite(x).any():
-                    ends[name] += [(float(x[k]), begin + int(k)) for k in (np.nanargmin(x), np.nanargmax(x))]
-            x = sign * part[plan.best].values
-            order = np.argsort(x, kind="stable")[:BEST]
-            best += [(float(x[k]), begin + int(k)) for k in order if np.isfinite(x[k])]
-            best = sorted(best)[:BEST]
-        extremes = {
-            name: (min(places)[1], max(places, key=lambda pair: (pair[0], -pair[1]))[1])
-            for name, places in ends.items()
-            if places
-        }
-        return PassedPoints(tuple(map(int, counts)), extremes, tuple(k for _, k in best))
 
     @cached_property
     def dataset(self) -> xr.Dataset:
@@ -354,15 +319,11 @@ class SweepFindings:
         plan, points = self.plan, self.points
         if not plan.is_grid:
             return points
-        about = {parameter.name: points[parameter.name].attrs for parameter in plan.parameters}
-        axes = {
-            parameter.name: (parameter.name, list(parameter.values), about[parameter.name])
-            for parameter in plan.parameters
-        }
-        variables = {
+        axes = {p.name: (p.name, list(p.values), points[p.name].attrs) for p in plan.parameters}
+        results = {
             name: (plan.dims, x.values.reshape(plan.shape), x.attrs) for name, x in points.data_vars.items()
         }
-        return xr.Dataset(variables, axes, points.attrs)
+        return xr.Dataset(results, axes, points.attrs)
 
 
 def run_sweep(

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from ...batch.transients import can_run
 from ...core.errors import Faults, InputError
@@ -54,34 +52,25 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
     faults.refuse()
 
 
-def block_of(rig: Rig, plan: SweepPlan, event: Event) -> BlockRuns:
-    """The compiled system of a rig whose values a sweep varies; see `check_drive`."""
-    varying = [full for parameter in plan.parameters for full in _of_system(parameter.name)]
-    return BlockRuns(rig, [event], varying)
-
-
 def measures(
     block: BlockRuns, plan: SweepPlan, event: Event, values: Mapping[str, Any]
-) -> tuple[dict[str, Any], list[Cause | None]]:
-    """The measures of the plan by name, and the causes for which there are none, of points with these values by full
-    name, each of shape (points,)."""
+) -> Iterator[Cause | dict[str, float]]:
+    """By point, the measures of the plan by name, or the cause for which there are none. The points have these values
+    by full name, each of shape (points,)."""
     count = len(next(iter(values.values())))
     points = [
         _point(block.rig, event, {name: float(x[k]) for name, x in values.items()}) for k in range(count)
     ]
-    results = {name: np.full(count, np.nan) for name in plan.measures}
-    causes: list[Cause | None] = []
-    for k, (point, run) in enumerate(zip(points, block.runs(points), strict=True)):
-        causes.append(run.fault.cause if run.fault else None)
-        if run.fault is None:
+    for point, run in zip(points, block.runs(points), strict=True):
+        if run.fault is not None:
+            yield run.fault.cause
+        else:
             window = _window(point, run)
-            for name in plan.measures:
-                value = read_measure(name, window)
-                results[name][k] = np.nan if value is None else value
-    return results, causes
+            measured = {name: read_measure(name, window) for name in plan.measures}
+            yield {name: math.nan if value is None else value for name, value in measured.items()}
 
 
-def _of_system(name: str) -> list[str]:
+def of_system(name: str) -> list[str]:
     """The parameters of the compiled system that a swept quantity sets, by full name."""
     part, _, short = name.partition(".")
     # the machine of the feed-forward has the same parameters
@@ -103,8 +92,8 @@ def _point(rig: Rig, event: Event, values: Mapping[str, float]) -> RunPoint:
         run = replace(operation.run, crank_speed=values.get(SPEED, operation.crank_speed))
         rig = replace(rig, operation=replace(operation, feed=loads, run=run))
     limit = rig.guards.get(rig.drive.motor_torque, math.inf)
-    of_system = {full: x for name, x in values.items() for full in _of_system(name)}
-    return RunPoint(rig, event, event.time_followed(rig.operation.turn), limit=limit, values=of_system)
+    system_values = {full: x for name, x in values.items() for full in of_system(name)}
+    return RunPoint(rig, event, event.time_followed(rig.operation.turn), limit=limit, values=system_values)
 
 
 def _window(point: RunPoint, run: EventRun) -> Window:

@@ -54,8 +54,12 @@ def shares_on_grid(y: Any) -> list[Shares]:
     for i in axes:
         alone = float(np.var(np.mean(y, axis=tuple(k for k in axes if k != i)))) / whole
         in_all = float(np.mean(np.var(y, axis=i))) / whole
-        exact.append(Shares(Estimate(alone, alone, alone), Estimate(in_all, in_all, in_all)))
+        exact.append(Shares(_share(alone, alone, alone), _share(in_all, in_all, in_all)))
     return exact
+
+
+def _share(value: float, low: float, high: float) -> Estimate:
+    return Estimate(value, low, high, "1", "percent")
 
 
 def shares_of_points(parameters: Sequence[SweptParameter], x: Any, y: Any) -> list[Shares]:
@@ -85,7 +89,7 @@ def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
     c, e = fit.coefficients, fit.errors
     part, whole, rest = float(np.sum(c[some] ** 2)), float(np.sum(c[1:] ** 2)), float(np.mean(e**2))
     if not whole > 0.0:
-        return Estimate(0.0, 0.0, 1.0)
+        return _share(0.0, 0.0, 1.0)
     share = part / whole
     contribution = phi[:, some] @ c[some]
     others = phi[:, 1:] @ c[1:] - contribution
@@ -95,7 +99,7 @@ def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
     least, highest, beside = max(0.0, part - most * rest), part + most * rest, whole - part
     low = least / (least + beside + rest) - _SIGMAS * error - _ROUNDING
     high = highest / (highest + max(0.0, beside - rest)) + _SIGMAS * error + _ROUNDING
-    return Estimate(share, max(0.0, low), min(1.0, high))
+    return _share(share, max(0.0, low), min(1.0, high))
 
 
 def _most_between(x: Any, e: Any) -> float:

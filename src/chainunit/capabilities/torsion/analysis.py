@@ -49,7 +49,7 @@ from .findings import (
     StabilityMap,
     TorsionFindings,
 )
-from .table import JOINTS, TorsionPlan
+from .table import TorsionPlan
 
 SLOW = 1.0 / 6.0
 """Ratio of the shaft's speed to the natural frequency below which no order of the joints comes near a
@@ -214,7 +214,7 @@ def _stability_map(
     bend = np.linspace(table.bend_low, table.bend_high, int(table.bends))
     points = np.meshgrid(ratios, bend, speed, indexing="ij")
     ratio_of_point, bend_of_point, speed_of_point = (x.ravel() for x in points)
-    bent = JOINTS[:2] if plan.joint == "both" else (plan.joint,)
+    bent = ("alpha1", "alpha2") if plan.joint == "both" else (plan.joint,)
     bends: dict[str, Any] = dict.fromkeys(bent, bend_of_point)
     unit = with_damping_ratio(line, 1.0)
     p = dataclasses.replace(line, d2=unit.d2 * ratio_of_point, d3=unit.d3 * ratio_of_point, **bends)

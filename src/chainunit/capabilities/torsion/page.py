@@ -14,16 +14,12 @@ from ...report.cited import cited, number
 from ...report.lines import Line, line
 from ...study.record import StudyRecord
 from .findings import TorsionFindings
+from .table import JOINTS
 
 PICTURES = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
 _OVER_BOTH = "over the turns of shaft and machine"
 """The range of natural frequencies that an order may meet: i23 varies over a turn of the shaft, the inertia over a
 turn of the machine."""
-_JOINTS = {
-    "alpha1": "bend of the joint on shaft 2",
-    "alpha2": "bend of the joint on shaft 3",
-    "both": "both bends",
-}
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -145,7 +141,7 @@ def _stability(analysis: TorsionFindings) -> fig.Figure:
     grid, k = analysis.map, analysis.natural_frequency.even
     levels = -1.0, 0.0, 0.01, 0.03, 10.0
     names = "stable", "grows below 0.01 k", "0.01 to 0.03 k", "faster"
-    y = fig.Axis(_JOINTS[grid.joint], "rad", low=float(grid.bend[0]), high=float(grid.bend[-1]))
+    y = fig.Axis(JOINTS[grid.joint], "rad", low=float(grid.bend[0]), high=float(grid.bend[-1]))
     panels = []
     for ratio, growth, unstable in zip(grid.ratio, grid.growth, grid.unstable, strict=True):
         # a point that does not count as unstable is not drawn as unstable, however near it is

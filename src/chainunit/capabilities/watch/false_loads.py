@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...core.engines import casadi_
-from ...core.errors import InputError
 from ...drives.gearing import felt_share
 from ...machines.load_declarations import Inputs
 from ...machines.load_filter import UNKNOWNS
@@ -61,24 +60,16 @@ def false_loads(
     Parameters
     ----------
     p : parameters of `LoadObserver`
-    names : parameters that are uncertain, by full name
-    covariance : of these parameters, shape (names, names)
+    names : numbers that are uncertain, by full name; one that the observer does not know counts as right
+    covariance : of their errors, shape (names, names)
     crank_speed : mean speed of the crank [rad/s]
     acceleration : of the crank at `ANGLES` even angles of a turn from 0 [rad/s2], shape (ANGLES,), or one number
-
-    Raises
-    ------
-    InputError
-        for an unknown parameter, and a covariance of another shape.
     """
     import casadi
 
-    layout, sigma = LoadObserver.parameter_layout, np.atleast_2d(np.asarray(covariance, float))
-    for name in names:
-        if name not in layout.names:
-            raise InputError(f"{name}: is no parameter of {LoadObserver.name}")
-    if sigma.shape != (len(names), len(names)):
-        raise InputError(f"covariance: has the shape {sigma.shape}, must be {(len(names), len(names))}")
+    layout = LoadObserver.parameter_layout
+    places = [k for k, name in enumerate(names) if name in layout.names]
+    names, sigma = [names[k] for k in places], np.asarray(covariance, float)[np.ix_(places, places)]
     symbols, phi, a = casadi.SX.sym("p", len(names)), casadi.SX.sym("phi"), casadi.SX.sym("a")
     parameters = layout.from_names(dict(zip(names, casadi.vertsplit(symbols), strict=True)), p)
     u = Inputs(phi=phi, w=crank_speed * p.ratio)

@@ -38,18 +38,13 @@ class WatchedFile:
 
 @result
 class Thresholds:
-    """The range of the thresholds over the crank angle, after the time of learning."""
+    """The range of the thresholds over the crank angle, after the time of learning, and how far they are wider by the
+    false imbalance that errors of the machine's parameters make."""
 
     feed_threshold_least: float = quantity("kg", "imbalance of the feed, least threshold")
     feed_threshold_most: float = quantity("kg", "imbalance of the feed, largest threshold")
     force_threshold_least: float = quantity("N", "imbalance of the forces, least threshold")
     force_threshold_most: float = quantity("N", "imbalance of the forces, largest threshold")
-
-
-@result
-class FalseImbalance:
-    """The false imbalance by errors of the machine's parameters."""
-
     uncertainty: float = quantity("kg", "false imbalance of the feed by errors of the machine's parameters")
     force_uncertainty: float = quantity(
         "N", "false imbalance of the forces by errors of the machine's parameters"
@@ -89,7 +84,6 @@ class WatchSummary:
     of_feed_alone: bool = part("whether nothing but another feed speaks against the machine of the study")
     alarms: tuple[Alarm, ...] = part("the alarms in order")
     thresholds: Thresholds = part(inline=True)
-    false_imbalance: FalseImbalance = part(inline=True)
     noise: Mapping[str, float] = part("noise of signal and speed over the stated noise", unit="1")
     constant_parts: list[str] = part("parts in which a column keeps a value, in words")
     gaps: list[Gap] = part("parts without rows, behind which the observer starts anew")
@@ -143,8 +137,7 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
         doubts=list(_doubts(begin)),
         of_feed_alone=not begin.is_described and describes(begin.problem, begin.fit, begin.tests, loads),
         alarms=watched.alarms,
-        thresholds=Thresholds(*thresholds),
-        false_imbalance=FalseImbalance(*watched.uncertainty, *watched.widening),
+        thresholds=Thresholds(*thresholds, *watched.uncertainty, *watched.widening),
         noise=dict(zip(("signal", "speed"), begin.noises, strict=True)),
         constant_parts=list(constant_parts(recording, [name for name in columns if name])),
         gaps=[Gap(*ends) for ends in recording.gaps if ends[1] - ends[0] > GAP * plan.turn],

@@ -155,8 +155,11 @@ class Begin:
 
     @property
     def noises(self) -> tuple[float, float]:
-        """The noise of the signal and of the measured speed, over the stated noise [1], see `noises`."""
-        return noises(self.tests, self.recording)
+        """The noise of the signal of the observer and that of the speed, in parts of the stated one, where they are
+        larger."""
+        by_column = {test.column: test.noise for test in self.tests}
+        signal = max([1.0, *(by_column.get(name, 1.0) for name in columns_watched(self.recording).values())])
+        return signal, max(1.0, by_column.get(speed_column(self.recording), 1.0))
 
     @property
     def mark_angle(self) -> float:
@@ -351,29 +354,19 @@ def _parameters(
     return values | {"ratio": ratio} | tuning(table, feed, plan.crank_speed * ratio, torque)
 
 
-def noises(tests: Sequence[ResidualTest], recording: Recording) -> tuple[float, float]:
-    """The noise of the signal of the observer and that of the speed at the begin of the recording, in parts of the
-    stated one, where they are larger."""
-    by_column = {test.column: test.noise for test in tests}
-    signal = max([1.0, *(by_column.get(name, 1.0) for name in columns_watched(recording).values())])
-    return signal, max(1.0, by_column.get(speed_column(recording), 1.0))
-
-
 def _read_errors(file: Path) -> MachineErrors:
     """The errors of the machine by the result of an identification."""
+    key = "watch.identification"
     try:
         content = json_of(file_bytes(file, JSON), str(file), "result.json of chainunit identify")
         table, failed = content["covariance"], not content["is_described"]
-        names, matrix = list(table["names"]), np.array(table["matrix"], float)
+        rows = [k for k, name in enumerate(table["names"]) if name.startswith("machine.")]
+        names = [table["names"][k].removeprefix("machine.") for k in rows]
+        return MachineErrors(names, np.array(table["matrix"], float)[np.ix_(rows, rows)], failed)
     except InputError as error:
-        raise InputError(f"watch.identification = {error}", "watch.identification") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            f"watch.identification = {file}: is no result.json of chainunit identify", "watch.identification"
-        ) from error
-    rows = [k for k, name in enumerate(names) if name.startswith("machine.")]
-    names = [names[k].removeprefix("machine.") for k in rows]
-    return MachineErrors(names, matrix[np.ix_(rows, rows)], failed)
+        raise InputError(f"{key} = {error}", key) from error
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise InputError(f"{key} = {file}: is no result.json of chainunit identify", key) from error
 
 
 def observe(
