@@ -183,11 +183,13 @@ def test_a_killed_study_goes_on_from_what_it_saved(killed):
 
 
 @pytest.mark.slow
-def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path):
+def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path, monkeypatch):
     """In this process, from the first to the last run: the bytes of every file are the same."""
     folder, _, _ = killed
+    closed, close = [], EventSimulation.close
+    monkeypatch.setattr(EventSimulation, "close", lambda self: closed.append(close(self)))
     result = monte_carlo.run(task_of(folder), tmp_path, lambda *said: None, workers=1)
-    assert result.file.read_bytes() == opened(folder).file.read_bytes() and not monte_carlo._systems
+    assert result.file.read_bytes() == opened(folder).file.read_bytes() and len(closed) == 1
 
 
 def branches(task, simulation, *drawn):
@@ -378,10 +380,7 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
     parcel = monte_carlo.Parcel.of(task_of(killed[0]))
     nowhere = dict.fromkeys(parcel.content, tmp_path / "nowhere.fmu")
     away = dataclasses.replace(parcel, task=with_rig(parcel.task, files=nowhere))
-    try:
-        runs = monte_carlo.make_runs(pickle.loads(pickle.dumps(away)), 17, 19)
-    finally:
-        monte_carlo.close_system()
+    runs = monte_carlo.make_runs(pickle.loads(pickle.dumps(away)), 17, 19)
     wanted = opened(killed[0]).dataset.isel(run=slice(17, 19))
     assert runs["failed"] == ["", ""] and len(runs) == len(wanted)
     for name in set(runs) - {"failed"}:
@@ -580,13 +579,10 @@ def test_runs_on_the_compiled_system_do_not_depend_on_their_batch(tmp_path):
     """In one process without Dask; made again by a worker from its parcel, in other batches."""
     task = compiled_task(STUDY, runs=30)
     result = monte_carlo.run(task, tmp_path, lambda *said: None)
-    assert result.runs == 30 and not result.failures and not monte_carlo._systems
+    assert result.runs == 30 and not result.failures
     assert result.method == "compiled"
     parcel = pickle.loads(pickle.dumps(monte_carlo.Parcel.of(task)))
-    try:
-        pieces = [monte_carlo.make_runs(parcel, a, b) for a, b in ((0, 7), (7, 30))]
-    finally:
-        monte_carlo.close_system()
+    pieces = [monte_carlo.make_runs(parcel, a, b) for a, b in ((0, 7), (7, 30))]
     for name in pieces[0]:
         both = [x for piece in pieces for x in piece[name]]
         stored = result.dataset[name].values

@@ -279,6 +279,15 @@ def test_refusals(tmp_path):
         (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], **more), "utf-8")
         with pytest.raises(InputError, match=words):
             Study.from_file(tmp_path / "mine.toml").watch()
+    # a matrix of another size than its names
+    covariance = {"names": ["machine.crank.m", "machine.rocker.m"], "matrix": [[1.0]]}
+    (tmp_path / "small.json").write_text(
+        json.dumps({"is_described": True, "covariance": covariance}), "utf-8"
+    )
+    text = study_text(TRUTH["machine"], identification="small.json")
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
+    with pytest.raises(InputError, match=r"small\.json: is no result\.json of chainunit identify"):
+        Study.from_file(tmp_path / "mine.toml").watch()
     (tmp_path / "mine.toml").write_text(
         "[watch]\nbegin = 3\nend = 2\ncolumns = { 'motor.v' = 'U' }\n", "utf-8"
     )

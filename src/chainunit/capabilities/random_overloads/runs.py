@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
@@ -171,8 +172,10 @@ class Parcel:
             return cls(replace(task, rig=replace(task.rig, files={})), task.digest(block), {}, block.states)
         return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
-    def start(self) -> BlockRuns | EventSimulation:
-        """The system of the task in its steady state."""
+    @cached_property
+    def system(self) -> BlockRuns | EventSimulation:
+        """The system of the task in its steady state, which is closed when the parcel goes; a worker keeps the parcel
+        of its last job."""
         if self.states is not None:
             return self.task.block(self.states)
         with scratch() as folder:
@@ -180,24 +183,9 @@ class Parcel:
             for name, file in files.items():
                 file.write_bytes(self.content[name])
             # it unpacks the FMUs
-            return EventSimulation(replace(self.task.rig, files=files), self.task.steady)
-
-
-_systems: dict[str, BlockRuns | EventSimulation] = {}
-"""The system of this process, by the digest of its task."""
-
-
-def _system_of(parcel: Parcel) -> BlockRuns | EventSimulation:
-    if parcel.digest not in _systems:
-        close_system()
-        _systems[parcel.digest] = parcel.start()
-    return _systems[parcel.digest]
-
-
-def close_system() -> None:
-    """Close the system that `make_runs` keeps in this process."""
-    while _systems:
-        _systems.popitem()[1].close()
+            simulation = EventSimulation(replace(self.task.rig, files=files), self.task.steady)
+        weakref.finalize(self, simulation.close)
+        return simulation
 
 
 @dataclass(frozen=True)
@@ -259,11 +247,10 @@ def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
     """The results of the runs from number `begin` to `end` - 1, by the names of `result_variables`."""
     task = parcel.task
     chances = [draw(task.plan, task.rig.operation, number) for number in range(begin, end)]
-    system = _system_of(parcel)
-    runs = system.runs([point(system.rig, chance, task.plan.duration) for chance in chances])
+    points = [point(parcel.system.rig, chance, task.plan.duration) for chance in chances]
     # a run that fails is a result, too
     faults, samples = [], []
-    for chance, run in zip(chances, runs, strict=True):
+    for chance, run in zip(chances, parcel.system.runs(points), strict=True):
         faults.append("" if run.fault is None else str(run.fault))
         samples.append(None if run.fault else sample(task, chance, run))
     return {
@@ -421,10 +408,7 @@ def run(
     job = job_of(task)
     if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
         workers = 1
-    try:
-        store = run_job(job, folder, progress, workers, scheduler)
-    finally:
-        close_system()
+    store = run_job(job, folder, progress, workers, scheduler)
     return MonteCarloResult(
         store.dataset, store.file, task.method, store.earlier_points, store.damaged_batches
     )

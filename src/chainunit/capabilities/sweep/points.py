@@ -133,13 +133,10 @@ class SweepTask:
         )
 
     def codes_of_turns(self, table: xr.Dataset) -> Any:
-        """The codes of the sweep for those of `turns`, shape (points,)."""
-        count = len(reasons_of(self.machine.model))
-        names = {parameter.name.partition(".")[2]: parameter.name for parameter in self.plan.parameters}
-        other = self.codes[Beside.BOUNDS, ""]
-        outside = (names.get(x, x) for x in table.reason.attrs["subjects"][count:])
-        codes = [*range(count), *(self.codes.get((ReasonKind.BOUNDS, name), other) for name in outside)]
-        return np.array(codes, np.int16)[table.reason.values]
+        """The codes of the sweep for those of `turns`, shape (points,); `make_points` names a swept value that is
+        outside its bounds."""
+        code, count = table.reason.values, len(reasons_of(self.machine.model))
+        return np.where(code < count, code, self.codes[Beside.BOUNDS, ""]).astype(np.int16)
 
     def digest(self) -> str:
         """A digest of everything on which the results depend, in hexadecimal digits. The number of points of Sobol's

@@ -31,7 +31,6 @@ from .table import SPEED
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
 
 BEST = 10
 """Number of best points."""
@@ -193,7 +192,8 @@ def _summary(findings: SweepFindings) -> SweepSummary:
         number: {"point": InUnit(number, "1")} | {name: findings.in_unit(name, x) for name, x in row.items()}
         for number, row in ends.points.to_dict("index").items()
     }
-    sampled = _sampled(findings)
+    step = -(-plan.points // SAMPLE) if plan.is_grid else 1
+    sampled = findings.points.isel(point=slice(None, step * SAMPLE, step))
     sound = sampled["reason"].values == 0
     sample = {name: sampled[name].values[sound] for name in findings.variables}
     gaps = {name: 1.0 - np.isfinite(sample[name]).sum() / len(sound) for name in findings.results}
@@ -232,7 +232,9 @@ def _summary(findings: SweepFindings) -> SweepSummary:
         best=[rows[k] for k in ends.best],
         influences=influences,
         gaps={name: gaps[name] for name in influences},
-        current_limit=_current_limit(findings, ends.points),
+        current_limit=limit_reached(task.rig.drive, ends.points["current_peak"].dropna())
+        if task.rig is not None and "current_peak" in ends.points
+        else None,
         spread=SweepSpread(
             evenly if has_spread else [], dict(_spread(findings, sample)) if has_spread else {}
         ),
@@ -281,12 +283,6 @@ def _range(parameter: SweptParameter, is_grid: bool) -> SweptRange:
         tolerance=InUnit(parameter.tolerance, v.unit, "difference" if v.unit == "K" else v.kind),
         distribution=parameter.distribution if parameter.tolerance is not None and not is_grid else None,
     )
-
-
-def _sampled(findings: SweepFindings) -> xr.Dataset:
-    points = findings.points
-    step = -(-points.sizes["point"] // SAMPLE) if findings.plan.is_grid else 1
-    return points.isel(point=slice(None, None, step)).isel(point=slice(0, SAMPLE))
 
 
 def _influences(
@@ -348,14 +344,6 @@ def _organs(findings: SweepFindings) -> list[OrganShare]:
         for limit, count in zip(limits, counts, strict=True)
         if count
     ]
-
-
-def _current_limit(findings: SweepFindings, ends: pd.DataFrame) -> float | None:
-    """The limit of the motor's current [A], where the largest current of the points is at it."""
-    rig, name = findings.task.rig, "current_peak"
-    if rig is None or name not in ends:
-        return None
-    return limit_reached(rig.drive, ends[name].dropna())
 
 
 def _spread(findings: SweepFindings, sample: Mapping[str, Any]) -> Iterator[tuple[str, ResultSpread]]:

@@ -165,14 +165,12 @@ def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
             "note",
         )
     course = {name: np.asarray(values.value, float) for name, values in summary.course.items()}
-    time, axis, marks = course["time"], fig.Axis("time", "s"), tuple(_marks(summary))
+    time, marks = course["time"], tuple(_marks(summary))
     panels = []
     for name, title, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
-        courses = {side: course[f"{side}.{name}"] for side in ("left", "right")}
-        low, high = _span(time, list(courses.values()))
-        items = [fig.Curve(side, time, load, look) for look, (side, load) in enumerate(courses.items())]
-        y = fig.Axis(title, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*marks, *items)),))
+        sides = {side: course[f"{side}.{name}"] for side in ("left", "right")}
+        curves = (fig.Curve(side, time, load, look) for look, (side, load) in enumerate(sides.items()))
+        panels.append(_panel(title, unit, time, list(sides.values()), (*marks, *curves)))
     yield fig.Figure(
         "loads",
         "Estimated loads",
@@ -183,10 +181,9 @@ def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
     panels = []
     for name, title, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
         imbalance, limit = course[f"imbalance.{name}"], course[f"imbalance.{name}_threshold"]
-        low, high = _span(time, [imbalance, limit, -limit])
         band = fig.Between("below the threshold", time, -limit, limit, "band")
-        y = fig.Axis(title, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*marks, band, fig.Curve("imbalance", time, imbalance, 0))),))
+        items = (*marks, band, fig.Curve("imbalance", time, imbalance, 0))
+        panels.append(_panel(title, unit, time, [imbalance, limit, -limit], items))
     yield fig.Figure(
         "imbalance",
         "Imbalance and thresholds",
@@ -196,13 +193,16 @@ def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
     )
 
 
-def _span(time: Any, courses: list[Any]) -> tuple[float, float]:
-    """The ends of an axis: of the values after the first tenth of the time, in which the observer settles."""
+def _panel(
+    title: str, unit: str, time: Any, courses: list[Any], items: tuple[fig.Item, ...]
+) -> tuple[fig.Panel]:
+    """A panel over the time, whose axis shows the courses after the first tenth, in which the observer settles."""
     settled = time > time[0] + 0.1 * (time[-1] - time[0])
-    values = np.concatenate([x[settled] for x in courses])
+    values = np.concatenate([course[settled] for course in courses])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     wide = 0.1 * (high - low) or 1.0
-    return low - wide, high + wide
+    axis = fig.Axis(title, unit, low=low - wide, high=high + wide)
+    return (fig.Panel(fig.Axis("time", "s"), axis, items),)
 
 
 def _marks(summary: WatchSummary) -> Iterator[fig.Shade]:
