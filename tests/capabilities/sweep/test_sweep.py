@@ -34,6 +34,7 @@ from chainunit.capabilities.sweep import points as sweep
 from chainunit.capabilities.sweep import runs as sweep_runs
 from chainunit.capabilities.sweep.plan import SweptParameter
 from chainunit.capabilities.sweep.shares import shares_of_points, shares_on_grid
+from chainunit.capabilities.sweep.summary import summary_of
 from chainunit.core.errors import InputError as Refusal
 from chainunit.core.files import FileList
 from chainunit.core.native.compilers import compiler
@@ -595,6 +596,14 @@ def test_the_summary_is_that_of_the_table(grid, spread):
         assert [each["machine.r"]["value"] for each in numbers["best"]] == list(best["machine.r"])
         # one summary serves the report and Python
         assert result.summary is result.summary and as_data(result.summary)["best"] == numbers["best"]
+
+
+def test_extremes_and_best_points_do_not_depend_on_the_parts_that_are_read(grid, spread, monkeypatch):
+    monkeypatch.setattr(sweep, "_PART", 7)
+    for result in (grid, spread):
+        again, whole = summary_of(result.summary.findings), result.summary
+        assert (again.size, again.reasons, again.best) == (whole.size, whole.reasons, whole.best)
+        assert again.extremes == whole.extremes and len(whole.best) > 0
 
 
 def test_points_beyond_the_limits_of_two_bars_are_counted():

@@ -18,15 +18,16 @@ from ...study.config import Config
 from ...work.progress import TaskProgress
 from . import figures as sweep_figures
 from .points import run_sweep
-from .summary import MOST_GAPS, Influence, SweepSummary, SweptRange, summary_of
+from .summary import MOST_GAPS, Influence, SweepSummary, SweptRange, SweptStudy
 
 _MOST_COLUMNS = 8
 """Columns of a table on the terminal."""
 
 
-def report(summary: SweepSummary) -> b.Report:
+def report(swept: SweptStudy) -> b.Report:
     """The report on a sweep."""
-    x, config = cited(summary), summary.findings.config
+    summary, config = swept.summary, swept.findings.config
+    x = cited(summary)
     spread_heading = "Spread by tolerances" + (" and ranges" if summary.spread.evenly else "")
     with shown_in(config.units):
         influences = (*_influences(x), *sweep_figures.tornado(summary))
@@ -59,19 +60,19 @@ def _compute(
     workers: int | None = None,
     scheduler: str | None = None,
     engine: str = "native",
-) -> SweepSummary:
+) -> SweptStudy:
     """Run the sweep of a study; a store in the folder that fits is continued. Errors are those of `run_sweep`, and an
     InputError for a number of workers that is none."""
     if workers is not None and (
         isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
     ):
         raise InputError(f"workers = {shown(workers)}: must be a whole number >= 1")
-    return summary_of(run_sweep(config, folder, progress, workers, scheduler, engine))
+    return SweptStudy(run_sweep(config, folder, progress, workers, scheduler, engine))
 
 
-def _store_in(summary: SweepSummary, folder: Path) -> Path:
+def _store_in(swept: SweptStudy, folder: Path) -> Path:
     """The store of all points, which is written while the sweep runs."""
-    return folder / summary.findings.outcome.file.name
+    return folder / swept.findings.outcome.file.name
 
 
 def _opening(x: SweepSummary) -> Iterator[b.Block]:
@@ -296,13 +297,13 @@ def _basis(x: SweepSummary, driver: str) -> Iterator[b.Block]:
     yield b.Text(filled("All points: {} (NetCDF).", x.store.store), "fine", "long")
 
 
-TASK: Task[Config, SweepSummary] = Task(
+TASK: Task[Config, SweptStudy] = Task(
     "sweep",
     _compute,
     report,
     content=SweepSummary,
     files=("sweep_*.png",),
-    writers=lambda summary, report, folder, of_report: [*of_report, lambda: [_store_in(summary, folder)]],
-    kept=lambda summary, folder: [_store_in(summary, folder)],
-    shortfall=lambda summary: None if summary.size.feasible else "",
+    writers=lambda swept, report, folder, of_report: [*of_report, lambda: [_store_in(swept, folder)]],
+    kept=lambda swept, folder: [_store_in(swept, folder)],
+    shortfall=lambda swept: None if swept.summary.size.feasible else "",
 )

@@ -12,14 +12,14 @@ from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import TaskProgress
 from .page import TASK
-from .summary import SweepSummary
+from .summary import SweepSummary, SweptStudy
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
 
-class SweepResult(ReportedResult[Config, SweepSummary]):
+class SweepResult(ReportedResult[Config, SweptStudy]):
     """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
 
     _task = TASK
@@ -27,7 +27,7 @@ class SweepResult(ReportedResult[Config, SweepSummary]):
     @property
     def summary(self) -> SweepSummary:
         """Extremes, best points, influences and spread, as the report reads them."""
-        return self._outcome
+        return self._outcome.summary
 
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """For each result the least and the largest value over all points, and the value of the study."""

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ...core.brief import briefly_shown
 from ...core.quantities import quantity
 from ...reading.results import OWN, Estimate, InUnit, part, result
 from ...reading.text import shown_in
@@ -179,13 +181,22 @@ class SweepSummary:
         return min(12, max(4, 3 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low)))))
 
 
+@briefly_shown
+@dataclass(frozen=True)
+class SweptStudy:
+    """A study whose sweep was run. Its numbers are made once, for report and Python, when they are asked for."""
+
+    findings: SweepFindings
+
+    @cached_property
+    def summary(self) -> SweepSummary:
+        """The numbers, with texts in the units of the study."""
+        with shown_in(self.findings.config.units):
+            return summary_of(self.findings)
+
+
 def summary_of(findings: SweepFindings) -> SweepSummary:
-    """The numbers of a sweep, with texts in the units of the study."""
-    with shown_in(findings.config.units):
-        return _summary(findings)
-
-
-def _summary(findings: SweepFindings) -> SweepSummary:
+    """The numbers of a sweep."""
     plan, config, task = findings.plan, findings.config, findings.task
     ends = _ends(findings)
     rows: dict[int, Row] = {
@@ -253,6 +264,7 @@ class _Ends(NamedTuple):
 
 
 def _ends(findings: SweepFindings) -> _Ends:
+    """The ends of all points, which are read in parts; of the parts that went by only the ends stay in memory."""
     import pandas as pd
 
     plan = findings.plan
