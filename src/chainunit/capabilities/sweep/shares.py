@@ -215,24 +215,26 @@ class _Path(NamedTuple):
 def _path(gram: Any, moment: Any, phi: Any, y: Any, most: int) -> _Path:
     """The fits of the points with these products, each with the term more that lessens the error most (orthogonal
     least squares), and their errors at the points of the fold, whose terms and values are `phi` and `y`."""
-    size = np.diag(gram)
-    left, rest = size.copy(), moment.copy()
+    squares = np.diag(gram)
+    # of each term, what the chosen terms leave: its square, and its product with the result
+    free, product = squares.copy(), moment.copy()
     basis, along, errors = np.zeros((len(gram), most)), np.zeros(most), np.empty((len(y), most))
+    columns, error = np.zeros((len(y), most)), y.copy()
     chosen: list[int] = []
-    columns, e, term = np.zeros((len(y), most)), y.copy(), 0
+    term = 0
     while True:
-        j, row = len(chosen), basis[term].copy()
-        root = math.sqrt(left[term])
+        j, row, root = len(chosen), basis[term].copy(), math.sqrt(free[term])
         basis[:, j] = (gram[:, term] - basis @ row) / root
         columns[:, j] = (phi[:, term] - columns @ row) / root
-        along[j] = rest[term] / root
-        rest -= along[j] * basis[:, j]
-        left -= basis[:, j] ** 2
-        e = e - along[j] * columns[:, j]
-        errors[:, j:] = e[:, None]
+        along[j] = product[term] / root
+        product -= along[j] * basis[:, j]
+        free -= basis[:, j] ** 2
+        error = error - along[j] * columns[:, j]
+        errors[:, j:] = error[:, None]
         chosen.append(term)
-        gain = np.where(left > 1e-6 * size, rest**2 / np.maximum(left, 1e-300), 0.0)
+        # a term that the chosen ones nearly make gains nothing
+        gain = np.where(free > 1e-6 * squares, product**2 / np.maximum(free, 1e-300), 0.0)
         gain[chosen] = 0.0
         term = int(np.argmax(gain))
-        if len(chosen) == most or gain[term] <= _NO_GAIN * size[0]:
+        if len(chosen) == most or gain[term] <= _NO_GAIN * squares[0]:
             return _Path(chosen, basis[:, : j + 1], along[: j + 1], errors)
