@@ -99,8 +99,8 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     items += _infeasible(summary, x, y, part["reason"].values)
     items.append(fig.Curve("the study", [across.centre], [up.centre], 1, "o", has_line=False))
     if summary.best and name == plan.best:
-        point = ([summary.best[0][parameter.name].value] for parameter in plan.parameters)
-        items.append(fig.Curve(plan.best_is, *point, 3, "s", has_line=False))
+        best = summary.best[0][across.name].value, summary.best[0][up.name].value
+        items.append(fig.Curve(plan.best_is, [best[0]], [best[1]], 3, "s", has_line=False))
     ends = [{"low": float(axis[0]), "high": float(axis[-1])} for axis in (x, y)]
     panel = fig.Panel(_axis(across.variable, **ends[0]), _axis(up.variable, **ends[1]), tuple(items))
     return fig.Figure(
@@ -131,7 +131,7 @@ def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
     part = points.isel(point=slice(None, None, -(-points.sizes["point"] // 20_000)))
     part = part.isel(point=np.argsort(part[parameter.name].values, kind="stable"))
     x = part[parameter.name].values
-    marks = [
+    marks: list[fig.Item] = [
         fig.Mark(parameter.centre, "the study", look="mark"),
         *_gaps(summary, x, part["reason"].values),
     ]

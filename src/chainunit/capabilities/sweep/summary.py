@@ -269,7 +269,8 @@ def _ends(findings: SweepFindings) -> _Ends:
 
     plan = findings.plan
     counts = np.zeros(len(findings.task.reasons), np.int64)
-    kept, extremes, best = [], {}, []
+    kept: list[pd.DataFrame] = []
+    extremes, best = {}, []
     for begin, points in findings.parts([*findings.variables, "reason"]):
         counts += np.bincount(points["reason"].values, minlength=len(counts))
         frame = points.to_dataframe()[[*findings.variables]]

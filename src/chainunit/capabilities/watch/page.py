@@ -182,8 +182,8 @@ def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
     for name, title, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
         imbalance, limit = course[f"imbalance.{name}"], course[f"imbalance.{name}_threshold"]
         band = fig.Between("below the threshold", time, -limit, limit, "band")
-        items = (*marks, band, fig.Curve("imbalance", time, imbalance, 0))
-        panels.append(_panel(title, unit, time, [imbalance, limit, -limit], items))
+        curve = fig.Curve("imbalance", time, imbalance, 0)
+        panels.append(_panel(title, unit, time, [imbalance, limit, -limit], (*marks, band, curve)))
     yield fig.Figure(
         "imbalance",
         "Imbalance and thresholds",

@@ -105,11 +105,10 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
     learning, start, sought = plan.table.learning, float(recording.time[0]), begin.problem.sought
     duration = float(recording.time[-1]) - start
     settled = recording.time > start + learning
-    thresholds = [
-        float(x)
+    (feed_least, feed_most), (force_least, force_most) = (
+        map(float, np.percentile(watched.outputs[f"imbalance.{ground}_threshold"][settled], [2.0, 98.0]))
         for ground in GROUNDS
-        for x in np.percentile(watched.outputs[f"imbalance.{ground}_threshold"][settled], [2.0, 98.0])
-    ]
+    )
     loads = {load.name for load in sought}
     columns = *columns_watched(recording).values(), speed_column(recording)
     every = max(1, -(-len(recording.time) // ROWS))
@@ -137,7 +136,9 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
         doubts=list(_doubts(begin)),
         of_feed_alone=not begin.is_described and describes(begin.problem, begin.fit, begin.tests, loads),
         alarms=watched.alarms,
-        thresholds=Thresholds(*thresholds, *watched.uncertainty, *watched.widening),
+        thresholds=Thresholds(
+            feed_least, feed_most, force_least, force_most, *watched.uncertainty, *watched.widening
+        ),
         noise=dict(zip(("signal", "speed"), begin.noises, strict=True)),
         constant_parts=list(constant_parts(recording, [name for name in columns if name])),
         gaps=[Gap(*ends) for ends in recording.gaps if ends[1] - ends[0] > GAP * plan.turn],
