@@ -95,8 +95,13 @@ def _ranges(analysis: TorsionFindings) -> Iterator[tuple[Line, Line, Line]]:
 
 
 def _speed_axis(analysis: TorsionFindings) -> fig.Axis:
-    ends = (float(x * analysis.rotation.speed) for x in (analysis.ranges.slowest, analysis.ranges.fastest))
-    return fig.Axis("speed of the shaft", "rad/s", "speed", *ends)
+    low, high = _speed_ends(analysis)
+    return fig.Axis("speed of the shaft", "rad/s", "speed", low=low, high=high)
+
+
+def _speed_ends(analysis: TorsionFindings) -> tuple[float, float]:
+    speed, ranges = analysis.rotation.speed, analysis.ranges
+    return float(ranges.slowest * speed), float(ranges.fastest * speed)
 
 
 def _running(analysis: TorsionFindings) -> fig.Mark:
@@ -105,9 +110,7 @@ def _running(analysis: TorsionFindings) -> fig.Mark:
 
 def _campbell(analysis: TorsionFindings) -> fig.Figure:
     curve, motion, axis = analysis.resonance, analysis.resonance.motion, _speed_axis(analysis)
-    slowest, fastest = (
-        x * analysis.rotation.speed for x in (analysis.ranges.slowest, analysis.ranges.fastest)
-    )
+    slowest, fastest = _speed_ends(analysis)
     low, high = analysis.natural_frequency.over_both_turns
     ends = np.array([0.0, fastest])
     places = np.flatnonzero(motion.exists & ~motion.unstable)[::4]
@@ -181,7 +184,8 @@ def _resonance(analysis: TorsionFindings) -> fig.Figure:
             _running(analysis),
         ]
         if simulation is not None:
-            points = (x[analysis.on_speed] for x in (simulation.speed, getattr(simulation, f"peak{shaft}")))
+            speed, torque = simulation.speed, getattr(simulation, f"peak{shaft}")
+            points = speed[analysis.on_speed], torque[analysis.on_speed]
             items.append(fig.Curve("time simulation", *points, 1, "o", has_line=False))
         if static > 0.0:
             items.append(fig.Mark(static, "load alone", axis="y", look=3))
