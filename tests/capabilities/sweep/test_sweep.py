@@ -31,7 +31,6 @@ from chainunit.batch.evaluate import ReasonKind
 from chainunit.capabilities.sweep import figures as sweep_figures
 from chainunit.capabilities.sweep import page as sweep_page
 from chainunit.capabilities.sweep import points as sweep
-from chainunit.capabilities.sweep import runs as sweep_runs
 from chainunit.capabilities.sweep.plan import SweptParameter
 from chainunit.capabilities.sweep.shares import shares_of_points, shares_on_grid
 from chainunit.capabilities.sweep.summary import summary_of
@@ -450,7 +449,7 @@ def test_the_event_of_each_point_begins_at_its_own_crank_angle(monkeypatch):
         windows.append(window)
         return 0.0
 
-    monkeypatch.setattr(sweep_runs, "read_measure", read)
+    monkeypatch.setattr(sweep, "read_measure", read)
     results = sweep.make_points(sweep.task_of(parse(gains() + text)), 0, 4)
     begun = [crank_angle(window.drive, window.run)[0] for window in windows[:: len(windows) // 4]]
     off = [
@@ -1029,4 +1028,4 @@ def test_measures_need_a_compiler(monkeypatch):
     with pytest.raises(
         InputError, match=r"^sweep\.measures: need a C compiler .*; install one, or leave them out$"
     ):
-        sweep_runs.check_drive(rig, plan, config.events[plan.event])
+        sweep.check_drive(rig, plan, config.events[plan.event])

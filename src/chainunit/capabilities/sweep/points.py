@@ -1,4 +1,5 @@
-"""Runs a sweep: its points as batches of the runner (see `chainunit.work.runner`), and its results as a dataset."""
+"""Runs a sweep: its points as batches of the runner (see `chainunit.work.runner`), and its results as a dataset. For
+measures each point starts its own drive from rest, and meets the event once it is steady."""
 
 from __future__ import annotations
 
@@ -18,29 +19,32 @@ import numpy as np
 
 from ... import __version__
 from ...batch.evaluate import ReasonKind, StateReason, check_engine, reasons_of
+from ...batch.transients import can_run
 from ...core.brief import briefly_shown
-from ...core.errors import InputError
+from ...core.errors import Faults, InputError
+from ...core.native.compilers import COMPILERS
 from ...core.quantities import Layout, Quantity, Variable, variables
 from ...machines.machine import Machine
 from ...reading.results import InUnit
-from ...study.block_runs import BlockRuns, Cause
+from ...study.block_runs import BlockRuns, Cause, EventRun, RunPoint
 from ...study.choice import drive_of
 from ...study.config import Config
 from ...study.cycle_quantities import CycleQuantity, cycle_quantity, evaluate
 from ...study.event import Event
-from ...study.measures import Answers
+from ...study.measures import Answers, read_measure
 from ...study.rig import Rig
+from ...study.window import Phase, Trip, Window
 from ...work.job import BatchStore, Job, ResultVariable
 from ...work.progress import TaskProgress
 from ...work.runner import check_scheduler
 from ...work.runner import run as run_job
 from .plan import SweepPlan
-from .runs import check_drive, measures, of_system
 from .table import SPEED
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_RATIO = "machine.ratio"
 TITLE = "points of the sweep"
 _STATES, _STATES_OF_RATIOS, _RUNS = 12e6, 2e6, 64
 """Largest numbers of states of a batch, of states where the ratio of the gear is swept (each then has an angle of its
@@ -181,7 +185,7 @@ def plain_name(name: str) -> str:
 
 def batch_of(plan: SweepPlan) -> int:
     """The number of points of a batch, a power of 2: some tenths of a second of work, and some 100 MB."""
-    has_ratio = any(parameter.name == "machine.ratio" for parameter in plan.parameters)
+    has_ratio = any(parameter.name == _RATIO for parameter in plan.parameters)
     states = (_STATES_OF_RATIOS if has_ratio else _STATES) / plan.angles
     return _RUNS if plan.measures else 1 << max(4, int(math.log2(states)))
 
@@ -213,8 +217,7 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
         results |= {name: np.full(end - begin, np.nan) for name in plan.measures}
         sound = np.flatnonzero(reason == 0)
         if len(sound):
-            assert task.event is not None
-            runs = measures(task.block, plan, task.event, {name: x[sound] for name, x in values.items()})
+            runs = _measures(task, {name: x[sound] for name, x in values.items()})
             for k, measured in zip(sound, runs, strict=True):
                 if isinstance(measured, Cause):
                     reason[k] = task.codes[measured, ""]
@@ -224,13 +227,94 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
     return results | {"reason": reason.astype(np.int16)}
 
 
+def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
+    """Refuse what the transients of a drive with this `event` cannot have.
+
+    Raises
+    ------
+    InputError
+        for an event that the drive cannot have, for a swept quantity that changes no run or is not one number of the
+        drive, and without a C compiler.
+    """
+    faults = Faults()
+    if not rig.takes(event):
+        faults.add([InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")])
+    names = rig.drive.simulated_machine.model.parameter_layout.names
+    for name in (parameter.name for parameter in plan.parameters):
+        reason = ""
+        if name == SPEED and not rig.drive.follows:
+            reason = "changes no run, as the motor has the speed of its supply"
+        elif name.startswith("machine.") and name.partition(".")[2] not in names:
+            reason = "is not of the drive"
+        elif name == _RATIO and rig.drive.whole_line:
+            reason = "is not one number of the drive"
+        if reason:
+            line = f"sweep.parameter: {name} {reason}; leave it out, or sweep it without measures"
+            faults.add([InputError(line, "sweep.parameter")])
+    if not can_run():
+        line = f"sweep.measures: need a C compiler ({COMPILERS}); install one, or leave them out"
+        faults.add([InputError(line, "sweep.measures")])
+    faults.refuse()
+
+
+def _measures(task: SweepTask, values: Mapping[str, Any]) -> Iterator[Cause | dict[str, float]]:
+    """By point, the measures of the plan by name, or the cause for which there are none. The points have these values
+    by full name, each of shape (points,)."""
+    assert task.rig is not None and task.event is not None
+    point_values = zip(*(map(float, x) for x in values.values()), strict=True)
+    points = [_point(task.rig, task.event, dict(zip(values, x, strict=True))) for x in point_values]
+    for point, run in zip(points, task.block.runs(points), strict=True):
+        if run.fault is not None:
+            yield run.fault.cause
+        else:
+            window = _window(point, run)
+            measured = {name: read_measure(name, window) for name in task.plan.measures}
+            yield {name: math.nan if value is None else value for name, value in measured.items()}
+
+
+def of_system(name: str) -> list[str]:
+    """The parameters of the compiled system that a swept quantity sets, by full name."""
+    part, _, short = name.partition(".")
+    # the machine of the feed-forward has the same parameters
+    return [name, f"model.{short}"] if part == "machine" else []
+
+
+def _point(rig: Rig, event: Event, values: Mapping[str, float]) -> RunPoint:
+    """The run with these values by full name."""
+    operation = rig.operation
+    feed = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    begin = f"event.{event.name}."
+    of_event = {name.removeprefix(begin): x for name, x in values.items() if name.startswith(begin)}
+    event = replace(event, p=replace(event.p, **of_event))
+    if _RATIO in values:
+        machine = rig.drive.machine.replace(ratio=values[_RATIO])
+        rig = replace(rig, drive=replace(rig.drive, machine=machine))
+    if feed or SPEED in values:
+        loads = Layout(type(operation.feed)).from_names(feed, operation.feed)
+        run = replace(operation.run, crank_speed=values.get(SPEED, operation.crank_speed))
+        rig = replace(rig, operation=replace(operation, feed=loads, run=run))
+    limit = rig.guards.get(rig.drive.motor_torque, math.inf)
+    system_values = {full: x for name, x in values.items() for full in of_system(name)}
+    return RunPoint(rig, event, event.time_followed(rig.operation.turn), limit=limit, values=system_values)
+
+
+def _window(point: RunPoint, run: EventRun) -> Window:
+    """The rows of a run from its event on."""
+    assert run.series is not None and run.steady is not None
+    drive, speed = point.rig.drive, point.rig.operation.crank_speed
+    steady = Window(Phase.STEADY, run.steady, drive, (), speed)
+    # the energy behind a coupling that opens is not followed
+    trip = Trip(float(run.series["time"][-1]), math.nan, None) if run.ended else None
+    return Window(Phase.EVENT, run.series, drive, (), speed, 0.0, steady, trip)
+
+
 def task_of(config: Config) -> SweepTask:
     """The task of the sweep of a study.
 
     Raises
     ------
     InputError
-        for a study without a sweep or without swept parameters; of measures see `chainunit.capabilities.sweep.runs`.
+        for a study without a sweep or without swept parameters; of measures see `check_drive`.
     """
     plan: SweepPlan | None = config.plans["sweep"]
     if plan is None or not plan.parameters:
