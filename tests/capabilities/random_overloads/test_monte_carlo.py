@@ -183,11 +183,13 @@ def test_a_killed_study_goes_on_from_what_it_saved(killed):
 
 
 @pytest.mark.slow
-def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path):
+def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path, monkeypatch):
     """In this process, from the first to the last run: the bytes of every file are the same."""
     folder, _, _ = killed
+    closed, close = [], EventSimulation.close
+    monkeypatch.setattr(EventSimulation, "close", lambda self: closed.append(close(self)))
     result = monte_carlo.run(task_of(folder), tmp_path, lambda *said: None, workers=1)
-    assert result.file.read_bytes() == opened(folder).file.read_bytes() and not monte_carlo._systems
+    assert result.file.read_bytes() == opened(folder).file.read_bytes() and len(closed) == 1
 
 
 def branches(task, simulation, *drawn):
@@ -209,7 +211,7 @@ def test_a_run_is_what_its_number_says(killed):
         for number in (7, 3, 20):
             drawn, run = draw(task, number), results.isel(run=number)
             (branch,) = branches(task, simulation, drawn)
-            got = monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, drawn, branch))
+            got = Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, drawn, branch))
             assert ("none", "left", "right")[int(run["side"])] == drawn.event.side
             assert float(run["drawn_force"]) == drawn.values["force"]
             assert {name: float(run[name]) for name in got} == got
@@ -221,7 +223,7 @@ def test_the_store_says_what_its_numbers_are(killed):
     assert results["side"].attrs["flag_meanings"] == "none left right"
     assert list(results["side"].attrs["flag_values"]) == [0, 1, 2]
     assert results["drawn_force"].attrs["units"] == "N" and results["trip_torque"].attrs["units"] == "N.m"
-    for v in monte_carlo.Layout(monte_carlo.Sample).variables:
+    for v in Layout(monte_carlo.Sample).variables:
         assert results[v.name].attrs == {"units": v.unit, "long_name": v.description}
 
 
@@ -352,7 +354,7 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     assert result.reasons == {2: "machine: it broke"} and result.failures == 1 and result.method == "cs"
     assert as_data(result)["failed"]["value"] == 1 and len(result.values("event")) == 4
     got, wanted = result.dataset, opened(killed[0]).dataset
-    for name in monte_carlo.Layout(monte_carlo.Sample).names:
+    for name in Layout(monte_carlo.Sample).names:
         assert np.isnan(got[name][2]), name
         np.testing.assert_array_equal(got[name][[0, 1, 3, 4]], wanted[name][[0, 1, 3, 4]])
     np.testing.assert_array_equal(got["drawn_force"], wanted["drawn_force"][:5])
@@ -378,10 +380,7 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
     parcel = monte_carlo.Parcel.of(task_of(killed[0]))
     nowhere = dict.fromkeys(parcel.content, tmp_path / "nowhere.fmu")
     away = dataclasses.replace(parcel, task=with_rig(parcel.task, files=nowhere))
-    try:
-        runs = monte_carlo.make_runs(pickle.loads(pickle.dumps(away)), 17, 19)
-    finally:
-        monte_carlo.close_system()
+    runs = monte_carlo.make_runs(pickle.loads(pickle.dumps(away)), 17, 19)
     wanted = opened(killed[0]).dataset.isel(run=slice(17, 19))
     assert runs["failed"] == ["", ""] and len(runs) == len(wanted)
     for name in set(runs) - {"failed"}:
@@ -516,8 +515,7 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
     for got, other, each in zip(task.block().runs(points), wanted, drawn, strict=True):
         assert got.fault is None and got.ended == other.ended and got.series.sizes == other.series.sizes
         a, b = (
-            monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, each, run))
-            for run in (got, other)
+            Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, each, run)) for run in (got, other)
         )
         for name, x in a.items():
             assert x == b[name] or abs(x - b[name]) < 1e-3 * max(abs(b[name]), 0.1), (name, x, b[name])
@@ -581,13 +579,10 @@ def test_runs_on_the_compiled_system_do_not_depend_on_their_batch(tmp_path):
     """In one process without Dask; made again by a worker from its parcel, in other batches."""
     task = compiled_task(STUDY, runs=30)
     result = monte_carlo.run(task, tmp_path, lambda *said: None)
-    assert result.runs == 30 and not result.failures and not monte_carlo._systems
+    assert result.runs == 30 and not result.failures
     assert result.method == "compiled"
     parcel = pickle.loads(pickle.dumps(monte_carlo.Parcel.of(task)))
-    try:
-        pieces = [monte_carlo.make_runs(parcel, a, b) for a, b in ((0, 7), (7, 30))]
-    finally:
-        monte_carlo.close_system()
+    pieces = [monte_carlo.make_runs(parcel, a, b) for a, b in ((0, 7), (7, 30))]
     for name in pieces[0]:
         both = [x for piece in pieces for x in piece[name]]
         stored = result.dataset[name].values

@@ -19,12 +19,12 @@ from scipy.linalg import expm
 
 from chainunit import InputError
 from chainunit.app import cli
-from chainunit.capabilities.torsion import analysis as torsion_findings
+from chainunit.capabilities.torsion import analysis as torsion_analysis
 from chainunit.capabilities.torsion import page as torsion_report
-from chainunit.capabilities.torsion.analysis import TorsionAnalysis
-from chainunit.capabilities.torsion.line import Rotation, analyse
+from chainunit.capabilities.torsion.analysis import TorsionAnalysis, analyse
+from chainunit.capabilities.torsion.findings import Rotation
 from chainunit.capabilities.torsion.page import PICTURES
-from chainunit.capabilities.torsion.table import TorsionTable
+from chainunit.capabilities.torsion.table import TorsionPlan, TorsionTable
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
@@ -471,7 +471,7 @@ def test_numbers_are_those_of_the_former_program():
         bend_high=math.radians(35.0),
     )
     rotation = Rotation(speed=run["speed"], load=run["load"])
-    now = as_data(analyse(line, rotation, table, damping_ratios=(0.01, 0.03)))
+    now = as_data(analyse(line, rotation, TorsionPlan(table, "alpha1", (0.01, 0.03))))
 
     def compare(old, new):
         if isinstance(old, dict):
@@ -494,21 +494,25 @@ def test_the_orders_of_one_joint_have_a_closed_form():
     """The series of atan(tan(x)/cos(alpha)) - x."""
     found = findings("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n[feed]\nload = 0\n" + SMALL)
     square = math.tan(math.radians(15.0)) ** 2
-    assert found.analysis.excitation == {
+    assert found.excitation == {
         2: pytest.approx(square, rel=1e-9),
         4: pytest.approx(square**2 / 2.0, rel=1e-9),
     }
     # without a load there is nothing to compare the peaks with
-    assert not said(found, "Shaft 2 carries") and found.analysis.static2 == 0.0
+    assert (
+        not said(found, "With a motor of constant torque shaft 2 carries")
+        and found.operating.static_torque2 == 0.0
+    )
 
 
 def test_crossings_are_where_the_orders_meet_the_band(study):
-    analysis = study.analysis
-    for n, ends in analysis.crossings().items():
-        assert [n * w for w in ends] == pytest.approx([analysis.band.least, analysis.band.largest])
-    low, high = analysis.crossings()[2]
+    for n, ends in study.crossings.items():
+        assert [n * w for w in ends] == pytest.approx(
+            [study.natural_frequency.least, study.natural_frequency.largest]
+        )
+    low, high = study.crossings[2]
     (warning,) = said(study, "Running at 146.6 rad/s (1400 rev/min) is")
-    near = (analysis.rotation.speed - high) / analysis.rotation.speed
+    near = (study.rotation.speed - high) / study.rotation.speed
     ends = [number(end, "rad/s", "speed", 4) for end in (low, high)]
     assert f"is {number(near, '1', 'percent')} from where order 2" in str(warning)
     assert " to ".join(ends) in str(warning)
@@ -547,7 +551,7 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     study = study_of(SLOW_LINE)
     found = TorsionAnalysis.find(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None))
     J = study.statics.normal.outputs.J
-    ratio = found.analysis.ratio
+    ratio = found.ratio
     low, high = (
         [
             pick(frozen_frequency(numpy_(), two_masses(study.drive, float(x)), ratio))
@@ -555,8 +559,8 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
         ]
         for x in (np.max(J), np.min(J))
     )
-    assert found.analysis.crossings()[2] == pytest.approx((low[0] / 2.0, high[1] / 2.0), rel=1e-6)
-    band = found.analysis.band
+    assert found.crossings[2] == pytest.approx((low[0] / 2.0, high[1] / 2.0), rel=1e-6)
+    band = found.natural_frequency
     assert high[1] - low[0] > 2.0 * (band.largest - band.least)
     study.findings["torsion"] = found
     source = blocks.Source({"torsion": as_data(found)})
@@ -571,29 +575,27 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     )
     campbell = next(each for each in shown if isinstance(each, figure.Figure) and each.name == "campbell")
     (band_shown,) = (item for item in campbell.panels[0][0].items if isinstance(item, figure.Shade))
-    assert (band_shown.low, band_shown.high) == found.analysis.span
+    assert (band_shown.low, band_shown.high) == found.natural_frequency.over_both_turns
     assert band_shown.name == f"natural frequency {over_both}"
 
 
 def test_the_tongue_lies_at_the_natural_frequency(study):
-    analysis = study.analysis
-    ((low, high),) = analysis.unstable_ranges()
-    assert low < analysis.at_even < high < 1.1 * low
+    ((low, high),) = study.resonance.unstable
+    assert low < study.natural_frequency.even < high < 1.1 * low
     (warning,) = said(study, "Unstable from")
     assert "damping ratio 0.0150" in str(warning) and warning.quantities["low"][0] == low
     # more bend and less damping widen it
-    wide = (analysis.map.unstable * np.gradient(analysis.map.speed)).sum(axis=2)
+    wide = (study.map.unstable * np.gradient(study.map.speed)).sum(axis=2)
     assert wide[0, 0] == wide[1, 0] == wide[1, 1] == 0.0 and wide[0, 2] > 0.0 and wide[0, 2] >= wide[1, 2]
 
 
 def test_peaks_are_compared_with_the_load_alone(study):
     (warning,) = said(study, "With a motor of constant torque shaft 2 carries")
-    analysis = study.analysis
-    peak = float(analysis.operating.peak2[0])
+    peak = float(study.operating.motion.peak2[0])
     # the brake of the machine is smoothed near rest
-    assert analysis.static2 == pytest.approx(375.0 * np.max(analysis.ratio), rel=1e-7)
+    assert study.operating.static_torque2 == pytest.approx(375.0 * np.max(study.ratio), rel=1e-7)
     assert number(peak, "N.m", digits=4) in str(warning)
-    assert f"{number(peak / analysis.static2, '1')} times" in str(warning)
+    assert f"{number(peak / study.operating.static_torque2, '1')} times" in str(warning)
     assert said(study, "With a motor of constant torque the torque of shaft 2 falls to")
 
 
@@ -611,15 +613,14 @@ def test_what_would_even_the_joints():
 
 def test_an_even_line_has_nothing_to_warn_of():
     found = findings("[driveline]\nalpha1 = '8 deg'\n" + SMALL + "joint = 'both'\n")
-    analysis = found.analysis
-    assert not said(found, "") and analysis.unstable_ranges() == []
-    assert not np.any(analysis.map.unstable) and np.all(np.isfinite(analysis.map.growth))
-    np.testing.assert_allclose(analysis.steady.peak2, 375.0, rtol=1e-6)
+    assert not said(found, "") and found.resonance.unstable == []
+    assert not np.any(found.map.unstable) and np.all(np.isfinite(found.map.growth))
+    np.testing.assert_allclose(found.resonance.motion.peak2, 375.0, rtol=1e-6)
 
 
 def test_without_damping_it_says_so():
     found = findings("[driveline]\nd2 = 0\n" + SMALL)
-    assert found.analysis.simulation is None and found.analysis.damping_ratio == 0.0
+    assert found.simulation is None and found.damping_ratio == 0.0
     assert said(found, "Without damping no transient dies", "note")
 
 
@@ -632,9 +633,9 @@ def only_line(line, rotation, *_):
 
 def test_the_line_is_that_of_the_study(monkeypatch):
     """On the other side of a gear, with a flywheel, it is the same system seen from another shaft."""
-    monkeypatch.setattr(torsion_findings, "analyse", only_line)
+    monkeypatch.setattr(torsion_analysis, "analyse", only_line)
     text = "[machine]\nratio = 3\n[driveline]\nplace = '{}'\nJ4 = 0.4\n[flywheel]\nJ = 0.3\n" + SMALL
-    crank, motor = (findings(text.format(place)).analysis for place in ("crank", "motor"))
+    crank, motor = (findings(text.format(place)) for place in ("crank", "motor"))
     assert (crank.line.J1, crank.line.J4) == pytest.approx((1.5 * 9.0, 59.9))
     assert (motor.line.J1, motor.line.J4) == pytest.approx((1.5, 0.4 + 59.5 / 9.0))
     assert motor.rotation.speed == pytest.approx(3.0 * crank.rotation.speed)
@@ -643,7 +644,7 @@ def test_the_line_is_that_of_the_study(monkeypatch):
 
 @pytest.mark.parametrize(("speed", "made"), [("300 rev/min", False), ("450 rev/min", True)])
 def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
-    monkeypatch.setattr(torsion_findings, "analyse", only_line)
+    monkeypatch.setattr(torsion_analysis, "analyse", only_line)
     text = f"{SYSTEM}{BARE}[run]\ncrank_speed = '{speed}'\n"
     # a table of its own asks for it
     for more in ("", "[torsion]\nspeeds = 2\n"):
@@ -659,7 +660,7 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     """A motor that gives a constant torque, as the analysis takes it, in the FMUs of the study."""
     found = findings(SMALL)
     study = study_of(f"{SYSTEM}{BARE}")
-    w = found.analysis.rotation.speed
+    w = found.rotation.speed
     drive = study.drive
     motor = Layout(type(drive.parameters)).from_names(
         {"speed_control.kp": 1e-6, "speed_control.ki": 0.0, "w_start": w}, drive.parameters
@@ -668,13 +669,13 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     part = dataclasses.replace(part, parameters=dataclasses.replace(part.parameters, w_start=w))
     drive = dataclasses.replace(drive, parameters=motor, line=Line((part,)))
     files, _ = export_drive(drive, tmp_path)
-    load = found.analysis.rotation.load
+    load = found.rotation.load
     signals = {"motor.w_ref": w, "motor.tau_ff": 0.0, "machine.load": study.config.feed.load}
     with CoSimulation(with_files(drive, files), signals | {"motor.tau_ff": load}) as simulation:
         run = simulation.run(2.5, 2.5e-4).sel(time=slice(2.2, None))
     assert float(run["motor.w"].mean()) == pytest.approx(w, rel=0.01)
     reached = float(run["motor.w"].mean())
-    want = steady(found.analysis.line, reached, load)
+    want = steady(found.line, reached, load)
     assert float(np.abs(run["driveline.tau2"]).max()) == pytest.approx(float(want.peak2[0]), rel=0.02)
 
 

@@ -15,8 +15,8 @@ from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit import InputError, Study
 from chainunit.capabilities.watch import page as watch_page
-from chainunit.capabilities.watch import watch as watching
 from chainunit.capabilities.watch.crank_motion import crank_motion
+from chainunit.capabilities.watch.watch import Begin
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.reading.result_entries import ResultEntries
@@ -242,7 +242,8 @@ def test_the_noise_of_columns_that_the_observer_does_not_use():
     )
     measured = {"motor.i": 3.0, "motor.u": 8.0, "motor.w": 0.9}
     checks = [SimpleNamespace(column=name, noise=x) for name, x in measured.items()]
-    assert watching.noises(checks, recording) == (3.0, 1.0)
+    problem = SimpleNamespace(runs=[SimpleNamespace(recording=recording)])
+    assert Begin(problem, None, checks).noises == (3.0, 1.0)
 
 
 def test_a_sensor_that_fails_behind_the_begin(tmp_path):
@@ -274,6 +275,15 @@ def test_refusals(tmp_path):
         (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], **more), "utf-8")
         with pytest.raises(InputError, match=words):
             Study.from_file(tmp_path / "mine.toml").watch()
+    # a matrix of another size than its names
+    covariance = {"names": ["machine.crank.m", "machine.rocker.m"], "matrix": [[1.0]]}
+    (tmp_path / "small.json").write_text(
+        json.dumps({"is_described": True, "covariance": covariance}), "utf-8"
+    )
+    text = study_text(TRUTH["machine"], identification="small.json")
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
+    with pytest.raises(InputError, match=r"small\.json: is no result\.json of chainunit identify"):
+        Study.from_file(tmp_path / "mine.toml").watch()
     (tmp_path / "mine.toml").write_text(
         "[watch]\nbegin = 3\nend = 2\ncolumns = { 'motor.v' = 'U' }\n", "utf-8"
     )

@@ -71,7 +71,7 @@ class RandomOverloads(Capability):
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The runs."""
-        from .analysis import RandomAnalysis
+        from .runs import RandomAnalysis
 
         return (RandomAnalysis,)
 

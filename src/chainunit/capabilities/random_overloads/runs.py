@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
@@ -21,11 +22,12 @@ import numpy as np
 from ... import __version__
 from ...batch.transients import can_run
 from ...core.files import scratch
-from ...core.quantities import Layout, Value, declaration, quantity, variables
+from ...core.quantities import Value, declaration, quantity, variables
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import Estimate, derived, part, result
-from ...study.analysis import Findings
+from ...study.analysis import Analysis, Findings, Work
 from ...study.block_runs import BlockRuns, EventRun, EventSimulation, RunPoint
+from ...study.drive import Drive
 from ...study.event import AnySide, Event
 from ...study.event_table import RandomEvent
 from ...study.limits import limit_reached
@@ -126,8 +128,9 @@ class RandomTask:
         content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
         if self.is_compiled:
             content.update((block or self.block()).loop.digest.encode())
-        for name in () if self.is_compiled else sorted(self.files):
-            content.update(Path(self.files[name]).read_bytes())
+        else:
+            for name in sorted(self.files):
+                content.update(Path(self.files[name]).read_bytes())
         return content.hexdigest()[:12]
 
     def block(self, states: Any = None) -> BlockRuns:
@@ -146,7 +149,7 @@ def result_variables(event: RandomEvent) -> list[ResultVariable]:
             ResultVariable(f"drawn_{name}", units[name].unit, f"drawn: {units[name].description}")
             for name in event.ranges
         ),
-        *(ResultVariable(v.name, v.unit, v.description) for v in Layout(Sample).variables),
+        *(ResultVariable(v.name, v.unit, v.description) for v in variables(Sample)),
         ResultVariable("failed", "1", "reason why the run failed; empty where it did not", letters=_LETTERS),
     ]
 
@@ -169,8 +172,10 @@ class Parcel:
             return cls(replace(task, rig=replace(task.rig, files={})), task.digest(block), {}, block.states)
         return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
-    def start(self) -> BlockRuns | EventSimulation:
-        """The system of the task in its steady state."""
+    @cached_property
+    def system(self) -> BlockRuns | EventSimulation:
+        """The system of the task in its steady state, which is closed when the parcel goes; a worker keeps the parcel
+        of its last job."""
         if self.states is not None:
             return self.task.block(self.states)
         with scratch() as folder:
@@ -178,24 +183,9 @@ class Parcel:
             for name, file in files.items():
                 file.write_bytes(self.content[name])
             # it unpacks the FMUs
-            return EventSimulation(replace(self.task.rig, files=files), self.task.steady)
-
-
-_systems: dict[str, BlockRuns | EventSimulation] = {}
-"""The system of this process, by the digest of its task."""
-
-
-def _system_of(parcel: Parcel) -> BlockRuns | EventSimulation:
-    if parcel.digest not in _systems:
-        close_system()
-        _systems[parcel.digest] = parcel.start()
-    return _systems[parcel.digest]
-
-
-def close_system() -> None:
-    """Close the system that `make_runs` keeps in this process."""
-    while _systems:
-        _systems.popitem()[1].close()
+            simulation = EventSimulation(replace(self.task.rig, files=files), self.task.steady)
+        weakref.finalize(self, simulation.close)
+        return simulation
 
 
 @dataclass(frozen=True)
@@ -257,36 +247,33 @@ def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
     """The results of the runs from number `begin` to `end` - 1, by the names of `result_variables`."""
     task = parcel.task
     chances = [draw(task.plan, task.rig.operation, number) for number in range(begin, end)]
-    system = _system_of(parcel)
-    runs = system.runs([point(system.rig, chance, task.plan.duration) for chance in chances])
-    results = [_result_of(task, chance, run) for chance, run in zip(chances, runs, strict=True)]
-    return {name: [result[name] for result in results] for name in results[0]}
-
-
-def _result_of(task: RandomTask, chance: Draw, run: EventRun) -> dict[str, Any]:
-    """The results of a run by name; one that fails is a result, too."""
-    numbers = dict.fromkeys(Layout(Sample).names)
-    if run.fault is None:
-        numbers = Layout(Sample).by_name(sample(task, chance, run))
+    points = [point(parcel.system.rig, chance, task.plan.duration) for chance in chances]
+    # a run that fails is a result, too
+    faults, samples = [], []
+    for chance, run in zip(chances, parcel.system.runs(points), strict=True):
+        faults.append("" if run.fault is None else str(run.fault))
+        samples.append(None if run.fault else sample(task, chance, run))
     return {
-        "side": np.int8((_NO_SIDE, *SIDES).index(chance.event.side or _NO_SIDE)),
-        **{f"drawn_{name}": value for name, value in chance.values.items()},
-        **{name: math.nan if value is None else float(value) for name, value in numbers.items()},
-        "failed": "" if run.fault is None else str(run.fault),
+        "side": np.array(
+            [(_NO_SIDE, *SIDES).index(chance.event.side or _NO_SIDE) for chance in chances], np.int8
+        ),
+        **{f"drawn_{name}": [chance.values[name] for chance in chances] for name in task.plan.event.ranges},
+        **{v.name: np.array([getattr(x, v.name, None) for x in samples], float) for v in variables(Sample)},
+        "failed": faults,
     }
 
 
-_SHARE = ("1", "percent")
+_SHARE = {("1", "percent"): "share"}
 _OUTCOMES = {
     "trips": warning(
         "random-overload-trips",
         f"Overloads at random: in {{share}} of them {OUTCOMES['trips']}.",
-        sizes={_SHARE: "share"},
+        sizes=_SHARE,
     ),
     "stalls": fault(
         "random-overload-stalls",
         f"Overloads at random: in {{share}} of them {OUTCOMES['stalls']}.",
-        sizes={_SHARE: "share"},
+        sizes=_SHARE,
     ),
 }
 _TOO_FEW = note("too-few-runs", "Overloads at random: {text}")
@@ -341,34 +328,29 @@ class MonteCarloResult(Findings):
     def quantiles(self) -> dict[str, dict[str, Estimate]]:
         """Quantiles of every answer, and shares of the runs that stall or trip, each with its interval. A
         quantile is left out where there are too few runs for its interval."""
-        estimates_of: dict[str, dict[str, Estimate]] = {}
-        for v in Layout(Sample).variables:
+        results: dict[str, dict[str, Estimate]] = {}
+        for v in variables(Sample):
             values = self.values(v.name)
             if not values or v.name in ("event", "crank_angle"):
                 continue
-            if v.name in ("stalls", "trips"):
+            if v.name in ENDS:
                 of_runs = share(sum(x > 0.5 for x in values), len(values))
-                estimates_of[v.name] = {"share": replace(of_runs, unit="1", kind="percent")}
-                continue
-            estimates = {f"q{100 * q:.0f}": quantile(values, q) for q in QUANTILES}
-            present = {name: estimate for name, estimate in estimates.items() if estimate is not None}
-            estimates_of[v.name] = {
-                name: replace(estimate, unit=v.unit) for name, estimate in present.items()
-            }
-        return estimates_of
+                results[v.name] = {"share": replace(of_runs, unit="1", kind="percent")}
+            else:
+                sizes = ((f"q{100 * q:.0f}", quantile(values, q)) for q in QUANTILES)
+                results[v.name] = {name: replace(x, unit=v.unit) for name, x in sizes if x is not None}
+        return results
 
     def remark(self, study: StudyRecord) -> None:
         """Warn of runs that end badly, and note what limits the numbers."""
         shares = self.quantiles
         for name, code in _OUTCOMES.items():
-            share = shares.get(name, {}).get("share")
-            if share is not None and share.value > 0.0:
-                study.say(code, share=share.value)
+            if name in shares and shares[name]["share"].value > 0.0:
+                study.say(code, share=shares[name]["share"].value)
         if self.shortage:
             study.say(_TOO_FEW, text=self.shortage)
-        currents = [estimate.value for estimate in shares.get("current_peak", {}).values()]
-        limit = limit_reached(study.drive, currents)
-        if limit is not None:
+        currents = (estimate.value for estimate in shares.get("current_peak", {}).values())
+        if (limit := limit_reached(study.drive, currents)) is not None:
             study.say(_AT_LIMIT, limit=limit)
         if self.damaged_batches:
             study.say(_MADE_ANEW, text=made_anew(self.damaged_batches, "runs", self.file_name))
@@ -377,17 +359,15 @@ class MonteCarloResult(Findings):
     def shortage(self) -> str:
         """Words on the quantiles for which there are too few runs; empty where there are enough."""
         count = self.runs - self.failures
-        omissions = [q for q in QUANTILES if count < runs_needed(q)]
-        if not omissions:
-            return ""
-        needs = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omissions)
-        return f"{count} runs are too few for some quantiles: {needs} (monte_carlo.runs)."
+        needed = ((q, runs_needed(q)) for q in QUANTILES)
+        lacks = ", ".join(f"the {100 * q:.0f} % quantile takes {runs}" for q, runs in needed if count < runs)
+        return lacks and f"{count} runs are too few for some quantiles: {lacks} (monte_carlo.runs)."
 
     @derived("1")
     def sides(self) -> dict[SideName, int]:
         """Number of runs by the side of the event; empty for an event without a side."""
         sides = self.dataset["side"].values
-        return {side: int(np.sum(sides == k)) for k, side in enumerate(SIDES, 1) if np.any(sides)}
+        return {side: int(np.sum(sides == k)) for k, side in enumerate(SIDES, 1)} if np.any(sides) else {}
 
     @cached_property
     def reasons(self) -> dict[int, str]:
@@ -428,10 +408,33 @@ def run(
     job = job_of(task)
     if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
         workers = 1
-    try:
-        store = run_job(job, folder, progress, workers, scheduler)
-    finally:
-        close_system()
+    store = run_job(job, folder, progress, workers, scheduler)
     return MonteCarloResult(
         store.dataset, store.file, task.method, store.earlier_points, store.damaged_batches
     )
+
+
+class RandomAnalysis(Analysis):
+    """The runs of the table [monte_carlo]."""
+
+    name = "monte_carlo"
+    needs_runs = True
+
+    @staticmethod
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
+        """Whether the study asks for runs."""
+        return bool(plans["random_overloads"].runs)
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> MonteCarloResult:
+        """Make the missing runs, and write them to their store in the folder of the study.
+
+        Raises
+        ------
+        RunError
+            where a batch fails; earlier ones are in the store.
+        """
+        assert work.folder is not None
+        rig = replace(work.rig, drive=replace(study.drive, observer=None))
+        task = RandomTask(study.config.plans["random_overloads"], rig, work.steady)
+        return run(task, work.folder, work.progress, scheduler=work.scheduler)

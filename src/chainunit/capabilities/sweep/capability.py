@@ -11,8 +11,7 @@ from ...study.file_section import FileSection
 from ...study.organs import finer_models
 from ...study.rules import MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, Rule, motor_is_chosen
 from .plan import SweepPlan
-from .reading import Sweepable, read_plan
-from .table import FIELDS, MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES, SWEPT, SweepTable
+from .table import FIELDS, MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES, SWEPT, SweepTable, read_plan
 
 
 class SweepCapability(Capability):
@@ -76,12 +75,7 @@ class SweepCapability(Capability):
 
     def plan(self, reading: FileReading) -> SweepPlan | None:
         """The plan of the table; None for a machine that was refused."""
-        if "sweep" not in reading.data or reading.machine is None:
-            return None
-        parts, values = reading.parts, reading.values
-        fixed = {"machine.ratio": "follows from the motor's rated speed"} if parts.designation else {}
-        quantities = Sweepable.of(reading.machine, values["feed"], values["run"], reading.events)
-        return read_plan(reading.form.sweep, values["sweep"], parts.machine, quantities, fixed)
+        return read_plan(reading) if "sweep" in reading.data and reading.machine is not None else None
 
 
 CAPABILITY = SweepCapability()

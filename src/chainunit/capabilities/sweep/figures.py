@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Iterator
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from itertools import pairwise, zip_longest
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,11 @@ _NARROW = 80
 """Letters of a reason in a legend."""
 
 
-def _pieces(items: Iterable[Any], size: int) -> Iterator[list[Any]]:
-    """The items in lists of this size; the last one may be shorter."""
-    whole = list(items)
-    return (whole[k : k + size] for k in range(0, len(whole), size))
+def _numbered(name: str, items: Sequence[Any], size: int) -> Iterator[tuple[str, str, Sequence[Any]]]:
+    """The items in figures of this size at most: name and file of each figure, and its items."""
+    for k, first in enumerate(range(0, len(items), size)):
+        file = f"sweep_{name}_{k + 1}.png" if k else f"sweep_{name}.png"
+        yield f"{name}-{k}" if k else name, file, items[first : first + size]
 
 
 def _axis(v: Variable, **more: Any) -> fig.Axis:
@@ -98,9 +99,8 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     items += _infeasible(summary, x, y, part["reason"].values)
     items.append(fig.Curve("the study", [across.centre], [up.centre], 1, "o", has_line=False))
     if summary.best and name == plan.best:
-        k = np.unravel_index(summary.findings.passed.best[0], plan.shape)
-        point = [float(parameter.values[int(i)]) for parameter, i in zip(plan.parameters, k, strict=True)]
-        items.append(fig.Curve(plan.best_is, [point[0]], [point[1]], 3, "s", has_line=False))
+        best = summary.best[0][across.name].value, summary.best[0][up.name].value
+        items.append(fig.Curve(plan.best_is, [best[0]], [best[1]], 3, "s", has_line=False))
     ends = [{"low": float(axis[0]), "high": float(axis[-1])} for axis in (x, y)]
     panel = fig.Panel(_axis(across.variable, **ends[0]), _axis(up.variable, **ends[1]), tuple(items))
     return fig.Figure(
@@ -113,116 +113,113 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     )
 
 
+def _reason(summary: SweepSummary, code: Any) -> str:
+    """The reason with that code, as a legend has it."""
+    return textwrap.shorten(str(summary.findings.task.reasons[int(code)]), _NARROW, placeholder=" ...")
+
+
 def _infeasible(summary: SweepSummary, x: Any, y: Any, reason: Any) -> Iterator[fig.Hatch]:
     """The cells of a map with a corner that has no result, by their reasons."""
-    corners = np.stack([reason[:-1, :-1], reason[1:, :-1], reason[:-1, 1:], reason[1:, 1:]])
-    worst = np.max(corners, axis=0)
+    worst = np.max([reason[:-1, :-1], reason[1:, :-1], reason[:-1, 1:], reason[1:, 1:]], axis=0)
     for look, code in enumerate(np.unique(worst[worst > 0])):
-        title = textwrap.shorten(str(summary.findings.task.reasons[int(code)]), _NARROW, placeholder=" ...")
-        yield fig.Hatch(title, x, y, worst == code, look)
+        yield fig.Hatch(_reason(summary, code), x, y, worst == code, look)
 
 
 def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
-    plan, points = summary.findings.plan, summary.findings.points
-    (parameter,) = plan.parameters
+    findings = summary.findings
+    (parameter,), points = findings.plan.parameters, findings.points
     part = points.isel(point=slice(None, None, -(-points.sizes["point"] // 20_000)))
-    order = np.argsort(part[parameter.name].values, kind="stable")
-    x, reason = part[parameter.name].values[order], part["reason"].values[order]
-    marks: list[fig.Item] = [fig.Mark(parameter.centre, "the study", look="mark"), *_gaps(summary, x, reason)]
-    names = [name for name in summary.findings.results if name in summary.extremes]
-    for k, some in enumerate(_pieces(names, _MOST_ROWS)):
+    part = part.isel(point=np.argsort(part[parameter.name].values, kind="stable"))
+    x = part[parameter.name].values
+    marks: list[fig.Item] = [
+        fig.Mark(parameter.centre, "the study", look="mark"),
+        *_gaps(summary, x, part["reason"].values),
+    ]
+    dots = "o" if len(x) <= 40 else ""
+    names = [name for name in findings.results if name in summary.extremes]
+    for figure_name, file, some in _numbered("curves", names, _MOST_ROWS):
         rows = (
             (
-                _axis(summary.findings.variables[name]),
-                [
-                    fig.Curve(
-                        name, x, part[name].values[order], 0, "o" if len(x) <= 40 else "", in_legend=False
-                    ),
-                    *marks,
-                ],
+                _axis(findings.variables[name]),
+                [fig.Curve(name, x, part[name].values, 0, dots, in_legend=False), *marks],
             )
             for name in some
         )
         yield fig.Figure(
-            f"curves-{k}" if k else "curves",
+            figure_name,
             f"Results over {parameter.name}: {parameter.variable.description}",
             f"Results over {parameter.name}; ranges without a result are shaded.",
             fig.stacked(_axis(parameter.variable), rows),
-            file=f"sweep_curves{f'_{k + 1}' if k else ''}.png",
+            file=file,
         )
 
 
 def _gaps(summary: SweepSummary, x: Any, reason: Any) -> Iterator[fig.Shade]:
     """The ranges of a parameter without a result."""
-    edges = np.flatnonzero(np.diff(reason)) + 1
-    for part in np.split(np.arange(len(x)), edges):
-        if reason[part[0]]:
-            low, high = x[max(0, part[0] - 1)], x[min(len(x) - 1, part[-1] + 1)]
-            title = textwrap.shorten(
-                str(summary.findings.task.reasons[int(reason[part[0]])]), _NARROW, placeholder=" ..."
-            )
-            look = ("dark", "pale", "band")[int(reason[part[0]]) % 3]
-            yield fig.Shade(0.5 * (x[part[0]] + low), 0.5 * (x[part[-1]] + high), title, look=look)
+    for rows in np.split(np.arange(len(x)), np.flatnonzero(np.diff(reason)) + 1):
+        first, last = rows[0], rows[-1]
+        if code := reason[first]:
+            low, high = x[max(0, first - 1)], x[min(len(x) - 1, last + 1)]
+            look = ("dark", "pale", "band")[code % 3]
+            yield fig.Shade(0.5 * (x[first] + low), 0.5 * (x[last] + high), _reason(summary, code), look=look)
 
 
 def _in_pairs(panels: list[fig.Panel]) -> tuple[tuple[fig.Panel | None, ...], ...]:
-    """Panels in rows of two, or below each other where there is one."""
+    """Panels in rows of two; a panel alone has the whole width."""
     if len(panels) == 1:
         return ((panels[0],),)
-    filled = [*panels, *([None] if len(panels) % 2 else [])]
-    return tuple((filled[k], filled[k + 1]) for k in range(0, len(filled), 2))
+    return tuple(zip_longest(panels[::2], panels[1::2]))
 
 
 def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
-    """Bars of the rank correlation of each result with each parameter, the largest share of the variance first."""
-    for k, some in enumerate(_pieces(summary.influences.items(), _MOST_PANELS)):
+    """Bars of the rank correlation of each result with each parameter, the largest share of the variance first; none
+    of two parameters."""
+    parameters, results = summary.findings.plan.parameters, list(summary.influences.items())
+    for figure_name, file, some in _numbered("tornado", results if len(parameters) > 2 else [], _MOST_PANELS):
         panels = []
-        for name, table in some:
+        for name, influences in some:
             size = {
                 parameter: (influence.share.value if influence.share else 0.0, abs(influence.rank))
-                for parameter, influence in table.items()
+                for parameter, influence in influences.items()
             }
-            order = sorted(table, key=size.__getitem__, reverse=True)
-            shares = [table[parameter].share for parameter in order]
+            order = sorted(influences, key=size.__getitem__, reverse=True)
+            shares = [influences[parameter].share for parameter in order]
             labels = tuple("" if x is None else f"{100.0 * x.value:.0f} %" for x in shares)
-            ranks = [table[parameter].rank for parameter in order]
+            ranks = [influences[parameter].rank for parameter in order]
             bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=labels)
             # beside the longest bars there is room for the words
             x = fig.Axis("rank correlation", low=-1.3, high=1.3, ticks=(-1.0, -0.5, 0.0, 0.5, 1.0))
-            panels.append(
-                fig.Panel(x, fig.Axis("parameter", names=tuple(order)), (bars, fig.Mark(0.0)), name)
-            )
+            y = fig.Axis("parameter", names=tuple(order))
+            panels.append(fig.Panel(x, y, (bars, fig.Mark(0.0)), name))
         rows = _in_pairs(panels)
         yield fig.Figure(
-            f"tornado-{k}" if k else "tornado",
+            figure_name,
             "Which parameter moves what; beside the bars shares of the variance that they explain alone",
             "Bars of the rank correlation between each result and each parameter.",
             rows,
-            file=f"sweep_tornado{f'_{k + 1}' if k else ''}.png",
-            heights=(max(0.6, 0.16 * len(summary.findings.plan.parameters)),) * len(rows),
+            file=file,
+            heights=(max(0.6, 0.16 * len(parameters)),) * len(rows),
         )
 
 
 def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
-    """The share of the points below each value of each result."""
-    shares = np.linspace(0.0, 1.0, 201)
-    names = [name for name in summary.influences if len(summary.sample[name])]
-    for k, some in enumerate(_pieces(names, _MOST_PANELS)):
+    """The share of the points below each value of each result; none of a sweep without a spread."""
+    shares, sample = np.linspace(0.0, 1.0, 201), summary.sample
+    names = [name for name in summary.influences if summary.spread.spread and len(sample[name])]
+    for figure_name, file, some in _numbered("spread", names, _MOST_PANELS):
         panels = []
         for name in some:
-            values = summary.sample[name][np.isfinite(summary.sample[name])]
-            x = np.quantile(values, shares)
+            x = np.quantile(sample[name][np.isfinite(sample[name])], shares)
             items: list[fig.Item] = [fig.Curve("share of the points below", x, shares, in_legend=False)]
             items += [fig.Mark(q, "5 %, 95 %", axis="y", look="thin") for q in (0.05, 0.95)]
             if name in summary.nominal:
                 items.append(fig.Mark(summary.nominal[name].value, "at the values of the study"))
             y = fig.Axis("share below", "1", "percent", low=0.0, high=1.0)
             panels.append(fig.Panel(_axis(summary.findings.variables[name]), y, tuple(items)))
-        rows = _in_pairs(panels)
         yield fig.Figure(
-            f"spread-{k}" if k else "spread",
+            figure_name,
             "Distribution of the results",
             "The share of the points below each value of each result.",
-            rows,
-            file=f"sweep_spread{f'_{k + 1}' if k else ''}.png",
+            _in_pairs(panels),
+            file=file,
         )

@@ -47,7 +47,7 @@ class SweptParameter:
     @property
     def is_normal(self) -> bool:
         """Whether its values are normally distributed."""
-        return self.distribution == "normal" and self.tolerance is not None and not self.values
+        return self.distribution == "normal"
 
     @property
     def deviation(self) -> float:

@@ -1,4 +1,5 @@
-"""Runs a sweep: its points as batches of the runner (see `chainunit.work.runner`), and its results as a dataset."""
+"""Runs a sweep: its points as batches of the runner (see `chainunit.work.runner`), and its results as a dataset. For
+measures each point starts its own drive from rest, and meets the event once it is steady."""
 
 from __future__ import annotations
 
@@ -12,35 +13,38 @@ from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ... import __version__
 from ...batch.evaluate import ReasonKind, StateReason, check_engine, reasons_of
+from ...batch.transients import can_run
 from ...core.brief import briefly_shown
-from ...core.errors import InputError
-from ...core.quantities import Layout, Quantity, Variable
+from ...core.errors import Faults, InputError
+from ...core.native.compilers import COMPILERS
+from ...core.quantities import Layout, Quantity, Variable, variables
 from ...machines.machine import Machine
 from ...reading.results import InUnit
-from ...study.block_runs import BlockRuns, Cause
+from ...study.block_runs import BlockRuns, Cause, EventRun, RunPoint
 from ...study.choice import drive_of
 from ...study.config import Config
 from ...study.cycle_quantities import CycleQuantity, cycle_quantity, evaluate
 from ...study.event import Event
-from ...study.measures import Answers
+from ...study.measures import Answers, read_measure
 from ...study.rig import Rig
+from ...study.window import Phase, Trip, Window
 from ...work.job import BatchStore, Job, ResultVariable
 from ...work.progress import TaskProgress
 from ...work.runner import check_scheduler
 from ...work.runner import run as run_job
 from .plan import SweepPlan
-from .runs import block_of, check_drive, measures
 from .table import SPEED
 
 if TYPE_CHECKING:
     import xarray as xr
 
+_RATIO = "machine.ratio"
 TITLE = "points of the sweep"
 _STATES, _STATES_OF_RATIOS, _RUNS = 12e6, 2e6, 64
 """Largest numbers of states of a batch, of states where the ratio of the gear is swept (each then has an angle of its
@@ -76,10 +80,21 @@ class SweepTask:
         return [cycle_quantity(name, self.machine.model) for name in self.plan.quantities]
 
     @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """Parameters, quantities and measures by name."""
+        declared = {parameter.name: parameter.variable for parameter in self.plan.parameters}
+        for q in self.quantities:
+            of_turn = Quantity(q.unit, q.description, kind=q.kind)
+            declared[q.name] = Variable(q.name, q.description, of_turn)
+        answers = {v.name: v for v in variables(Answers)}
+        return declared | {name: answers[name] for name in self.plan.measures}
+
+    @cached_property
     def block(self) -> BlockRuns:
-        """The runs of the measures."""
+        """The compiled system, in which the values of the sweep vary."""
         assert self.rig is not None and self.event is not None
-        return block_of(self.rig, self.plan, self.event)
+        varying = [full for parameter in self.plan.parameters for full in of_system(parameter.name)]
+        return BlockRuns(self.rig, [self.event], varying)
 
     @cached_property
     def reasons(self) -> list[StateReason]:
@@ -122,13 +137,10 @@ class SweepTask:
         )
 
     def codes_of_turns(self, table: xr.Dataset) -> Any:
-        """The codes of the sweep for those of `turns`, shape (points,)."""
-        count = len(reasons_of(self.machine.model))
-        names = {parameter.name.partition(".")[2]: parameter.name for parameter in self.plan.parameters}
-        other = self.codes[Beside.BOUNDS, ""]
-        outside = (names.get(x, x) for x in table.reason.attrs["subjects"][count:])
-        codes = [*range(count), *(self.codes.get((ReasonKind.BOUNDS, name), other) for name in outside)]
-        return np.array(codes, np.int16)[table.reason.values]
+        """The codes of the sweep for those of `turns`, shape (points,); `make_points` names a swept value that is
+        outside its bounds."""
+        code, count = table.reason.values, len(reasons_of(self.machine.model))
+        return np.where(code < count, code, self.codes[Beside.BOUNDS, ""]).astype(np.int16)
 
     def digest(self) -> str:
         """A digest of everything on which the results depend, in hexadecimal digits. The number of points of Sobol's
@@ -173,22 +185,16 @@ def plain_name(name: str) -> str:
 
 def batch_of(plan: SweepPlan) -> int:
     """The number of points of a batch, a power of 2: some tenths of a second of work, and some 100 MB."""
-    has_ratio = any(parameter.name == "machine.ratio" for parameter in plan.parameters)
+    has_ratio = any(parameter.name == _RATIO for parameter in plan.parameters)
     states = (_STATES_OF_RATIOS if has_ratio else _STATES) / plan.angles
     return _RUNS if plan.measures else 1 << max(4, int(math.log2(states)))
 
 
 def result_variables(task: SweepTask) -> list[ResultVariable]:
     """The results of a point: its parameters, its quantities and measures, and the reason why it has none."""
-    plan, answers = task.plan, {v.name: v for v in Layout(Answers).variables}
     flags = [re.sub(r"[^\w.+@-]+", "_", str(reason)).strip("_") for reason in task.reasons]
     return [
-        *(
-            ResultVariable(plain_name(p.name), p.variable.unit, p.variable.description)
-            for p in plan.parameters
-        ),
-        *(ResultVariable(plain_name(q.name), q.unit, q.description) for q in task.quantities),
-        *(ResultVariable(name, answers[name].unit, answers[name].description) for name in plan.measures),
+        *(ResultVariable(plain_name(name), v.unit, v.description) for name, v in task.variables.items()),
         ResultVariable("reason", "1", "reason for which there is no result", "int16", flags=tuple(flags)),
     ]
 
@@ -211,13 +217,95 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
         results |= {name: np.full(end - begin, np.nan) for name in plan.measures}
         sound = np.flatnonzero(reason == 0)
         if len(sound):
-            sound_values = {name: x[sound] for name, x in values.items()}
-            assert task.event is not None
-            measured, causes = measures(task.block, plan, task.event, sound_values)
-            for name, x in measured.items():
-                results[name][sound] = x
-            reason[sound] = [task.codes[cause, ""] if cause else 0 for cause in causes]
+            runs = _measures(task, {name: x[sound] for name, x in values.items()})
+            for k, measured in zip(sound, runs, strict=True):
+                if isinstance(measured, Cause):
+                    reason[k] = task.codes[measured, ""]
+                else:
+                    for name, value in measured.items():
+                        results[name][k] = value
     return results | {"reason": reason.astype(np.int16)}
+
+
+def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
+    """Refuse what the transients of a drive with this `event` cannot have.
+
+    Raises
+    ------
+    InputError
+        for an event that the drive cannot have, for a swept quantity that changes no run or is not one number of the
+        drive, and without a C compiler.
+    """
+    faults = Faults()
+    if not rig.takes(event):
+        faults.add([InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")])
+    names = rig.drive.simulated_machine.model.parameter_layout.names
+    for name in (parameter.name for parameter in plan.parameters):
+        reason = ""
+        if name == SPEED and not rig.drive.follows:
+            reason = "changes no run, as the motor has the speed of its supply"
+        elif name.startswith("machine.") and name.partition(".")[2] not in names:
+            reason = "is not of the drive"
+        elif name == _RATIO and rig.drive.whole_line:
+            reason = "is not one number of the drive"
+        if reason:
+            line = f"sweep.parameter: {name} {reason}; leave it out, or sweep it without measures"
+            faults.add([InputError(line, "sweep.parameter")])
+    if not can_run():
+        line = f"sweep.measures: need a C compiler ({COMPILERS}); install one, or leave them out"
+        faults.add([InputError(line, "sweep.measures")])
+    faults.refuse()
+
+
+def _measures(task: SweepTask, values: Mapping[str, Any]) -> Iterator[Cause | dict[str, float]]:
+    """By point, the measures of the plan by name, or the cause for which there are none. The points have these values
+    by full name, each of shape (points,)."""
+    assert task.rig is not None and task.event is not None
+    point_values = zip(*(map(float, x) for x in values.values()), strict=True)
+    points = [_point(task.rig, task.event, dict(zip(values, x, strict=True))) for x in point_values]
+    for point, run in zip(points, task.block.runs(points), strict=True):
+        if run.fault is not None:
+            yield run.fault.cause
+        else:
+            window = _window(point, run)
+            measured = {name: read_measure(name, window) for name in task.plan.measures}
+            yield {name: math.nan if value is None else value for name, value in measured.items()}
+
+
+def of_system(name: str) -> list[str]:
+    """The parameters of the compiled system that a swept quantity sets, by full name."""
+    part, _, short = name.partition(".")
+    # the machine of the feed-forward has the same parameters
+    return [name, f"model.{short}"] if part == "machine" else []
+
+
+def _point(rig: Rig, event: Event, values: Mapping[str, float]) -> RunPoint:
+    """The run with these values by full name."""
+    operation = rig.operation
+    feed = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    begin = f"event.{event.name}."
+    of_event = {name.removeprefix(begin): x for name, x in values.items() if name.startswith(begin)}
+    event = replace(event, p=replace(event.p, **of_event))
+    if _RATIO in values:
+        machine = rig.drive.machine.replace(ratio=values[_RATIO])
+        rig = replace(rig, drive=replace(rig.drive, machine=machine))
+    if feed or SPEED in values:
+        loads = Layout(type(operation.feed)).from_names(feed, operation.feed)
+        run = replace(operation.run, crank_speed=values.get(SPEED, operation.crank_speed))
+        rig = replace(rig, operation=replace(operation, feed=loads, run=run))
+    limit = rig.guards.get(rig.drive.motor_torque, math.inf)
+    system_values = {full: x for name, x in values.items() for full in of_system(name)}
+    return RunPoint(rig, event, event.time_followed(rig.operation.turn), limit=limit, values=system_values)
+
+
+def _window(point: RunPoint, run: EventRun) -> Window:
+    """The rows of a run from its event on."""
+    assert run.series is not None and run.steady is not None
+    drive, speed = point.rig.drive, point.rig.operation.crank_speed
+    steady = Window(Phase.STEADY, run.steady, drive, (), speed)
+    # the energy behind a coupling that opens is not followed
+    trip = Trip(float(run.series["time"][-1]), math.nan, None) if run.ended else None
+    return Window(Phase.EVENT, run.series, drive, (), speed, 0.0, steady, trip)
 
 
 def task_of(config: Config) -> SweepTask:
@@ -226,7 +314,7 @@ def task_of(config: Config) -> SweepTask:
     Raises
     ------
     InputError
-        for a study without a sweep or without swept parameters; of measures see `chainunit.capabilities.sweep.runs`.
+        for a study without a sweep or without swept parameters; of measures see `check_drive`.
     """
     plan: SweepPlan | None = config.plans["sweep"]
     if plan is None or not plan.parameters:
@@ -257,19 +345,8 @@ def job_of(task: SweepTask) -> Job:
     )
 
 
-BEST = 10
-"""Number of best points."""
 _PART = 2**18
-
-
-class PassedPoints(NamedTuple):
-    """The points of a sweep as they went by: `counts` by the code of their reason; by result that has values, the
-    numbers of the points with its least and its largest value (`extremes`); the numbers of the `best` points, the
-    best first."""
-
-    counts: tuple[int, ...]
-    extremes: Mapping[str, tuple[int, int]]
-    best: tuple[int, ...]
+"""Number of points that are read at a time."""
 
 
 @briefly_shown
@@ -291,15 +368,10 @@ class SweepFindings:
         """The names of all quantities and measures."""
         return (*self.plan.quantities, *self.plan.measures)
 
-    @cached_property
+    @property
     def variables(self) -> dict[str, Variable]:
         """Parameters and results by name."""
-        declared = {parameter.name: parameter.variable for parameter in self.plan.parameters}
-        for quantity in self.task.quantities:
-            of_turn = Quantity(quantity.unit, quantity.description, kind=quantity.kind)
-            declared[quantity.name] = Variable(quantity.name, quantity.description, of_turn)
-        measures = {v.name: v for v in Layout(Answers).variables}
-        return declared | {name: measures[name] for name in self.plan.measures}
+        return self.task.variables
 
     def in_unit(self, name: str, value: float | None) -> InUnit:
         """A value of a parameter or result, with its unit."""
@@ -309,41 +381,15 @@ class SweepFindings:
     def points(self) -> xr.Dataset:
         """All points over the dimension ``point``, by the names of the study: parameters, results and ``reason``. The
         values are read when they are used."""
-        plan = self.plan
-        names = {plain_name(name): name for name in (*(p.name for p in plan.parameters), *self.results)}
-        dataset = self.outcome.dataset.rename(names)
+        dataset = self.outcome.dataset.rename({plain_name(name): name for name in self.variables})
         dataset["reason"].attrs["reasons"] = [str(reason) for reason in self.task.reasons]
-        return dataset.set_coords([parameter.name for parameter in plan.parameters])
+        return dataset.set_coords([parameter.name for parameter in self.plan.parameters])
 
     def parts(self, names: Sequence[str]) -> Iterator[tuple[int, xr.Dataset]]:
         """The variables `names` of all points in parts, each with the number of its first point."""
         points = self.points[[*names]]
         for begin in range(0, points.sizes["point"], _PART):
             yield begin, points.isel(point=slice(begin, begin + _PART)).load()
-
-    @cached_property
-    def passed(self) -> PassedPoints:
-        """Reasons, extremes and best points of all points."""
-        plan, sign = self.plan, -1.0 if self.plan.best_is == "largest" else 1.0
-        counts = np.zeros(len(self.task.reasons), np.int64)
-        ends: dict[str, list[tuple[float, int]]] = {name: [] for name in self.results}
-        best: list[tuple[float, int]] = []
-        for begin, part in self.parts([*self.results, "reason"]):
-            counts += np.bincount(part["reason"].values, minlength=len(counts))
-            for name in self.results:
-                x = part[name].values
-                if np.isfinite(x).any():
-                    ends[name] += [(float(x[k]), begin + int(k)) for k in (np.nanargmin(x), np.nanargmax(x))]
-            x = sign * part[plan.best].values
-            order = np.argsort(x, kind="stable")[:BEST]
-            best += [(float(x[k]), begin + int(k)) for k in order if np.isfinite(x[k])]
-            best = sorted(best)[:BEST]
-        extremes = {
-            name: (min(places)[1], max(places, key=lambda pair: (pair[0], -pair[1]))[1])
-            for name, places in ends.items()
-            if places
-        }
-        return PassedPoints(tuple(map(int, counts)), extremes, tuple(k for _, k in best))
 
     @cached_property
     def dataset(self) -> xr.Dataset:
@@ -354,15 +400,11 @@ class SweepFindings:
         plan, points = self.plan, self.points
         if not plan.is_grid:
             return points
-        about = {parameter.name: points[parameter.name].attrs for parameter in plan.parameters}
-        axes = {
-            parameter.name: (parameter.name, list(parameter.values), about[parameter.name])
-            for parameter in plan.parameters
-        }
-        variables = {
+        axes = {p.name: (p.name, list(p.values), points[p.name].attrs) for p in plan.parameters}
+        results = {
             name: (plan.dims, x.values.reshape(plan.shape), x.attrs) for name, x in points.data_vars.items()
         }
-        return xr.Dataset(variables, axes, points.attrs)
+        return xr.Dataset(results, axes, points.attrs)
 
 
 def run_sweep(

@@ -54,8 +54,12 @@ def shares_on_grid(y: Any) -> list[Shares]:
     for i in axes:
         alone = float(np.var(np.mean(y, axis=tuple(k for k in axes if k != i)))) / whole
         in_all = float(np.mean(np.var(y, axis=i))) / whole
-        exact.append(Shares(Estimate(alone, alone, alone), Estimate(in_all, in_all, in_all)))
+        exact.append(Shares(_share(alone, alone, alone), _share(in_all, in_all, in_all)))
     return exact
+
+
+def _share(value: float, low: float, high: float) -> Estimate:
+    return Estimate(value, low, high, "1", "percent")
 
 
 def shares_of_points(parameters: Sequence[SweptParameter], x: Any, y: Any) -> list[Shares]:
@@ -85,7 +89,7 @@ def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
     c, e = fit.coefficients, fit.errors
     part, whole, rest = float(np.sum(c[some] ** 2)), float(np.sum(c[1:] ** 2)), float(np.mean(e**2))
     if not whole > 0.0:
-        return Estimate(0.0, 0.0, 1.0)
+        return _share(0.0, 0.0, 1.0)
     share = part / whole
     contribution = phi[:, some] @ c[some]
     others = phi[:, 1:] @ c[1:] - contribution
@@ -95,7 +99,7 @@ def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
     least, highest, beside = max(0.0, part - most * rest), part + most * rest, whole - part
     low = least / (least + beside + rest) - _SIGMAS * error - _ROUNDING
     high = highest / (highest + max(0.0, beside - rest)) + _SIGMAS * error + _ROUNDING
-    return Estimate(share, max(0.0, low), min(1.0, high))
+    return _share(share, max(0.0, low), min(1.0, high))
 
 
 def _most_between(x: Any, e: Any) -> float:
@@ -211,24 +215,26 @@ class _Path(NamedTuple):
 def _path(gram: Any, moment: Any, phi: Any, y: Any, most: int) -> _Path:
     """The fits of the points with these products, each with the term more that lessens the error most (orthogonal
     least squares), and their errors at the points of the fold, whose terms and values are `phi` and `y`."""
-    size = np.diag(gram)
-    left, rest = size.copy(), moment.copy()
+    squares = np.diag(gram)
+    # of each term, what the chosen terms leave: its square, and its product with the result
+    free, product = squares.copy(), moment.copy()
     basis, along, errors = np.zeros((len(gram), most)), np.zeros(most), np.empty((len(y), most))
+    columns, error = np.zeros((len(y), most)), y.copy()
     chosen: list[int] = []
-    columns, e, term = np.zeros((len(y), most)), y.copy(), 0
+    term = 0
     while True:
-        j, row = len(chosen), basis[term].copy()
-        root = math.sqrt(left[term])
+        j, row, root = len(chosen), basis[term].copy(), math.sqrt(free[term])
         basis[:, j] = (gram[:, term] - basis @ row) / root
         columns[:, j] = (phi[:, term] - columns @ row) / root
-        along[j] = rest[term] / root
-        rest -= along[j] * basis[:, j]
-        left -= basis[:, j] ** 2
-        e = e - along[j] * columns[:, j]
-        errors[:, j:] = e[:, None]
+        along[j] = product[term] / root
+        product -= along[j] * basis[:, j]
+        free -= basis[:, j] ** 2
+        error = error - along[j] * columns[:, j]
+        errors[:, j:] = error[:, None]
         chosen.append(term)
-        gain = np.where(left > 1e-6 * size, rest**2 / np.maximum(left, 1e-300), 0.0)
+        # a term that the chosen ones nearly make gains nothing
+        gain = np.where(free > 1e-6 * squares, product**2 / np.maximum(free, 1e-300), 0.0)
         gain[chosen] = 0.0
         term = int(np.argmax(gain))
-        if len(chosen) == most or gain[term] <= _NO_GAIN * size[0]:
+        if len(chosen) == most or gain[term] <= _NO_GAIN * squares[0]:
             return _Path(chosen, basis[:, : j + 1], along[: j + 1], errors)

@@ -7,11 +7,11 @@ Extremes, best points and reasons are of all points, which are read in parts. Co
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import zip_longest
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,11 @@ from .points import SweepFindings
 from .shares import LEAST_POINTS, Shares, shares_of_points, shares_on_grid
 from .table import SPEED
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+BEST = 10
+"""Number of best points."""
 SAMPLE = 2**20
 """Largest number of points behind correlations and quantiles."""
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
@@ -176,20 +181,37 @@ class SweepSummary:
         return min(12, max(4, 3 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low)))))
 
 
+@briefly_shown
+@dataclass(frozen=True)
+class SweptStudy:
+    """A study whose sweep was run. Its numbers are made once, for report and Python, when they are asked for."""
+
+    findings: SweepFindings
+
+    @cached_property
+    def summary(self) -> SweepSummary:
+        """The numbers, with texts in the units of the study."""
+        with shown_in(self.findings.config.units):
+            return summary_of(self.findings)
+
+
 def summary_of(findings: SweepFindings) -> SweepSummary:
     """The numbers of a sweep."""
-    plan, config, passed = findings.plan, findings.config, findings.passed
-    sampled = _sampled(findings)
+    plan, config, task = findings.plan, findings.config, findings.task
+    ends = _ends(findings)
+    rows: dict[int, Row] = {
+        number: {"point": InUnit(number, "1")} | {name: findings.in_unit(name, x) for name, x in row.items()}
+        for number, row in ends.points.to_dict("index").items()
+    }
+    step = -(-plan.points // SAMPLE) if plan.is_grid else 1
+    sampled = findings.points.isel(point=slice(None, step * SAMPLE, step))
     sound = sampled["reason"].values == 0
     sample = {name: sampled[name].values[sound] for name in findings.variables}
-    gaps = {
-        name: 1.0 - np.count_nonzero(np.isfinite(sample[name])) / sampled.sizes["point"]
-        for name in findings.results
-    }
+    gaps = {name: 1.0 - np.isfinite(sample[name]).sum() / len(sound) for name in findings.results}
     influences = _influences(findings, sample, gaps)
-    rows = _rows(findings, sorted({*passed.best, *(k for ends in passed.extremes.values() for k in ends)}))
     # points are those of tolerances; a parameter without one is evenly distributed
     has_spread = not plan.is_grid and any(parameter.tolerance is not None for parameter in plan.parameters)
+    evenly = [parameter.name for parameter in plan.parameters if parameter.tolerance is None]
     damaged, file = findings.outcome.damaged_batches, findings.outcome.file.name
     return SweepSummary(
         findings=findings,
@@ -201,14 +223,14 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
             states=float(plan.points) * plan.angles if plan.quantities else None,
             seed=plan.seed,
             angles=plan.angles,
-            feasible=passed.counts[0],
+            feasible=ends.counts[0],
         ),
         reasons=[
             ReasonShare(str(reason), count, count / plan.points)
-            for reason, count in list(zip(findings.task.reasons, passed.counts, strict=True))[1:]
+            for reason, count in zip(task.reasons[1:], ends.counts[1:], strict=True)
             if count
         ],
-        organs=[OrganShare(limit, count, count / plan.points) for limit, count in _organs(findings)],
+        organs=_organs(findings),
         basis=plan.basis,
         event=config.events[plan.event].title if plan.event else None,
         best_by=f"{plan.best_is} {plan.best}",
@@ -216,34 +238,50 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
         results={name: {"description": findings.variables[name].description} for name in findings.results},
         nominal={name: findings.in_unit(name, x) for name, x in _nominal(findings).items()},
         extremes={
-            name: {"least": rows[low], "largest": rows[high]} for name, (low, high) in passed.extremes.items()
+            name: {"least": rows[low], "largest": rows[high]} for name, (low, high) in ends.extremes.items()
         },
-        best=[rows[k] for k in passed.best],
+        best=[rows[k] for k in ends.best],
         influences=influences,
         gaps={name: gaps[name] for name in influences},
-        current_limit=_current_limit(findings),
+        current_limit=limit_reached(task.rig.drive, ends.points["current_peak"].dropna())
+        if task.rig is not None and "current_peak" in ends.points
+        else None,
         spread=SweepSpread(
-            [parameter.name for parameter in plan.parameters if parameter.tolerance is None]
-            if has_spread
-            else [],
-            _spread(findings, sample) if has_spread else {},
+            evenly if has_spread else [], dict(_spread(findings, sample)) if has_spread else {}
         ),
         store=PointStore(made_anew(damaged, "points", file) if damaged else None, damaged, file),
     )
 
 
-@briefly_shown
-@dataclass(frozen=True)
-class SweptStudy:
-    """A study whose sweep was run: its `findings`, and its numbers, which are made once for report and Python."""
+class _Ends(NamedTuple):
+    """The ends of all points: `counts` by the code of their reason; by result that has values, the numbers of the
+    `points` with its least and its largest value (`extremes`); the numbers of the `best` ones, the best first."""
 
-    findings: SweepFindings
+    counts: list[int]
+    extremes: dict[str, tuple[int, int]]
+    best: list[int]
+    points: pd.DataFrame
 
-    @cached_property
-    def summary(self) -> SweepSummary:
-        """The numbers, with texts in the units of the study."""
-        with shown_in(self.findings.config.units):
-            return summary_of(self.findings)
+
+def _ends(findings: SweepFindings) -> _Ends:
+    """The ends of all points, which are read in parts; of the parts that went by only the ends stay in memory."""
+    import pandas as pd
+
+    plan = findings.plan
+    counts = np.zeros(len(findings.task.reasons), np.int64)
+    kept: list[pd.DataFrame] = []
+    extremes, best = {}, []
+    for begin, points in findings.parts([*findings.variables, "reason"]):
+        counts += np.bincount(points["reason"].values, minlength=len(counts))
+        frame = points.to_dataframe()[[*findings.variables]]
+        frame.index += begin
+        candidates = pd.concat([*kept, frame])
+        present = [name for name in findings.results if np.isfinite(candidates[name]).any()]
+        extremes = {n: (int(candidates[n].idxmin()), int(candidates[n].idxmax())) for n in present}
+        ranked = candidates[plan.best][np.isfinite(candidates[plan.best])]
+        best = (ranked if plan.best_is == "least" else -ranked).nsmallest(BEST).index.tolist()
+        kept = [candidates.loc[sorted({*best, *(k for pair in extremes.values() for k in pair)})]]
+    return _Ends(counts.tolist(), extremes, best, kept[0])
 
 
 def _range(parameter: SweptParameter, is_grid: bool) -> SweptRange:
@@ -260,24 +298,6 @@ def _range(parameter: SweptParameter, is_grid: bool) -> SweptRange:
     )
 
 
-def _sampled(findings: SweepFindings) -> Any:
-    points = findings.points
-    step = -(-points.sizes["point"] // SAMPLE) if findings.plan.is_grid else 1
-    return points.isel(point=slice(None, None, step)).isel(point=slice(0, SAMPLE))
-
-
-def _rows(findings: SweepFindings, numbers: list[int]) -> dict[int, Row]:
-    """Points by their numbers."""
-    if not numbers:
-        return {}
-    some = findings.points.isel(point=numbers).load()
-    return {
-        number: {"point": InUnit(number, "1")}
-        | {name: findings.in_unit(name, float(some[name].values[k])) for name in findings.variables}
-        for k, number in enumerate(numbers)
-    }
-
-
 def _influences(
     findings: SweepFindings, sample: Mapping[str, Any], gaps: Mapping[str, float]
 ) -> dict[str, dict[str, Influence]]:
@@ -285,31 +305,27 @@ def _influences(
     from scipy.stats import rankdata
 
     plan = findings.plan
-    parameters = {parameter.name: parameter for parameter in plan.parameters}
-    ranks = {name: rankdata(sample[name]) for name in parameters}
-    table: dict[str, dict[str, Influence]] = {}
+    ranks = {parameter.name: rankdata(sample[parameter.name]) for parameter in plan.parameters}
+    influences: dict[str, dict[str, Influence]] = {}
     for name in findings.results:
         y = sample[name]
         has = np.isfinite(y)
         if has.sum() < _LEAST or np.ptp(y[has]) <= 1e-12 * np.max(np.abs(y[has])):
             continue
-        order = rankdata(y[has])
-        varying = [full for full in parameters if np.ptp(sample[full][has]) > 0.0]
-        shares: list[Shares] = []
+        order, shares = rankdata(y[has]), list[Shares]()
+        varying = [parameter for parameter in plan.parameters if np.ptp(sample[parameter.name][has]) > 0.0]
         if plan.is_grid and len(y) == plan.points and has.all():
             shares = shares_on_grid(y.reshape([n for n in plan.shape if n > 1]))
         elif gaps[name] <= MOST_GAPS and has.sum() >= LEAST_POINTS:
-            x = np.stack([sample[full][has] for full in varying], axis=1)
-            shares = shares_of_points([parameters[full] for full in varying], x, y[has])
-        table[name] = {
-            full: Influence(_correlation(ranks[full][has], order), *map(_in_percent, pair or (None, None)))
-            for full, pair in zip_longest(varying, shares)
+            x = np.stack([sample[parameter.name][has] for parameter in varying], axis=1)
+            shares = shares_of_points(varying, x, y[has])
+        influences[name] = {
+            parameter.name: Influence(
+                float(np.corrcoef(ranks[parameter.name][has], order)[0, 1]), *(pair or (None, None))
+            )
+            for parameter, pair in zip_longest(varying, shares)
         }
-    return table
-
-
-def _in_percent(share: Estimate | None) -> Estimate | None:
-    return share and replace(share, unit="1", kind="percent")
+    return influences
 
 
 def _nominal(findings: SweepFindings) -> dict[str, float]:
@@ -320,53 +336,39 @@ def _nominal(findings: SweepFindings) -> dict[str, float]:
     return {name: x for name, x in values.items() if np.isfinite(x)}
 
 
-def _organs(findings: SweepFindings) -> list[tuple[SpeedLimit, int]]:
-    """The limits of the crank speed for two bars as organs, of the study's machine and feed, each with the number
-    of points beyond it; only limits that a point passes, and none where no result depends on the organs."""
+def _organs(findings: SweepFindings) -> list[OrganShare]:
+    """The limits of the crank speed for two bars as organs, of the study's machine and feed; only limits that a point
+    passes, and none where no result depends on the organs."""
     config, plan, task = findings.config, findings.plan, findings.task
     if config.machine.in_place:
         return []
-    units = ["N"] if plan.measures else [findings.variables[name].unit for name in plan.quantities]
+    units = ["N"] if plan.measures else [q.unit for q in task.quantities]
     empties = bool(plan.event) and config.events[plan.event].empties
     limits = limits_of_organs(task.machine, config.feed, units, empties=empties)
-    if not limits or SPEED not in findings.points:
-        return [(limit, plan.points) for limit in passed_limits(limits, task.crank_speed)]
-    counts = np.zeros(len(limits), np.int64)
-    for _, some in findings.parts([SPEED]):
-        counts += [np.count_nonzero(limit.passed(some[SPEED].values)) for limit in limits]
-    return [(limit, int(count)) for limit, count in zip(limits, counts, strict=True) if count]
+    if limits and SPEED in findings.variables:
+        counts = np.zeros(len(limits), np.int64)
+        for _, points in findings.parts([SPEED]):
+            counts += [np.count_nonzero(limit.passed(points[SPEED].values)) for limit in limits]
+    else:
+        limits = tuple(passed_limits(limits, task.crank_speed))
+        counts = np.full(len(limits), plan.points)
+    return [
+        OrganShare(limit, int(count), int(count) / plan.points)
+        for limit, count in zip(limits, counts, strict=True)
+        if count
+    ]
 
 
-def _current_limit(findings: SweepFindings) -> float | None:
-    """The limit of the motor's current [A], where the largest current of the points is at it."""
-    rig, name, extremes = findings.task.rig, "current_peak", findings.passed.extremes
-    if rig is None or name not in extremes:
-        return None
-    largest = float(findings.points[name].isel(point=extremes[name][1]).values)
-    return limit_reached(rig.drive, [largest])
-
-
-def _spread(findings: SweepFindings, sample: Mapping[str, Any]) -> dict[str, ResultSpread]:
-    spread = {}
+def _spread(findings: SweepFindings, sample: Mapping[str, Any]) -> Iterator[tuple[str, ResultSpread]]:
     for name in findings.results:
-        x = sample[name][np.isfinite(sample[name])]
-        if not len(x):
-            continue
-        v = findings.variables[name]
-        estimates = {f"q{100 * q:.0f}": quantile(x, q) for q in QUANTILES}
-        spread[name] = ResultSpread(
-            findings.in_unit(name, float(np.mean(x))),
-            findings.in_unit(name, float(np.std(x))),
-            {
-                key: replace(estimate, unit=v.unit, kind=v.kind)
-                for key, estimate in estimates.items()
-                if estimate is not None
-            },
-        )
-    return spread
-
-
-def _correlation(a: Any, b: Any) -> float:
-    a, b = a - np.mean(a), b - np.mean(b)
-    size = np.sqrt(np.sum(a * a) * np.sum(b * b))
-    return float(np.sum(a * b) / size) if size > 0.0 else 0.0
+        x, v = sample[name][np.isfinite(sample[name])], findings.variables[name]
+        if len(x):
+            sizes = ((f"q{100 * q:.0f}", quantile(x, q)) for q in QUANTILES)
+            yield (
+                name,
+                ResultSpread(
+                    findings.in_unit(name, float(np.mean(x))),
+                    findings.in_unit(name, float(np.std(x))),
+                    {key: replace(size, unit=v.unit, kind=v.kind) for key, size in sizes if size is not None},
+                ),
+            )

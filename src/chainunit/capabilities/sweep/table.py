@@ -1,16 +1,23 @@
-"""The table [sweep] of a study file and its entries [[sweep.parameter]]: declarations only."""
+"""The table [sweep] of a study file and its entries [[sweep.parameter]]: their declarations, and their reader."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
-from ...core.quantities import Value, declaration, quantity
-from ...reading.lists import TableList
-from ...study.cycle_quantities import CycleBasis
+from ...core.errors import Faults, InputError, near_name, one_of, refusal_prefix, shown
+from ...core.messages import unit_behind
+from ...core.quantities import Quantity, Value, Variable, declaration, named_values, quantity, variables
+from ...reading.lists import Entry, TableList
+from ...study.cycle_quantities import CycleBasis, cycle_quantity
 from ...study.entry_values import Entered, entered, filled_text
+from ...study.event import Event
+from ...study.file_reading import FileReading
+from .plan import MOST_OF_HYPERCUBE, SweepPlan, SweptParameter
 
 SPEED = "run.crank_speed"
 METHODS = ("grid", "latin_hypercube", "sobol")
@@ -124,3 +131,189 @@ FIELDS: Mapping[str, Any] = {
     "parameter": SWEPT.field,
 }
 """Keys of the table that are no quantities, as pydantic fields."""
+
+_MOST_OF_GRID = 1_000_000_000
+_VALUES, _VALUES_OF_TOLERANCE = 11, 3
+_WAYS = {"from and to": ("from", "to"), "values": ("values",), "tolerance": ("tolerance",)}
+"""By way to give the values of a parameter, its keys."""
+
+
+def read_plan(reading: FileReading) -> SweepPlan:
+    """The plan of a checked table [sweep].
+
+    Raises
+    ------
+    InputError
+        with a line for each fault: the key, its value and the allowed range.
+    """
+    form, parts = reading.form.sweep, reading.parts
+    table: SweepTable = reading.values["sweep"]
+    faults, quantities = Faults(), _sweepable(reading)
+
+    def read(entry: Entry, name: str) -> SweptParameter:
+        return _parameter(entry, *quantities[name], form.method == "grid")
+
+    fixed = {"machine.ratio": "follows from the motor's rated speed"} if parts.designation else {}
+    swept = SWEPT.read(form.parameter, faults, read, names=quantities, fixed=fixed)
+    cycle_names, measures = tuple(dict.fromkeys(form.quantities)), tuple(dict.fromkeys(form.measures))
+    for name in cycle_names:
+        with faults.collected(), refusal_prefix("sweep.quantities: ", "sweep.quantities"):
+            cycle_quantity(name, parts.machine)
+    for name in measures:
+        if name not in MEASURES_OF_SWEEP:
+            line = f"sweep.measures: {shown(name)}: must be {one_of(name, MEASURES_OF_SWEEP)}"
+            faults.add([InputError(line, "sweep.measures")])
+    if not (cycle_names or measures):
+        cycle_names = USUAL_QUANTITIES
+    points, event = int(table.points), ""
+    with faults.collected():
+        points = _points(form.method, points, list(swept.values()))
+    with faults.collected():
+        event = _event(form, list(swept), reading.events)
+    results = *cycle_names, *measures
+    best = form.best or results[0]
+    if best not in results:
+        reason = f"must be one of the quantities and measures of the sweep: {', '.join(results)}"
+        line = f"sweep.best = {shown(best)}: {reason}{near_name(best, results)}"
+        faults.add([InputError(line, "sweep.best")])
+    faults.refuse()
+    # no value of a load is wished for: if the file does not say what is best, the largest ones come first
+    is_load = not form.best and "best_is" not in form.model_fields_set and best in LOADS_OF_SWEEP
+    return SweepPlan(
+        method=form.method,
+        seed=int(table.seed),
+        points=points,
+        parameters=tuple(swept.values()),
+        quantities=cycle_names,
+        measures=measures,
+        event=event,
+        best=best,
+        best_is="largest" if is_load else form.best_is,
+        angles=int(table.angles),
+        basis=CycleBasis(**{v.name: getattr(table, v.name) for v in variables(CycleBasis)}),
+    )
+
+
+def _sweepable(reading: FileReading) -> dict[str, tuple[Variable, float]]:
+    """The quantities of a study that a sweep may vary: by full name the declaration and the value."""
+    assert reading.machine is not None
+    pairs = [*named_values(reading.machine.p, "machine."), *named_values(reading.values["feed"], "feed.")]
+    pairs += (pair for pair in named_values(reading.values["run"], "run.") if pair[0].name == SPEED)
+    for name, event in reading.events.items():
+        pairs += (pair for pair in named_values(event.p, f"event.{name}.") if pair[0].type == "Real")
+    return {v.name: (v, x) for v, x in pairs}
+
+
+def _points(method: str, points: int, parameters: Sequence[SweptParameter]) -> int:
+    """The number of points."""
+    if method == "latin_hypercube" and points > MOST_OF_HYPERCUBE:
+        raise InputError(
+            f"sweep.points = {points}: of a Latin hypercube must be <= {MOST_OF_HYPERCUBE}, as each point "
+            'depends on all others; take method = "sobol"',
+            "sweep.points",
+        )
+    if method != "grid":
+        return points
+    product = math.prod(len(parameter.values) for parameter in parameters)
+    if product > _MOST_OF_GRID:
+        raise InputError(
+            f"sweep.parameter: the grid has {product:.3g} points: must be <= {_MOST_OF_GRID:.0e}; give fewer points, "
+            'or method = "sobol"',
+            "sweep.parameter",
+        )
+    return product
+
+
+def _event(form: Any, names: list[str], events: Mapping[str, Event]) -> str:
+    """The name of the run of the event of the measures; empty without measures."""
+    swept = list(dict.fromkeys(name.split(".")[1] for name in names if name.startswith("event.")))
+    if not form.measures:
+        if form.event:
+            raise InputError(
+                "sweep.event: is of measures; add sweep.measures, or leave it out", "sweep.event"
+            )
+        if swept:
+            raise InputError(
+                f"sweep.parameter: event.{swept[0]} changes no turn without an event; add sweep.measures",
+                "sweep.parameter",
+            )
+        return ""
+    running = [name for name, event in events.items() if not event.from_rest]
+    candidates = [form.event] if form.event else swept or running
+    wrong = [name for name in (*candidates, *swept) if name not in running]
+    if wrong or not candidates:
+        shown_name, hint = (shown(wrong[0]), near_name(wrong[0], running)) if wrong else ('""', "")
+        reason = f"must be one of the events in steady running: {', '.join(running) or 'none'}{hint}"
+        raise InputError(f"sweep.event = {shown_name}: {reason}", "sweep.event")
+    if len({*candidates, *swept}) != 1:
+        reason = f"must be given, one of {', '.join(dict.fromkeys((*candidates, *swept)))}; a sweep follows one event"
+        raise InputError(f"sweep.event: {reason}", "sweep.event")
+    return candidates[0]
+
+
+def _parameter(entry: Entry, variable: Variable, centre: float, of_grid: bool) -> SweptParameter:
+    """A parameter of the sweep, in the one of three ways that its entry has."""
+    content = entry.given
+    ways = [way for way, keys in _WAYS.items() if any(key in content for key in keys)]
+    if len(ways) != 1:
+        reason = "take one of these ways only" if ways else "has no values"
+        line = f"{entry.place} ({variable.name}): {reason}: from and to, values, or tolerance"
+        raise InputError(line, entry.place)
+    (way,), entry.more = ways, f" ({variable.name})"
+    if way == "values":
+        _without(entry, "points", "is of from and to, or of a tolerance; leave it out")
+        _without(entry, "distribution", "is of a tolerance; leave it out")
+        values = tuple(entry.quantity("values", variable, value) for value in content["values"])
+        if not values:
+            entry.fault("values", "must have at least one value")
+        if len(set(values)) < len(values):
+            entry.fault("values", "has a value twice; take one out")
+        return SweptParameter(variable, centre, values)
+    wide, usual = None, _VALUES
+    if way == "tolerance":
+        wide, usual = (
+            entry.quantity("tolerance", _tolerance_of(variable), content["tolerance"]),
+            _VALUES_OF_TOLERANCE,
+        )
+        low, high = centre - wide, centre + wide
+    else:
+        low, high = (_end(entry, name, variable) for name in ("from", "to"))
+        if not high > low and not entry.errors:
+            entry.fault("to", f"must be > from, {low:g}{unit_behind(variable.unit)}")
+    if wide is None or of_grid:
+        _without(entry, "distribution", "is of a tolerance with points that are no grid; leave it out")
+    if not of_grid:
+        _without(entry, "points", "is of a grid; the number of all points is sweep.points")
+        distribution = content.get("distribution", "uniform")
+        return SweptParameter(variable, centre, (), low, high, wide, distribution)
+    count = entry.quantity("points", _COUNT, content.get("points", usual))
+    entry.refuse()
+    values = tuple(float(x) for x in np.linspace(low, high, int(count)))
+    return SweptParameter(variable, centre, values, low, high, wide)
+
+
+_COUNT = Variable(
+    "",
+    "number of values",
+    Quantity("1", "number of values", low=2.0, high=float(MOST_VALUES), type="Integer"),
+)
+
+
+def _tolerance_of(v: Variable) -> Variable:
+    """The declaration of a tolerance of a quantity."""
+    kind = "difference" if v.unit == "K" else ""
+    q = Quantity(v.unit, f"tolerance of: {v.description}", low=0.0, open_low=True, kind=kind)
+    return Variable(v.name, q.description, q)
+
+
+def _end(entry: Entry, name: str, variable: Variable) -> float:
+    """The value of an end of a range; not a number, with a fault, where it is wrong or missing."""
+    if name in entry.given:
+        return entry.quantity(name, variable, entry.given[name])
+    entry.fault(name, "must be given, beside the other end")
+    return math.nan
+
+
+def _without(entry: Entry, key: str, reason: str) -> None:
+    if key in entry.given:
+        entry.fault(key, reason)

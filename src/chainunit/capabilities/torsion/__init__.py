@@ -28,7 +28,7 @@ class TorsionCapability(Capability):
             TorsionTable,
             keys={
                 "joint": (
-                    Literal[JOINTS],
+                    Literal[*JOINTS],
                     Field("alpha1", description="bend that the map of stability varies"),
                 ),
                 "damping_ratios": (

@@ -38,8 +38,12 @@ class TorsionTable:
     bends: Value = quantity("1", "number of bends of the map", default=14, min=2, max=1000, type="Integer")
 
 
-JOINTS = ("alpha1", "alpha2", "both")
-"""The bends that the map of stability may vary."""
+JOINTS = {
+    "alpha1": "bend of the joint on shaft 2",
+    "alpha2": "bend of the joint on shaft 3",
+    "both": "both bends",
+}
+"""The bends that the map of stability may vary, with their titles."""
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,7 @@ from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.plans import Estimates, EstimateUser, PartBeside
 from ...study.rules import MOTOR_FMU, Rule, has_sides
-from .observer_table import ObserverTable
-from .reading import WatchPlan, read_watch
-from .table import KEYS, WatchTable
+from .tables import KEYS, ObserverTable, WatchPlan, WatchTable, read_watch
 
 
 @dataclass(frozen=True)
@@ -93,10 +91,8 @@ class WatchCapability(Capability):
 
     def plan(self, reading: FileReading) -> WatchPlans:
         """The plans of the tables."""
-        data, watch = reading.data, None
-        if "watch" in data:
-            watch = read_watch(reading.form.watch, reading.values["run"].crank_speed, reading.source)
-        return WatchPlans(watch, reading.values["observer"] if "observer" in data else None)
+        watch = read_watch(reading) if "watch" in reading.data else None
+        return WatchPlans(watch, reading.values["observer"] if "observer" in reading.data else None)
 
     def files(self, data: Mapping[str, Any]) -> Iterator[FileReference]:
         """The recording, and the result of an identification."""
@@ -108,17 +104,15 @@ class WatchCapability(Capability):
     def faults(self, config: Config) -> Iterator[InputError]:
         """The refusal of an observer of a feed that is zero."""
         plans: WatchPlans = config.plans[self.name]
-        asked = {"observer": plans.observer, "watch": plans.watch}
-        tables = [name for name, plan in asked.items() if plan is not None]
-        if tables and config.machine.model.sides:
-            feed = config.feed
-            if not feed.left.material_mass + feed.right.material_mass > 0.0:
-                for table in tables:
-                    yield InputError(
-                        f"{table}: watches for a feed that moves to one side, and feed.left.material_mass and "
-                        f"feed.right.material_mass are 0 kg; give the feed of normal running, or leave [{table}] out",
-                        key=table,
-                    )
+        feed, asked = config.feed, {"observer": plans.observer, "watch": plans.watch}
+        if not config.machine.model.sides or feed.left.material_mass + feed.right.material_mass > 0.0:
+            return
+        for table in (name for name, plan in asked.items() if plan is not None):
+            yield InputError(
+                f"{table}: watches for a feed that moves to one side, and feed.left.material_mass and "
+                f"feed.right.material_mass are 0 kg; give the feed of normal running, or leave [{table}] out",
+                key=table,
+            )
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Who notices an event."""

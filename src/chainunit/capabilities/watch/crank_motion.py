@@ -34,46 +34,46 @@ def crank_motion(recording: Recording, angle: float, ratio: float) -> tuple[Any,
     InputError
         for a recording with neither an encoder nor a mark beside a speed.
     """
+    from scipy.integrate import cumulative_trapezoid
+
     columns, time = recording.columns, recording.time
+    w = measured_speed(recording, ratio)
     if "motor.count" in columns:
         # the count is rounded down
         phi = angle + (columns["motor.count"] + 0.5) * (2.0 * math.pi / COUNTS) / ratio
-        w = measured_speed(recording, ratio)
         return phi, _counted_speed(recording, phi) if w is None else w
-    w, passed = measured_speed(recording, ratio), mark_times(recording)
+    passed = mark_times(recording)
     if w is None or len(passed) < 3:
         raise InputError(
             f"{recording.source}: the angle of the crank is not known; must have a column motor.count, or mark with "
             "three passes beside motor.w or crank.w"
         )
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (w[1:] + w[:-1]) * np.diff(time))])
-    ahead = angle + 2.0 * math.pi * _turns(passed) - np.interp(passed, time, way)
-    smooth = np.empty(len(passed))
-    for k in range(len(passed)):
-        near = slice(max(0, k - NEIGHBOURS), k + NEIGHBOURS + 1)
-        smooth[k] = np.polynomial.Polynomial.fit(passed[near], ahead[near], 1)(passed[k])
-    return way + _extended(time, passed, smooth), w
+    way, gaps = cumulative_trapezoid(w, time, initial=0.0), np.diff(passed)
+    # a gap of the recording may hide some turns
+    turns = np.append(0.0, np.cumsum(np.round(gaps / np.median(gaps))))
+    ahead = angle + 2.0 * math.pi * turns - np.interp(passed, time, way)
+    neighbours = (slice(max(0, k - NEIGHBOURS), k + NEIGHBOURS + 1) for k in range(len(passed)))
+    smooth = [
+        _line(passed[near], ahead[near])(instant) for near, instant in zip(neighbours, passed, strict=True)
+    ]
+    return way + _extended(time, passed, np.array(smooth)), w
 
 
-def _turns(passed: Any) -> Any:
-    """The number of the turn at each pass; a gap may hide some."""
-    gaps = np.diff(passed)
-    return np.concatenate([[0.0], np.cumsum(np.round(gaps / np.median(gaps)))])
+def _line(x: Any, y: Any) -> Any:
+    """The straight line through points, a polynomial."""
+    return np.polynomial.Polynomial.fit(x, y, 1)
 
 
 def _counted_speed(recording: Recording, phi: Any) -> Any:
     """The speed that an encoder gives with these angles."""
-    half = max(1, round(0.5 * WINDOW / recording.step))
-    last = len(phi) - 1
-    later, sooner = (np.clip(np.arange(last + 1) + sign * half, 0, last) for sign in (1, -1))
+    half, rows = max(1, round(0.5 * WINDOW / recording.step)), np.arange(len(phi))
+    later, sooner = np.minimum(rows + half, rows[-1]), np.maximum(rows - half, 0)
     return (phi[later] - phi[sooner]) / (recording.time[later] - recording.time[sooner])
 
 
 def _extended(time: Any, places: Any, values: Any) -> Any:
     """Linear between the points, and beyond them on the lines through their first and last ones."""
-    inside = np.interp(time, places, values)
     few = min(len(places), NEIGHBOURS + 1)
-    first, last = (
-        np.polynomial.Polynomial.fit(places[s], values[s], 1) for s in (slice(few), slice(-few, None))
-    )
-    return np.where(time < places[0], first(time), np.where(time > places[-1], last(time), inside))
+    first, last = _line(places[:few], values[:few])(time), _line(places[-few:], values[-few:])(time)
+    outside = [time < places[0], time > places[-1]]
+    return np.select(outside, [first, last], np.interp(time, places, values))

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...core.engines import casadi_
-from ...core.errors import InputError
 from ...drives.gearing import felt_share
 from ...machines.load_declarations import Inputs
 from ...machines.load_filter import UNKNOWNS
@@ -29,25 +28,16 @@ class FalseLoads:
     by_parameter: Mapping[str, Any]
 
     @property
-    def feed(self) -> tuple[float, float]:
-        """Standard deviations of the feed of the left and of the right side [kg]."""
-        return self._deviation(0), self._deviation(1)
-
-    @property
     def imbalance(self) -> float:
         """Standard deviation of the false imbalance of the feed [kg]: `imbalance.uncertainty` of the observer."""
-        return self._deviation(0, 1)
+        return self._deviation([1.0, -1.0, 0.0, 0.0, 0.0])
 
     @property
     def force_imbalance(self) -> float:
         """Standard deviation of the false imbalance of the forces [N]: `imbalance.force_uncertainty`."""
-        return self._deviation(2, 3)
+        return self._deviation([0.0, 0.0, 1.0, -1.0, 0.0])
 
-    def _deviation(self, plus: int, minus: int | None = None) -> float:
-        direction = np.zeros(len(LOADS))
-        direction[plus] = 1.0
-        if minus is not None:
-            direction[minus] = -1.0
+    def _deviation(self, direction: list[float]) -> float:
         return math.sqrt(max(float(direction @ self.covariance @ direction), 0.0))
 
 
@@ -70,24 +60,16 @@ def false_loads(
     Parameters
     ----------
     p : parameters of `LoadObserver`
-    names : parameters that are uncertain, by full name
-    covariance : of these parameters, shape (names, names)
+    names : numbers that are uncertain, by full name; one that the observer does not know counts as right
+    covariance : of their errors, shape (names, names)
     crank_speed : mean speed of the crank [rad/s]
     acceleration : of the crank at `ANGLES` even angles of a turn from 0 [rad/s2], shape (ANGLES,), or one number
-
-    Raises
-    ------
-    InputError
-        for an unknown parameter, and a covariance of another shape.
     """
     import casadi
 
-    layout, sigma = LoadObserver.parameter_layout, np.atleast_2d(np.asarray(covariance, float))
-    for name in names:
-        if name not in layout.names:
-            raise InputError(f"{name}: is no parameter of {LoadObserver.name}")
-    if sigma.shape != (len(names), len(names)):
-        raise InputError(f"covariance: has the shape {sigma.shape}, must be {(len(names), len(names))}")
+    layout = LoadObserver.parameter_layout
+    places = [k for k, name in enumerate(names) if name in layout.names]
+    names, sigma = [names[k] for k in places], np.asarray(covariance, float)[np.ix_(places, places)]
     symbols, phi, a = casadi.SX.sym("p", len(names)), casadi.SX.sym("phi"), casadi.SX.sym("a")
     parameters = layout.from_names(dict(zip(names, casadi.vertsplit(symbols), strict=True)), p)
     u = Inputs(phi=phi, w=crank_speed * p.ratio)
@@ -105,16 +87,10 @@ def false_loads(
     missing = b.inertia * (b.acceleration - a * p.ratio)
     rows = casadi.horzcat(*(b.inertia * g for g in b.gradient[1:]), casadi.jacobian(missing, symbols))
     function = casadi.Function("rows", [symbols, phi, a], [rows])
-    values = layout.by_name(p)
-    angles = np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
-    accelerations = np.broadcast_to(np.asarray(acceleration, float), (ANGLES,))
-    numbers = [values[name] for name in names]
-    table = np.array(
-        [
-            np.asarray(function(numbers, q * p.ratio, x)).ravel()
-            for q, x in zip(angles, accelerations, strict=True)
-        ]
-    )
+    values, turn = layout.by_name(p), np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
+    accelerations = np.broadcast_to(np.asarray(acceleration, float), (1, ANGLES))
+    numbers = np.outer([values[name] for name in names], np.ones(ANGLES))
+    table = np.array(function.map(ANGLES)(numbers, turn[None] * p.ratio, accelerations)).reshape(ANGLES, -1)
     loads, errors = table[:, : len(LOADS)], table[:, len(LOADS) :]
     # the observer's machine has the error, the loads make up for it
     answer = -np.linalg.lstsq(loads, errors, rcond=None)[0]

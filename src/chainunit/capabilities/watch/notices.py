@@ -140,23 +140,26 @@ class ObserverAnalysis(Analysis):
         out: the observer learns the loads in it."""
         if "steady" not in study.answers:
             return None
-        steady, begin = study.steady, study.steady_begin
+        steady, events = study.steady, study.config.events
         normal = peak(steady["machine.rocker.tau"].values)
         after = {
             name: from_event_on(study, name)
             for name in study.event
-            if name in study.answers and not study.config.events[name].from_rest
+            if name in study.answers and not events[name].from_rest
         }
-        start = study.runs["start_up"].sel(time=slice(None, begin))
-        alarm = _first(start, np.abs(start["observer.alarm"].values) > 0.5)
+        start = study.runs["start_up"].sel(time=slice(None, study.steady_begin))
+        resonance = None
+        if study.drive.machine.in_place:
+            _, mode = slack_and_mode(study.drive.chain_unit, study.config.feed)
+            resonance = study.config.run.crank_speed / mode
         return ObserverFindings(
-            {name: dict(_notices(study, name, run, normal)) for name, run in after.items()},
-            {name: _side(run) for name, run in after.items()},
-            {name: study.config.events[name].loaded_side for name in after},
-            _observed(steady, normal),
-            alarm,
-            bool(np.any(np.abs(steady["observer.alarm"].values) > 0.5)),
-            _resonance(study),
+            notices={name: dict(_notices(study, name, run, normal)) for name, run in after.items()},
+            named={name: _side(run) for name, run in after.items()},
+            loaded={name: events[name].loaded_side for name in after},
+            steady=_observed(steady, normal),
+            alarm_in_start=_first(start["time"].values, _is_alarm(start)),
+            alarms_in_steady=bool(np.any(_is_alarm(steady))),
+            resonance=resonance,
         )
 
 
@@ -172,48 +175,37 @@ def _observed(steady: xr.Dataset, normal: float) -> Observed:
     )
 
 
-def _resonance(study: StudyRecord) -> float | None:
-    if not study.drive.machine.in_place:
-        return None
-    _, mode = slack_and_mode(study.drive.chain_unit, study.config.feed)
-    return study.config.run.crank_speed / mode
+def _is_alarm(run: xr.Dataset) -> Any:
+    """Whether the observer raises an alarm, at each row of a run."""
+    return np.abs(run["observer.alarm"].values) > 0.5
 
 
-def _first(run: xr.Dataset, is_noticed: Any) -> float | None:
+def _first(time: Any, is_noticed: Any) -> float | None:
     """The time of the first row at which something is noticed [s]."""
-    rows = np.flatnonzero(is_noticed)
-    return float(run["time"][rows[0]]) if rows.size else None
+    return next(map(float, time[is_noticed]), None)
 
 
 def _side(run: xr.Dataset) -> str:
     """The side of the first alarm; empty without an alarm."""
-    alarm = run["observer.alarm"].values
-    rows = np.flatnonzero(np.abs(alarm) > 0.5)
-    return ("left" if alarm[rows[0]] > 0.0 else "right") if rows.size else ""
+    first = run["observer.alarm"].values[_is_alarm(run)][:1]
+    return "" if not first.size else "left" if first[0] > 0.0 else "right"
 
 
 def _notices(study: StudyRecord, name: str, run: xr.Dataset, normal: float) -> Iterator[tuple[str, Notice]]:
     """The notice of each device that the drive has, by its name. `run` is that of the event from its begin on."""
-    begin, answers = study.event[name], study.answers[name]
-    time, torque = run["time"].values - begin, np.abs(run["machine.rocker.tau"].values)
-    for device, noticed in _times(study, run, begin, answers):
+    drive, motor, answers = study.drive, study.drive.motor, study.answers[name]
+    time, torque = run["time"].values - study.event[name], np.abs(run["machine.rocker.tau"].values)
+    times: dict[str, float | None] = {}
+    if drive.rated_current is not None:
+        times["thermal_relay"] = answers.thermal_trip_time
+    if study.config.coupling is not None:
+        times["torque_limiter"] = answers.coupling_trip_time
+    limit = motor.current_limit(drive.parameters)
+    if limit is not None:
+        current = np.abs(run[f"motor.{motor.current}"].values)
+        times["current_limit"] = _first(time, current >= AT_LIMIT * limit)
+    times["observer"] = _first(time, _is_alarm(run))
+    for device, noticed in times.items():
         # a row that is nearer than a millionth of a step is that of the notice
         until = time[-1] if noticed is None else noticed + 1e-6 * study.config.run.step
         yield device, Notice(time=noticed, carried=float(np.max(torque[time <= until])) / normal)
-
-
-def _times(
-    study: StudyRecord, run: xr.Dataset, begin: float, answers: Any
-) -> Iterator[tuple[str, float | None]]:
-    """The time from the event to the notice of each device that the drive has [s]."""
-    drive, motor = study.drive, study.drive.motor
-    if drive.rated_current is not None:
-        yield "thermal_relay", answers.thermal_trip_time
-    if study.config.coupling is not None:
-        yield "torque_limiter", answers.coupling_trip_time
-    limit = motor.current_limit(drive.parameters)
-    if limit is not None:
-        first = _first(run, np.abs(run[f"motor.{motor.current}"].values) >= AT_LIMIT * limit)
-        yield "current_limit", None if first is None else first - begin
-    first = _first(run, np.abs(run["observer.alarm"].values) > 0.5)
-    yield "observer", None if first is None else first - begin

@@ -18,7 +18,7 @@ from ...study.drive import Drive
 from ...study.plans import Estimates
 from ...system import ModelComponent
 from .false_loads import false_loads
-from .observer_table import ObserverTable
+from .tables import ObserverTable
 
 FEED_SPREAD = 0.5
 """Standard deviation of the feed of a side from the usual one, as a share."""
@@ -120,13 +120,9 @@ def false_imbalance(
     Parameters
     ----------
     values : parameters of the observer by name; others have their declared values
-    names : numbers of which the `covariance`, shape (names, names), is known; a number that the observer does not
-        know counts as right
-    crank_speed : mean speed of the crank [rad/s]
+    names, covariance, crank_speed : see `false_loads`
     """
     layout = LoadObserver.parameter_layout
-    places = [k for k, name in enumerate(names) if name in layout.names]
     parameters = layout.from_names({name: x for name, x in values.items() if name in layout.names})
-    sigma = np.asarray(covariance)[np.ix_(places, places)]
-    loads = false_loads(parameters, [names[k] for k in places], sigma, crank_speed)
+    loads = false_loads(parameters, names, covariance, crank_speed)
     return {"uncertainty": loads.imbalance, "force_uncertainty": loads.force_imbalance}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,11 @@ from ...recordings.residuals import EXCESS_NOISE
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.cited import cited, exact, number, source_line, table
-from ...report.lines import Name, filled, join, line
+from ...report.lines import Name, Number, filled, join, line
 from ...report.task import Task
 from ...study.config import Config
 from .result import WatchSummary, summary_of
-from .watch import WatchedRecording, watch
+from .watch import Alarm, watch
 
 PICTURES = ("loads.png", "imbalance.png")
 _USUAL = {
@@ -34,13 +34,12 @@ _USUAL = {
 """The rows of the table of usual values."""
 
 
-def watch_report(watched: WatchedRecording) -> b.Report:
+def watch_report(summary: WatchSummary) -> b.Report:
     """The report on a watched recording."""
-    summary = summary_of(watched)
-    x = cited(summary)
-    with shown_in(watched.config.units):
+    x, config = cited(summary), summary.watched.config
+    with shown_in(config.units):
         return b.Report(
-            watched.config.title or "Watched recording",
+            config.title or "Watched recording",
             "Watch for one-sided overload",
             as_data(summary),
             tuple(_opening(x)),
@@ -50,36 +49,50 @@ def watch_report(watched: WatchedRecording) -> b.Report:
                 b.Section("basis", "Basis of the numbers", tuple(_basis(x))),
             ),
             source=source_line(x.heading),
-            units=watched.config.units,
+            units=config.units,
             opening_title="The answer",
             status="alarm" if summary.alarms else "no alarm",
         )
 
 
-TASK: Task[Config, WatchedRecording] = Task(
+TASK: Task[Config, WatchSummary] = Task(
     "watch",
-    lambda config, folder, progress: watch(config, progress),
+    lambda config, folder, progress: summary_of(watch(config, progress)),
     watch_report,
     files=PICTURES,
     content=WatchSummary,
-    shortfall=lambda watched: None if watched.is_described else "",
-    alarmed=lambda watched: bool(watched.alarms),
+    shortfall=lambda summary: None if summary.is_described else "",
+    alarmed=lambda summary: bool(summary.alarms),
 )
 
 
 def _opening(x: WatchSummary) -> Iterator[b.Block]:
+    yield from _cautions(x)
+    if not x.alarms:
+        turns, duration = number(x.recording.turns, 3), number(x.recording.duration, 3)
+        yield b.Judgement("good", filled("No alarm in {} turns ({}).", turns, duration))
+    for alarm in x.alarms:
+        if alarm.in_learning:
+            yield b.Text(
+                "This alarm is within the time of learning: the recording may begin in an overload, or the study's "
+                "feed is not that of its begin."
+            )
+        overload = "Overload of the {} side from {} on, by the {}."
+        yield b.Judgement("alarm", filled(overload, alarm.side, number(alarm.begin, 4), alarm.imbalance))
+    yield from _limits(x)
+
+
+def _cautions(x: WatchSummary) -> Iterator[b.Block]:
+    """What the engineer has to know of recording and machine before the alarms."""
     if not x.is_described:
-        yield b.Judgement(
-            "bad",
-            line(
-                "The machine of this study does not describe the begin of the recording (",
-                join(x.doubts, "; "),
-                "): its alarms may be those of a wrong machine. ",
-                "If the feed was another one, state it ([feed]), or widen its deviation (watch.feed_deviation)."
-                if x.of_feed_alone
-                else "Identify the machine first.",
-            ),
+        remedy = "Identify the machine first."
+        if x.of_feed_alone:
+            remedy = "If the feed was another one, state it ([feed]), or widen its deviation (watch.feed_deviation)."
+        doubt = (
+            "The machine of this study does not describe the begin of the recording ({}): its alarms may be those of "
+            "a wrong machine. {}"
         )
+        yield b.Judgement("bad", filled(doubt, join(x.doubts, "; "), remedy))
     if x.failed_identification:
         failed = (
             "The identification of this machine failed: its model does not describe its recordings. The errors of "
@@ -99,49 +112,40 @@ def _opening(x: WatchSummary) -> Iterator[b.Block]:
     for gap in x.gaps:
         rows = "No rows from {} to {}: the observer starts anew behind this gap."
         yield b.Judgement("remark", filled(rows, number(gap.begin, 4), number(gap.end, 4)))
-    if not x.alarms:
-        turns, duration = number(x.recording.turns, 3), number(x.recording.duration, 3)
-        yield b.Judgement("good", filled("No alarm in {} turns ({}).", turns, duration))
-    for alarm in x.alarms:
-        if alarm.in_learning:
-            yield b.Text(
-                "This alarm is within the time of learning: the recording may begin in an overload, or the study's "
-                "feed is not that of its begin."
-            )
-        overload = "Overload of the {} side from {} on, by the {}."
-        yield b.Judgement("alarm", filled(overload, alarm.side, number(alarm.begin, 4), alarm.ground))
-    limits = x.thresholds
-    yield b.Text(
-        filled(
-            "The thresholds of an alarm follow from the permitted false alarms in a million turns ({}). According to "
-            "the angle of the crank, that of the imbalance of the feed is {} to {}, that of the processing forces {} "
-            "to {}.",
-            exact(x.tuning["alarm.rate"]),
-            number(limits.feed_threshold_least, 3),
-            number(limits.feed_threshold_most, 3),
-            number(limits.force_threshold_least, 3),
-            number(limits.force_threshold_most, 3),
-        )
+
+
+def _limits(x: WatchSummary) -> Iterator[b.Block]:
+    """On what the thresholds rest."""
+    limits, is_identified = x.thresholds, x.identification is not None
+    ends = (
+        limits.feed_threshold_least,
+        limits.feed_threshold_most,
+        limits.force_threshold_least,
+        limits.force_threshold_most,
     )
-    false, named = x.false_imbalance, x.identification is not None
-    deviations = number(false.uncertainty, 2), number(false.force_uncertainty, 2)
+    sentences = (
+        "The thresholds of an alarm follow from the permitted false alarms in a million turns ({}). According to the "
+        "angle of the crank, that of the imbalance of the feed is {} to {}, that of the processing forces {} to {}."
+    )
+    yield b.Text(filled(sentences, exact(x.tuning["alarm.rate"]), *(number(end, 3) for end in ends)))
+    deviations = number(limits.uncertainty, 2), number(limits.force_uncertainty, 2)
     if not any(deviation.value for deviation in deviations):
         remedy = (
-            "The identification sought no number of the machine that the observer knows."
-            if named
-            else "Name the result of an identification (identification) to have their errors in the thresholds."
+            "Name the result of an identification (identification) to have their errors in the thresholds."
         )
+        if is_identified:
+            remedy = "The identification sought no number of the machine that the observer knows."
         yield b.Text(f"The thresholds take the numbers of the machine for exact. {remedy}")
-    else:
-        cause = "Errors of the machine's parameters make"
-        if named:
-            cause = "The machine's parameters are those of an identification. Their errors make"
-        effect = (
-            " a false imbalance of {} and {} (standard deviations); the thresholds of feed and forces are wider by "
-            "the factors {} and {}."
-        )
-        factors = number(false.widening, 3), number(false.force_widening, 3)
-        yield b.Text(filled(cause + effect, *deviations, *factors))
+        return
+    cause = "Errors of the machine's parameters make"
+    if is_identified:
+        cause = "The machine's parameters are those of an identification. Their errors make"
+    effect = (
+        " a false imbalance of {} and {} (standard deviations); the thresholds of feed and forces are wider by the "
+        "factors {} and {}."
+    )
+    factors = number(limits.widening, 3), number(limits.force_widening, 3)
+    yield b.Text(filled(cause + effect, *deviations, *factors))
 
 
 def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
@@ -161,14 +165,12 @@ def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
             "note",
         )
     course = {name: np.asarray(values.value, float) for name, values in summary.course.items()}
-    time, axis, marks = course["time"], fig.Axis("time", "s"), tuple(_marks(summary))
+    time, marks = course["time"], tuple(_marks(summary))
     panels = []
     for name, title, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
-        courses = {side: course[f"{side}.{name}"] for side in ("left", "right")}
-        low, high = _span(time, list(courses.values()))
-        items = [fig.Curve(side, time, load, look) for look, (side, load) in enumerate(courses.items())]
-        y = fig.Axis(title, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*marks, *items)),))
+        sides = {side: course[f"{side}.{name}"] for side in ("left", "right")}
+        curves = (fig.Curve(side, time, load, look) for look, (side, load) in enumerate(sides.items()))
+        panels.append(_panel(title, unit, time, list(sides.values()), (*marks, *curves)))
     yield fig.Figure(
         "loads",
         "Estimated loads",
@@ -179,10 +181,9 @@ def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
     panels = []
     for name, title, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
         imbalance, limit = course[f"imbalance.{name}"], course[f"imbalance.{name}_threshold"]
-        low, high = _span(time, [imbalance, limit, -limit])
         band = fig.Between("below the threshold", time, -limit, limit, "band")
-        y = fig.Axis(title, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*marks, band, fig.Curve("imbalance", time, imbalance, 0))),))
+        curve = fig.Curve("imbalance", time, imbalance, 0)
+        panels.append(_panel(title, unit, time, [imbalance, limit, -limit], (*marks, band, curve)))
     yield fig.Figure(
         "imbalance",
         "Imbalance and thresholds",
@@ -192,13 +193,16 @@ def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
     )
 
 
-def _span(time: Any, courses: list[Any]) -> tuple[float, float]:
-    """The ends of an axis: of the values after the first tenth of the time, in which the observer settles."""
+def _panel(
+    title: str, unit: str, time: Any, courses: list[Any], items: tuple[fig.Item, ...]
+) -> tuple[fig.Panel]:
+    """A panel over the time, whose axis shows the courses after the first tenth, in which the observer settles."""
     settled = time > time[0] + 0.1 * (time[-1] - time[0])
-    values = np.concatenate([x[settled] for x in courses])
+    values = np.concatenate([course[settled] for course in courses])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     wide = 0.1 * (high - low) or 1.0
-    return low - wide, high + wide
+    axis = fig.Axis(title, unit, low=low - wide, high=high + wide)
+    return (fig.Panel(fig.Axis("time", "s"), axis, items),)
 
 
 def _marks(summary: WatchSummary) -> Iterator[fig.Shade]:
@@ -213,27 +217,22 @@ def _marks(summary: WatchSummary) -> Iterator[fig.Shade]:
 def _alarms(x: WatchSummary) -> Iterator[b.Block]:
     if not x.alarms:
         yield b.Text("There is none.")
+
+    def output(name: str) -> Callable[[Alarm], Number]:
+        return lambda alarm: number(alarm.outputs[name], 3)
+
     yield from table(
         x.alarms,
         ("side", lambda alarm: alarm.side),
         ("from", lambda alarm: number(alarm.begin, 5)),
         ("to", lambda alarm: "the end" if alarm.lasts else number(alarm.end, 5)),
-        ("ground", lambda alarm: alarm.ground),
+        ("ground", lambda alarm: alarm.imbalance),
         (b.Column("largest at", form="long"), lambda alarm: number(alarm.at, 5)),
-        (
-            b.Column("imbalance of the feed", "imbalance"),
-            lambda alarm: number(alarm.values["imbalance.feed"], 3),
-        ),
-        ("threshold", lambda alarm: number(alarm.values["imbalance.feed_threshold"], 3)),
-        (
-            b.Column("imbalance of the forces", "forces", form="long"),
-            lambda alarm: number(alarm.values["imbalance.force"], 3),
-        ),
-        (
-            b.Column("threshold", form="long"),
-            lambda alarm: number(alarm.values["imbalance.force_threshold"], 3),
-        ),
-        (b.Column("rocker torque", form="long"), lambda alarm: number(alarm.values["rocker.tau"], 3)),
+        (b.Column("imbalance of the feed", "imbalance"), output("imbalance.feed")),
+        ("threshold", output("imbalance.feed_threshold")),
+        (b.Column("imbalance of the forces", "forces", form="long"), output("imbalance.force")),
+        (b.Column("threshold", form="long"), output("imbalance.force_threshold")),
+        (b.Column("rocker torque", form="long"), output("rocker.tau")),
         title="Alarms, with the values at the largest imbalance in parts of its threshold",
     )
 

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from ...core.quantities import Variable, quantity
+from ...core.quantities import quantity
 from ...machines.load_observer import LoadObserver
 from ...reading.results import InUnit, part, result
 from ...reading.text import shown_in
 from ...recordings.fit import FittedValue, fitted_values
-from ...recordings.residuals import ResidualTest
+from ...recordings.inspection import constant_parts
+from ...recordings.problem import speed_column
+from ...recordings.residuals import ResidualTest, describes, prior_conflicts, sensor_conflicts
 from ...study.heading import Heading
-from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name
+from .watch import GAP, GROUNDS, OUTPUTS, Alarm, Begin, WatchedRecording, columns_watched, declared_outputs
 
 ROWS = 1500
 """Most rows of a course in the result."""
-GROUNDS = {"feed": "imbalance of the feed", "force": "imbalance of the processing forces"}
 
 
 @result
@@ -34,34 +37,14 @@ class WatchedFile:
 
 
 @result
-class ReportedAlarm:
-    """An alarm."""
-
-    side: str = part("side that is overloaded")
-    ground: str = part("the imbalance on which it rests")
-    begin: float = quantity("s", "its begin")
-    end: float = quantity("s", "its end")
-    lasts: bool = part("whether it lasts up to the end of the recording")
-    in_learning: bool = part("whether it begins in the time of learning")
-    turn: float = quantity("1", "turns of the crank before its begin")
-    at: float = quantity("s", "time at which its statistic is largest")
-    values: Mapping[str, InUnit] = part("outputs of the observer at this time")
-
-
-@result
 class Thresholds:
-    """The range of the thresholds over the crank angle, after the time of learning."""
+    """The range of the thresholds over the crank angle, after the time of learning, and how far they are wider by the
+    false imbalance that errors of the machine's parameters make."""
 
     feed_threshold_least: float = quantity("kg", "imbalance of the feed, least threshold")
     feed_threshold_most: float = quantity("kg", "imbalance of the feed, largest threshold")
     force_threshold_least: float = quantity("N", "imbalance of the forces, least threshold")
     force_threshold_most: float = quantity("N", "imbalance of the forces, largest threshold")
-
-
-@result
-class FalseImbalance:
-    """The false imbalance by errors of the machine's parameters."""
-
     uncertainty: float = quantity("kg", "false imbalance of the feed by errors of the machine's parameters")
     force_uncertainty: float = quantity(
         "N", "false imbalance of the forces by errors of the machine's parameters"
@@ -91,6 +74,7 @@ class UsualOutput:
 class WatchSummary:
     """The alarms and their basis: the content of a watch's result.json."""
 
+    watched: WatchedRecording
     heading: Heading = part(inline=True)
     recording: WatchedFile = part(inline=True)
     learned: Mapping[str, FittedValue] = part("numbers that were learned from the begin of the recording")
@@ -98,9 +82,8 @@ class WatchSummary:
     residuals: tuple[ResidualTest, ...] = part("tests of the residuals at the begin")
     doubts: list[str] = part("why the machine of the study does not describe the begin")
     of_feed_alone: bool = part("whether nothing but another feed speaks against the machine of the study")
-    alarms: list[ReportedAlarm] = part("the alarms in order")
+    alarms: tuple[Alarm, ...] = part("the alarms in order")
     thresholds: Thresholds = part(inline=True)
-    false_imbalance: FalseImbalance = part(inline=True)
     noise: Mapping[str, float] = part("noise of signal and speed over the stated noise", unit="1")
     constant_parts: list[str] = part("parts in which a column keeps a value, in words")
     gaps: list[Gap] = part("parts without rows, behind which the observer starts anew")
@@ -118,9 +101,20 @@ def summary_of(watched: WatchedRecording) -> WatchSummary:
 
 
 def _summary(watched: WatchedRecording) -> WatchSummary:
-    plan, recording, p = watched.plan, watched.recording, watched.parameters
-    duration = float(recording.time[-1] - recording.time[0])
+    plan, recording, begin = watched.plan, watched.recording, watched.begin
+    learning, start, sought = plan.table.learning, float(recording.time[0]), begin.problem.sought
+    duration = float(recording.time[-1]) - start
+    settled = recording.time > start + learning
+    (feed_least, feed_most), (force_least, force_most) = (
+        map(float, np.percentile(watched.outputs[f"imbalance.{ground}_threshold"][settled], [2.0, 98.0]))
+        for ground in GROUNDS
+    )
+    loads = {load.name for load in sought}
+    columns = *columns_watched(recording).values(), speed_column(recording)
+    every = max(1, -(-len(recording.time) // ROWS))
+    declared = declared_outputs()
     return WatchSummary(
+        watched=watched,
         heading=Heading.of(watched.config.title, watched.config.file),
         recording=WatchedFile(
             file=str(plan.file),
@@ -129,77 +123,63 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
             duration=duration,
             turns=duration / plan.turn,
             crank_speed=plan.crank_speed,
-            learning=plan.learning,
+            learning=learning,
         ),
         learned={
-            file_name(unknown.name): fitted
-            for unknown, fitted in fitted_values(watched.problem, watched.learned)
+            _file_name(unknown.name): fitted
+            for unknown, fitted in fitted_values(begin.problem, begin.fit)
             # without the orders of a motion
             if ".order." not in unknown.name
         },
-        is_described=watched.is_described,
-        residuals=watched.residual_tests,
-        doubts=[
-            *(() if watched.learned.is_ended else ("the fit still improved in its last round",)),
-            *(
-                f"order {test.orders[0][0]} of the crank remains in {test.column}"
-                if test.reason == "orders"
-                else f"slow changes remain in {test.column}"
-                for test in watched.residual_tests
-                if not test.is_noise
-            ),
-            *map(str, watched.prior_conflicts),
-        ],
-        of_feed_alone=watched.only_feed_differs,
-        alarms=[_alarm(watched, alarm) for alarm in watched.alarms],
-        thresholds=_thresholds(watched),
-        false_imbalance=FalseImbalance(*watched.uncertainty, *watched.widening),
-        noise=dict(zip(("signal", "speed"), watched.noises, strict=True)),
-        constant_parts=watched.constant_parts,
-        gaps=[Gap(begin, end) for begin, end in recording.gaps if end - begin > GAP * plan.turn],
+        is_described=begin.is_described,
+        residuals=begin.tests,
+        doubts=list(_doubts(begin)),
+        of_feed_alone=not begin.is_described and describes(begin.problem, begin.fit, begin.tests, loads),
+        alarms=watched.alarms,
+        thresholds=Thresholds(
+            feed_least, feed_most, force_least, force_most, *watched.uncertainty, *watched.widening
+        ),
+        noise=dict(zip(("signal", "speed"), begin.noises, strict=True)),
+        constant_parts=list(constant_parts(recording, [name for name in columns if name])),
+        gaps=[Gap(*ends) for ends in recording.gaps if ends[1] - ends[0] > GAP * plan.turn],
         failed_identification=watched.failed,
         identification=None if plan.identification is None else str(plan.identification),
         tuning={
-            v.name: InUnit(p.get(v.name, v.quantity.start), v.unit, v.kind)
+            v.name: InUnit(watched.parameters.get(v.name, v.quantity.start), v.unit, v.kind)
             for v in LoadObserver.parameter_layout.variables
             if v.name.split(".")[0] in ("noise", "feed", "force", "offset", "imbalance", "alarm")
         },
-        usual=dict(_usual(watched)),
-        course=_course(watched),
+        usual=dict(_usual(watched, settled)),
+        course={"time": InUnit(recording.time[::every], "s")}
+        | {name: InUnit(watched.outputs[name][::every], declared[name].unit) for name in OUTPUTS},
     )
 
 
-def _thresholds(watched: WatchedRecording) -> Thresholds:
-    time = watched.recording.time
-    rows = time > time[0] + watched.plan.learning
-    ends = (
-        np.percentile(watched.outputs[f"imbalance.{name}_threshold"][rows], [2.0, 98.0])
-        for name in ("feed", "force")
-    )
-    return Thresholds(*(float(x) for pair in ends for x in pair))
+def _file_name(name: str) -> str:
+    """The name in the study file of a load that is learned."""
+    return name.replace("machine.", "feed.", 1)
 
 
-def _alarm(watched: WatchedRecording, alarm: Alarm) -> ReportedAlarm:
-    units, after = _units(), alarm.begin - float(watched.recording.time[0])
-    return ReportedAlarm(
-        side=alarm.side,
-        ground=GROUNDS[alarm.ground],
-        begin=alarm.begin,
-        end=alarm.end,
-        lasts=alarm.lasts,
-        in_learning=after < watched.plan.learning,
-        turn=after / watched.plan.turn,
-        at=alarm.at,
-        values={name: InUnit(x, units[name]) for name, x in alarm.values.items()},
-    )
+def _doubts(begin: Begin) -> Iterator[str]:
+    """Why the machine of the study does not describe the begin: an open fit, residuals that are no noise, and numbers
+    of clock and sensors that are not as they are known, and feeds that are not as stated."""
+    if not begin.fit.is_ended:
+        yield "the fit still improved in its last round"
+    for test in begin.tests:
+        if not test.is_noise:
+            is_order = test.reason == "orders"
+            remains = f"order {test.orders[0][0]} of the crank remains" if is_order else "slow changes remain"
+            yield f"{remains} in {test.column}"
+    yield from map(str, sensor_conflicts(begin.problem, begin.fit))
+    for conflict in prior_conflicts(begin.problem.sought, begin.fit):
+        yield str(replace(conflict, name=_file_name(conflict.name)))
 
 
-def _usual(watched: WatchedRecording) -> Iterator[tuple[str, UsualOutput]]:
-    """The medians of the outputs after the time of learning and before the first alarm, with standard deviations and
+def _usual(watched: WatchedRecording, settled: Any) -> Iterator[tuple[str, UsualOutput]]:
+    """The medians of the outputs at the `settled` rows up to the first alarm, with standard deviations and
     thresholds."""
-    time, units = watched.recording.time, _units()
-    end = watched.alarms[0].begin if watched.alarms else float(time[-1])
-    rows = (time > time[0] + watched.plan.learning) & (time <= end)
+    time, declared = watched.recording.time, declared_outputs()
+    rows = settled & (time <= (watched.alarms[0].begin if watched.alarms else time[-1]))
     if not rows.any():
         return
 
@@ -210,24 +190,4 @@ def _usual(watched: WatchedRecording) -> Iterator[tuple[str, UsualOutput]]:
     for name in OUTPUTS:
         if not name.endswith(("_deviation", "_threshold")):
             names = (f"{name}{kind}" for kind in ("", "_deviation", "_threshold"))
-            yield name, UsualOutput(*(median(column, units[name]) for column in names))
-
-
-def _course(watched: WatchedRecording) -> dict[str, InUnit]:
-    """The outputs of the observer over time, at a part of the rows."""
-    every = max(1, -(-len(watched.recording.time) // ROWS))
-    units = _units()
-    return {"time": InUnit(watched.recording.time[::every], "s")} | {
-        name: InUnit(watched.outputs[name][::every], units[name]) for name in OUTPUTS
-    }
-
-
-def _units() -> dict[str, str]:
-    """The units of the outputs and states of the observer."""
-    return {name: v.unit for name, v in declared_outputs().items()}
-
-
-def declared_outputs() -> dict[str, Variable]:
-    """The declarations of the outputs and states of the observer, by name."""
-    layouts = [*(block.layout for block in LoadObserver.parts), LoadObserver.state_layout]
-    return {v.name: v for layout in layouts if layout is not None for v in layout.variables}
+            yield name, UsualOutput(*(median(column, declared[name].unit) for column in names))

@@ -13,14 +13,14 @@ from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import TaskProgress
 from .page import TASK
-from .result import declared_outputs, summary_of
-from .watch import Alarm, WatchedRecording
+from .result import WatchSummary
+from .watch import Alarm, WatchedRecording, declared_outputs
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-class WatchResult(ReportedResult[Config, WatchedRecording]):
+class WatchResult(ReportedResult[Config, WatchSummary]):
     """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
 
     _task = TASK
@@ -28,7 +28,7 @@ class WatchResult(ReportedResult[Config, WatchedRecording]):
     @property
     def record(self) -> WatchedRecording:
         """All that the watch found, as the report reads it."""
-        return self._outcome
+        return self._outcome.watched
 
     @cached_property
     def watched(self) -> xr.Dataset:
@@ -51,7 +51,7 @@ class WatchResult(ReportedResult[Config, WatchedRecording]):
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """The medians of the outputs after the time of learning and before the first alarm, with deviations and
         thresholds."""
-        usual: Mapping[str, Mapping[str, Any]] = as_data(summary_of(self.record).usual)
+        usual: Mapping[str, Mapping[str, Any]] = as_data(self._outcome.usual)
         return usual
 
 
