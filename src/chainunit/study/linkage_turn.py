@@ -243,8 +243,7 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
 
     (mean, torque_rms), forces_rms = _means(way, joints.values(), description.span)
     torque = np.broadcast_to(state.bias, q.shape)
-    losses = sum(effect.dissipative for load, effect in state.effects.items() if load in ("pins", "guides"))
-    gap = np.abs(state.torque_by_reactions(0.0) + losses - torque)
+    gap = np.abs(state.torque_by_reactions(0.0) + state.friction - torque)
     sign = np.sign(np.broadcast_to(way.state(places[:1])[0].bias, 1)[0])
     turn = LinkageTurn(
         torque_peak=float(sign * top["torque"]),

@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial, reduce
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
@@ -20,22 +21,25 @@ import numpy as np
 from ...core.engines import MATH, numpy_
 from ...core.errors import InputError
 from ...core.messages import unit_behind
-from ...core.model import About, FmuData, Requirement
+from ...core.model import About, FmuData, Part, Requirement
 from ...core.planar import ZERO
-from ...core.quantities import Value, declared_class, group, quantity, variable_of
+from ...core.ports import ShaftMotion
+from ...core.quantities import Value, declared_class, fields_of, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
+from ...mechanism.driven import DrivenLinkage, Port, SharedState, motions_of, slopes_of
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
 from ...mechanism.expressions import value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import InverseMachine, words_on_motion
+from ...mechanism.models import DirectMachine, InverseMachine, names_of, words_on_motion
 from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of, with_differing
 from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
+from .further import FurtherDrivers, splines
 from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
 from .loads import (
@@ -87,10 +91,117 @@ class FileMachine(InverseMachine):
         """The linkage with the start values."""
         return self.described_by.at_start
 
+    def __post_init__(self) -> None:
+        further = self.described_by.further
+        if further.free:
+            slopes = declared_class("Slopes", (self.driver_port.slopes,), further.slopes())
+            feed = fields_of(self.Inputs, without=(*names_of(ShaftMotion), *further.names.values()))
+            feed_type = declared_class("Feed", (), [*feed, *further.feed()])
+            feed_type.__module__, feed_type.__qualname__ = self.Parameters.__module__, f"{self.name}.Feed"
+            self.follow(
+                Feed=feed_type,
+                parts=(Part(self.Outputs, self._outputs), Part(slopes, self._slopes)),
+                input_rates=MappingProxyType({"phi": "w", "w": "a", **further.input_rates()}),
+                terminals=(*self.driver_port.terminals, *further.terminals()),
+            )
+        super().__post_init__()
+
     def _derived(self, xp: Any, p: Any) -> list[Any]:
         """See `LinkageModel`; the numbers of the start values are known."""
         described = self.described_by
         return [*described.start_derived] if described.is_start(xp, p) else super()._derived(xp, p)
+
+    def state(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
+        """See `LinkageModel`; the drivers that are inputs stand."""
+        state, further = super().state(xp, p, u, q, w), self.described_by.further
+        return SharedState(xp, state.m, w, further.geared) if further.are_motored else state
+
+    def direct(self) -> DirectMachine:
+        """See `InverseMachine`.
+
+        Raises
+        ------
+        InputError
+            for a machine with two drivers that are inputs.
+        """
+        if free := self.described_by.further.free:
+            name = next(iter(free.values())).name
+            raise InputError(
+                "is an input of its own, and a direct model has one driver: export without --direct, or give it a "
+                f'law in [drivers.{name}], such as phi = "0 deg"',
+                key=f"drivers.{name}",
+            )
+        return super().direct()
+
+    def _ports(self, xp: Any, p: Any, u: Any, m: Mechanism) -> tuple[DrivenLinkage, dict[int, Port]]:
+        """The linkage with the motion of all inputs, and the load port of each driver that is one."""
+        further, ratio = self.described_by.further, p.ratio
+        inputs = {k: getattr(u, further.names[entry.name]) for k, entry in further.free.items()}
+        motions = {k: (motion.phi, motion.w, motion.a) for k, motion in inputs.items()}
+
+        def driven(engine: Any, q: Any, w: Any, free: Mapping[int, tuple[Any, Any, Any]]) -> DrivenLinkage:
+            moving = motions_of(engine, m.linkage, q, w, free)
+            return DrivenLinkage(engine, m.linkage, moving, m.derived, m.topology)
+
+        def port(number: int, engine: Any, place: Any, speed: Any) -> tuple[Any, Any]:
+            q, w, free = m.q, u.w / ratio, dict(motions)
+            if number:
+                free[number] = place, speed, motions[number][2]
+            else:
+                q, w = place, speed
+            return driven(engine, q, w, free).port(number, further.geared, u.a / ratio)
+
+        return driven(xp, m.q, u.w / ratio, motions), {k: partial(port, k) for k in (0, *motions)}
+
+    def _outputs(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+        """See `InverseMachine`; of a machine with several inputs over their motion."""
+        further, ratio = self.described_by.further, p.ratio
+        if not further.free:
+            return super()._outputs(xp, p, u, x, s)
+        a, w = u.a / ratio, u.w / ratio
+        driven, ports = self._ports(xp, p, u, s.m)
+        moving, efforts = driven.moving(a), driven.efforts(a)
+        loads = {}
+        for k, entry in further.free.items():
+            motion = driven.motions[k]
+            (J, bias), (dJ, _, _) = driven.port(k, further.geared, a), slopes_of(xp, ports[k], *motion[:2])
+            loads[further.names[entry.name]] = further.declared[entry.name](
+                tau=efforts[k], power=efforts[k] * motion.speed,
+                tau_bias=bias, J=J, dJ_dphi=dJ, phi0=motion.place, w0=motion.speed,
+            )  # fmt: skip
+        J, bias = driven.port(0, further.geared)
+        tau = J * a + bias
+        return self.Outputs(
+            tau=tau / ratio,
+            tau_bias=bias / ratio,
+            J=J / (ratio * ratio),
+            dJ_dphi=s.inertia_slope / (ratio * ratio * ratio),
+            phi0=u.phi,
+            w0=u.w,
+            power=tau * w,
+            kinetic_energy=driven.kinetic_energy,
+            potential_energy=sum(effect.energy for effect in driven.effects.values()),
+            dissipated_power=sum(effect.dissipative for effect in driven.effects.values()),
+            margin=s.margin(),
+            **loads,
+            **self.probes(xp, p, u, moving, 0.0),  # type: ignore[arg-type]
+        )
+
+    def _slopes(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+        """The slopes of the load ports of a machine with several inputs."""
+        further, per_turn = self.described_by.further, 1.0 / (p.ratio * p.ratio)
+        driven, ports = self._ports(xp, p, u, s.m)
+        slopes = {k: slopes_of(xp, port, *driven.motions[k][:2])[1:] for k, port in ports.items()}
+        loads = {
+            further.names[entry.name]: further.port(entry).slopes(
+                tau_bias_dphi=slopes[k][0], tau_bias_dw=slopes[k][1]
+            )
+            for k, entry in further.free.items()
+        }
+        by_place, by_speed = slopes[0]
+        return self.parts[1].layout.cls(
+            tau_bias_dphi=by_place * per_turn, tau_bias_dw=by_speed * per_turn, **loads
+        )
 
 
 class LinkageDescription(LinkageOutputs):
@@ -107,6 +218,9 @@ class LinkageDescription(LinkageOutputs):
             for name, table in tables.items()
         }
         self.tables = {name: self.curves[name] for name, table in tables.items() if table["over"] == "phi"}
+        further = self.structure.further
+        variables = [self.variable("driver", driver.name) for driver in further]
+        self.further = FurtherDrivers(further, variables, splines(tables, self.way.turns))
         self.extremes = extremes_of(data["loads"])
         self.link_turns: dict[str, tuple[float, float]] = {}
         self.Parameters = self._parameters()
@@ -120,11 +234,11 @@ class LinkageDescription(LinkageOutputs):
                 port.start.__name__, (port.start,), [self._in_range(port.start, "phi_start")]
             )
             self.port, inputs = port._replace(start=start), [self._in_range(motion, "phi"), *inputs]
-        self.Inputs = declared_class("Inputs", (motion,), inputs)
+        self.Inputs = declared_class("Inputs", (motion,), [*inputs, *self.further.inputs()])
         p, u = self.Parameters(), self.Inputs()
         geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
         self.sides = start_sides(geometry)
-        self.at_start = self._loaded(LinkageParts(geometry, self.sides), p)
+        self.at_start = self._loaded(self._parts(geometry, u), p)
         self.sides |= turns_of_triads(self.at_start)
         self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
@@ -191,8 +305,19 @@ class LinkageDescription(LinkageOutputs):
 
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
-        geometry = LinkGeometry(xp, self.structure, self.values(xp, p, u))
-        return self._loaded(LinkageParts(geometry, self.sides), p)
+        return self._loaded(self._parts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), u), p)
+
+    def _parts(self, geometry: LinkGeometry, u: Any, places: Mapping[str, Any] | None = None) -> LinkageParts:
+        """The parts with the drivers that are inputs where the inputs say, or at `places` by name."""
+        courses = self.further.courses(geometry.values, u, places)
+        return LinkageParts(geometry, self.sides, courses)
+
+    def _standing(self, xp: Any, p: Any, places: Mapping[str, Any]) -> DescribedLinkage:
+        """The linkage with the drivers that are inputs at these places."""
+        u = self.Inputs()
+        return self._loaded(
+            self._parts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), u, places), p
+        )
 
     def _loaded(self, parts: LinkageParts, p: Any) -> DescribedLinkage:
         """The linkage of these parts, with the loads on it."""
@@ -314,9 +439,17 @@ class LinkageDescription(LinkageOutputs):
         """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes. Refuse
         extremes of the angle of a link that turns round, too."""
         try:
-            turns = self.followed.turns()
+            courses = self._courses(self.followed, self.Parameters())
         except InputError as error:
-            raise InputError(f"{error}{self.followed.range_words()}", key=error.key) from None
+            words = "" if self.further.free else self.followed.range_words()
+            raise InputError(f"{error}{words}", key=error.key) from None
+        turns = self.followed.turns(courses)
+        if self.extremes and self.further.free:
+            raise InputError(
+                f"{self.extremes[0]}: depends on two inputs, and has no value; give a number, or give "
+                f'the other driver a law, phi = "..."',
+                key="loads",
+            )
         for name in self.extremes:
             _, link, _, axis = parts_of_extreme(name)
             if axis == "angle" and self.way.turns and turns[link][0]:
@@ -327,6 +460,27 @@ class LinkageDescription(LinkageOutputs):
                 )
         return turns
 
+    def _courses(self, followed: FollowedLinkage, p: Any) -> list[dict[str, list[float]]]:
+        """The courses of the links over the way of the first driver, at all places of the drivers that are inputs;
+        the margins are added to those of `followed`."""
+        grid = self.further.grid()
+        visited = [(grid[0], followed.courses())]
+        for places in grid[1:]:
+
+            def way(other: Mapping[str, float], places: Mapping[str, float] = places) -> float:
+                return sum(abs(place - other[name]) for name, place in places.items())
+
+            _, near = min(visited, key=lambda visit: way(visit[0]))
+            other = self._followed(self._standing(MATH, p, places))
+            other.signs, other.derived = followed.signs, followed.derived
+            try:
+                visited.append((places, other.courses({name: course[0] for name, course in near.items()})))
+            except InputError as error:
+                where = " and ".join(self.further.words(name, place) for name, place in places.items())
+                raise InputError(f"{error}; this is with {where}", key=error.key) from None
+            followed.margins += other.margins
+        return [courses for _, courses in visited]
+
     def is_start(self, xp: Any, p: Any) -> bool:
         """Whether the parameters are numbers with the start values, whose linkage is known."""
         return xp is MATH and p == self.Parameters()
@@ -335,7 +489,7 @@ class LinkageDescription(LinkageOutputs):
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
         parameters; empty if there is none."""
         try:
-            self._followed(self.linkage(MATH, p, self.Inputs())).turns()
+            self._courses(self._followed(self.linkage(MATH, p, self.Inputs())), p)
         except InputError as error:
             values = ", ".join(
                 f"{entry['name']} = {getattr(p, entry['name']):g}{unit_behind(entry['unit'])}"
@@ -435,9 +589,11 @@ class LinkageDescription(LinkageOutputs):
             linkage, derived, course = self.at_start, self.start_derived, self.followed.margins
         else:
             linkage, derived = self.linkage(xp, p, self.Inputs()), getattr(p, "derived", ())
-            course = [
-                signed(self._margins(xp, linkage, derived, q), self.followed.signs) for q in self.way.places()
-            ]
+            course = []
+            for k, q in enumerate(self.way.places()):
+                if self.further.free:
+                    linkage = self._standing(xp, p, self.further.lattice(k))
+                course.append(signed(self._margins(xp, linkage, derived, q), self.followed.signs))
         for margins_of_group in zip(*course, strict=True):
             yield reduce(partial(lesser, xp), margins_of_group), LEAST_MARGIN, math.inf
         for _, misfit in misfits(linkage, derived):

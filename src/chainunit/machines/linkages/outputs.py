@@ -13,11 +13,13 @@ from ...core.planar import Motion, Vec2
 from ...core.quantities import declared_class, group
 from ...groups.joints import GuideForce
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
+from ...mechanism.driven import MovingLinkage, SharedState, driven_by_first
 from ...mechanism.driver_ports import DriverPort
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism
 from ..parts import Force, force
 from .declarations import RESERVED, GuideReaction, LinkTurning, PointMotion, Running, WayRunning
+from .further import FurtherDrivers
 from .joint_kind import JointEntry
 from .loads import name_of_load
 from .names import LinkPoint, connected
@@ -50,13 +52,15 @@ class LinkageOutputs:
     data: Mapping[str, Any]
     structure: Structure
     port: DriverPort
+    further: FurtherDrivers
     link_turns: Mapping[str, tuple[float, float]]
     """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad]."""
 
     def variable(self, kind: str, name: str) -> str:
         """The name under which the variables of a link or a joint stand: with its kind if the name has another
         meaning already."""
-        shared = kind == "joint" and name in self.structure.links
+        shared = kind != "link" and name in self.structure.links
+        shared = shared or (kind == "driver" and name in self.structure.joints)
         return f"{name}_{kind}" if shared or name in RESERVED else name
 
     @cached_property
@@ -69,6 +73,7 @@ class LinkageOutputs:
             fields.append((self.variable("joint", name), kind, group(kind, description)))
         for name, kind in self.link_outputs.items():
             fields.append((self.variable("link", name), kind, group(kind, f"link {name}")))
+        fields += self.further.outputs()
         running = WayRunning if self.structure.driver.linear else Running
         return declared_class("Outputs", (self.port.values, running), fields)
 
@@ -83,7 +88,7 @@ class LinkageOutputs:
             declared[name] = declared_class(f"Link_{name}", (LinkTurning,), points)
         return declared
 
-    def probes(self, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+    def probes(self, xp: Any, p: Any, u: Any, s: MachineState | MovingLinkage, a: Any) -> dict[str, Any]:
         """Reactions, rotation of links and motion of points at acceleration `a` of the driver."""
         reactions, m, w = s.reactions(a), s.m, s.w
         assert isinstance(m.linkage, DescribedLinkage)
@@ -115,6 +120,11 @@ class LinkageOutputs:
                 in_frame = frame.coordinates(place)
                 fields[point] = _point_motion(moving.beside(in_frame.x, in_frame.y), w, a)
             values[self.variable("link", name)] = self.link_outputs[name](**fields)
+        if isinstance(s, MovingLinkage):
+            return values | self.further.following(s.driven, s.first)
+        if self.further.laws:
+            driven = s.driven if isinstance(s, SharedState) else driven_by_first(xp, m, w)
+            values |= self.further.following(driven, a)
         return values
 
     def _guide_reaction(
@@ -124,8 +134,8 @@ class LinkageOutputs:
         assert isinstance(reaction, GuideForce)
         key, sign = parts.receivers[joint.name]
         slide, block = m.slides[key], m.pins[key[0]]
-        # the line of the driver has the direction in which the driver moves
-        along = sign if joint.name == self.structure.driver.joint else 1.0
+        # the line of a driver has the direction in which the driver moves
+        along = sign if any(joint.name == driver.joint for driver in self.structure.drivers) else 1.0
         d = slide.d * along
         moment = reaction.moment - (block.p - m.links[key[1]].pin.p).cross(reaction)
         s1, s2 = slide.s1 * sign * along, slide.s2 * sign * along

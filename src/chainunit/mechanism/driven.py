@@ -1,0 +1,216 @@
+"""A linkage with several drivers: the effort of each along its own place, and the load port of each.
+
+With the places x of the drivers the efforts are F = M(x) x'' + h(x, x'). A mechanism in which one driver alone moves
+gives a column of M, one that moves as the drivers do, over the time, gives h. Two drivers that depend on each other
+share the effort by the speeds with which they move: a gear hands on the effort of the driver behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ..core.engines import Dual, dual, slope
+from ..core.planar import Vec2
+from ..groups.driver import Course
+from ..groups.joints import Joint
+from ..groups.loads import Effect
+from .linkage import Linkage, Topology
+from .machine import MachineState, Mechanism, Steadiness
+
+
+class DriverMotion(NamedTuple):
+    """The motion of a driver: its `place` and `speed`; its acceleration is `rate` times that of the first driver,
+    and `rest`."""
+
+    place: Any
+    speed: Any
+    rate: Any
+    rest: Any
+
+
+def motions_of(
+    xp: Any, linkage: Linkage, q: Any, w: Any, free: Mapping[int, tuple[Any, Any, Any]] | None = None
+) -> list[DriverMotion]:
+    """The motion of each driver, the first of which has the place `q` and the speed `w` [rad, rad/s; m, m/s]; `free`
+    are place, speed and acceleration of those that move by themselves, by number."""
+    motions = [DriverMotion(q, w, 1.0, 0.0)]
+    for k, driver in enumerate(linkage.drivers[1:], 1):
+        if free and k in free:
+            place, speed, acceleration = free[k]
+            motions.append(DriverMotion(place, speed, 0.0, acceleration))
+        else:
+            place, rates = driver.course_at(xp, q)
+            motions.append(DriverMotion(place, rates[0] * w, rates[0], rates[1] * (w * w)))
+    return motions
+
+
+class DrivenLinkage:
+    """A linkage whose drivers have these `motions`: `inertia` has the effort of each driver per acceleration of each
+    [kg m2, kg m, kg], `bias` that at constant speeds [N m, N], of which `friction` is a part; `effects` are those of
+    the loads."""
+
+    __slots__ = ("_moved", "_reactions", "bias", "effects", "friction", "inertia", "motions")
+
+    def __init__(
+        self,
+        xp: Any,
+        linkage: Linkage,
+        motions: Sequence[DriverMotion],
+        derived: Sequence[Any] = (),
+        topology: Topology | None = None,
+    ) -> None:
+        """
+        Parameters
+        ----------
+        xp : engine (see `chainunit.core.engines`)
+        derived : numbers that the groups derive from the lengths
+        """
+        self.motions = motions
+
+        def moved(rates: Sequence[tuple[Any, Any, Any]]) -> Mechanism:
+            courses = [Course(motion.place, each) for motion, each in zip(motions, rates, strict=True)]
+            return Mechanism(xp, linkage.moved(courses), motions[0].place, derived, topology)
+
+        numbers = range(len(motions))
+        alone = [moved([(1.0 if k == j else 0.0, 0.0, 0.0) for k in numbers]) for j in numbers]
+        m = moved([(motion.speed, 0.0, 0.0) for motion in motions])
+        steady = Steadiness(xp, m, 1.0, linkage.loads)
+        self.effects: dict[str, Effect] = steady.effects | steady.losses
+        late = [load for load in linkage.loads.values() if load.by_reactions]
+        self.friction = [
+            sum(load.effect(xp, m, 1.0, steady.reactions, one).dissipative for load in late) for one in alone
+        ]
+        self.bias = [effort + lost for effort, lost in zip(steady.efforts, self.friction, strict=True)]
+        passes = [one.reactions({name: b.inertial() for name, b in one.bodies.items()}) for one in alone]
+        self.inertia = [[efforts[k] for efforts, _ in passes] for k in numbers]
+        self._reactions = steady.reactions, [reactions for _, reactions in passes]
+        self._moved = moved
+
+    def accelerations(self, a: Any) -> list[Any]:
+        """The acceleration of each driver at that of the first one."""
+        return [motion.rate * a + motion.rest for motion in self.motions]
+
+    def efforts(self, a: Any) -> list[Any]:
+        """The effort of each driver along its place at the acceleration `a` of the first one [N m, N], with
+        friction."""
+        x2 = self.accelerations(a)
+        return [
+            bias + sum(m * acceleration for m, acceleration in zip(row, x2, strict=True))
+            for bias, row in zip(self.bias, self.inertia, strict=True)
+        ]
+
+    def moving(self, a: Any) -> MovingLinkage:
+        """The linkage in motion at the acceleration `a` of the first driver."""
+        x2 = self.accelerations(a)
+        m = self._moved([(motion.speed, x, 0.0) for motion, x in zip(self.motions, x2, strict=True)])
+        steady, parts = self._reactions
+        reactions = {}
+        for joint, force in steady.items():
+            for part, x in zip(parts, x2, strict=True):
+                force = force.plus(part[joint], x)
+            reactions[joint] = force
+        return MovingLinkage(m, reactions, self.effects, self, a)
+
+    @property
+    def kinetic_energy(self) -> Any:
+        """Kinetic energy [J]."""
+        speeds = [motion.speed for motion in self.motions]
+        return 0.5 * sum(
+            v * sum(m * w for m, w in zip(row, speeds, strict=True))
+            for v, row in zip(speeds, self.inertia, strict=True)
+        )
+
+    def port(self, number: int, geared: Sequence[bool], a: Any = 0.0) -> tuple[Any, Any]:
+        """The inertia that a driver feels, and its effort without its own acceleration. The first one, number 0,
+        drives those that are `geared`, too; `a` is its acceleration."""
+        if number:
+            own = self.inertia[number][number]
+            return own, self.efforts(a)[number] - own * self.motions[number].rest
+        rates = [motion.rate for motion in self.motions]
+        inertia: Any = 0.0
+        bias: Any = 0.0
+        for k, (row, effort) in enumerate(zip(self.inertia, self.efforts(0.0), strict=True)):
+            if geared[k]:
+                inertia = inertia + rates[k] * sum(m * rate for m, rate in zip(row, rates, strict=True))
+                bias = bias + rates[k] * effort
+        return inertia, bias
+
+
+class MovingLinkage(NamedTuple):
+    """A linkage in motion over the time, in the form that outputs take: its mechanism, the force in each joint [N],
+    the effects of its loads, its drivers, and the acceleration of the first one."""
+
+    m: Mechanism
+    forces: Mapping[Joint, Vec2]
+    effects: Mapping[str, Effect]
+    driven: DrivenLinkage
+    first: Any
+    w: float = 1.0
+
+    def reactions(self, a: Any) -> Mapping[Joint, Vec2]:
+        """The force in each joint on its link [N]."""
+        return self.forces
+
+
+Port = Callable[[Any, Any, Any], tuple[Any, Any]]
+"""Inertia and bias of a driver, of engine, place and speed."""
+
+
+def slopes_of(xp: Any, port: Port, place: Any, speed: Any) -> tuple[Any, Any, Any]:
+    """The derivatives of the inertia by the place, and of the bias by place and speed."""
+    engine = dual(xp)
+    inertia, bias = port(engine, Dual(place, 1.0), speed)
+    _, by_speed = port(engine, place, Dual(speed, 1.0))
+    return slope(inertia), slope(bias), slope(by_speed)
+
+
+def driven_by_first(xp: Any, m: Mechanism, w: Any) -> DrivenLinkage:
+    """The linkage of a mechanism whose first driver has the speed `w`, and the others follow or stand."""
+    return DrivenLinkage(xp, m.linkage, motions_of(xp, m.linkage, m.q, w), m.derived, m.topology)
+
+
+class SharedState(MachineState):
+    """A linkage at one place and speed of its first driver, of which some further drivers have motors of their own:
+    inertia and torque are what the first one gives, energies and losses those of the whole machine."""
+
+    __slots__ = ("_shares", "_slopes", "_total", "driven")
+
+    def __init__(self, xp: Any, m: Mechanism, w: Any, geared: Sequence[bool]) -> None:
+        """
+        Parameters
+        ----------
+        geared : whether the first driver drives each of the drivers, itself among them
+        """
+        super().__init__(xp, m, w)
+        linkage, self._total, self.driven = m.linkage, self.J, driven_by_first(xp, m, w)
+
+        def port(engine: Any, q: Any, speed: Any) -> tuple[Any, Any]:
+            motions = motions_of(engine, linkage, q, speed)
+            return DrivenLinkage(engine, linkage, motions, m.derived, m.topology).port(0, geared)
+
+        self._shares = [
+            motion.rate if shares else 0.0 for motion, shares in zip(self.driven.motions, geared, strict=True)
+        ]
+        self.J, self.bias = self.driven.port(0, geared)
+        self.dJ, *self._slopes = slopes_of(xp, port, m.q, w)
+
+    @property
+    def kinetic_energy(self) -> Any:
+        """Kinetic energy of the whole machine [J]."""
+        return 0.5 * self._total * (self.w * self.w)
+
+    @property
+    def friction(self) -> Any:
+        """See `MachineState`; of the drivers that the first one drives."""
+        return sum(share * lost for share, lost in zip(self._shares, self.driven.friction, strict=True))
+
+    def torque_by_reactions(self, a: Any) -> Any:
+        """See `MachineState`."""
+        efforts = zip(self._shares, self.steady.efforts, self.inertial()[0], strict=True)
+        return sum(share * (effort + inertia * a) for share, effort, inertia in efforts)
+
+    def slopes(self) -> tuple[Any, Any]:
+        """See `MachineState`."""
+        by_angle, by_speed = self._slopes
+        return by_angle, by_speed
