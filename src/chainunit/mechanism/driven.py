@@ -20,13 +20,14 @@ from .machine import MachineState, Mechanism, Steadiness
 
 
 class DriverMotion(NamedTuple):
-    """The motion of a driver: its `place` and `speed`; its acceleration is `rate` times that of the first driver,
-    and `rest`."""
+    """The motion of a driver: its `place` and `speed`; its acceleration is `rate` times that of the first driver, and
+    a `bend` that its law gives, or the acceleration `own` of one that moves by itself."""
 
     place: Any
     speed: Any
-    rate: Any
-    rest: Any
+    rate: Any = 0.0
+    bend: Any = 0.0
+    own: Any = 0.0
 
 
 def motions_of(
@@ -34,11 +35,11 @@ def motions_of(
 ) -> list[DriverMotion]:
     """The motion of each driver, the first of which has the place `q` and the speed `w` [rad, rad/s; m, m/s]; `free`
     are place, speed and acceleration of those that move by themselves, by number."""
-    motions = [DriverMotion(q, w, 1.0, 0.0)]
+    motions = [DriverMotion(q, w, 1.0)]
     for k, driver in enumerate(linkage.drivers[1:], 1):
         if free and k in free:
             place, speed, acceleration = free[k]
-            motions.append(DriverMotion(place, speed, 0.0, acceleration))
+            motions.append(DriverMotion(place, speed, own=acceleration))
         else:
             place, rates = driver.course_at(xp, q)
             motions.append(DriverMotion(place, rates[0] * w, rates[0], rates[1] * (w * w)))
@@ -47,8 +48,8 @@ def motions_of(
 
 class DrivenLinkage:
     """A linkage whose drivers have these `motions`: `inertia` has the effort of each driver per acceleration of each
-    [kg m2, kg m, kg], `bias` that at constant speeds [N m, N], of which `friction` is a part; `effects` are those of
-    the loads."""
+    [kg m2, kg m, kg], `bias` that at a constant speed of the first one and of those that move by themselves
+    [N m, N], of which `friction` is a part; `effects` are those of the loads."""
 
     __slots__ = ("_moved", "_reactions", "bias", "effects", "friction", "inertia", "motions")
 
@@ -69,12 +70,12 @@ class DrivenLinkage:
         self.motions = motions
 
         def moved(rates: Sequence[tuple[Any, Any, Any]]) -> Mechanism:
-            courses = [Course(motion.place, each) for motion, each in zip(motions, rates, strict=True)]
+            courses = [Course(motion.place, rate) for motion, rate in zip(motions, rates, strict=True)]
             return Mechanism(xp, linkage.moved(courses), motions[0].place, derived, topology)
 
         numbers = range(len(motions))
         alone = [moved([(1.0 if k == j else 0.0, 0.0, 0.0) for k in numbers]) for j in numbers]
-        m = moved([(motion.speed, 0.0, 0.0) for motion in motions])
+        m = moved([(motion.speed, motion.bend, 0.0) for motion in motions])
         steady = Steadiness(xp, m, 1.0, linkage.loads)
         self.effects: dict[str, Effect] = steady.effects | steady.losses
         late = [load for load in linkage.loads.values() if load.by_reactions]
@@ -89,12 +90,16 @@ class DrivenLinkage:
 
     def accelerations(self, a: Any) -> list[Any]:
         """The acceleration of each driver at that of the first one."""
-        return [motion.rate * a + motion.rest for motion in self.motions]
+        return [further + motion.bend for further, motion in zip(self._growth(a), self.motions, strict=True)]
+
+    def _growth(self, a: Any) -> list[Any]:
+        """The accelerations besides those of `bias`."""
+        return [motion.rate * a + motion.own for motion in self.motions]
 
     def efforts(self, a: Any) -> list[Any]:
         """The effort of each driver along its place at the acceleration `a` of the first one [N m, N], with
         friction."""
-        x2 = self.accelerations(a)
+        x2 = self._growth(a)
         return [
             bias + sum(m * acceleration for m, acceleration in zip(row, x2, strict=True))
             for bias, row in zip(self.bias, self.inertia, strict=True)
@@ -102,8 +107,8 @@ class DrivenLinkage:
 
     def moving(self, a: Any) -> MovingLinkage:
         """The linkage in motion at the acceleration `a` of the first driver."""
-        x2 = self.accelerations(a)
-        m = self._moved([(motion.speed, x, 0.0) for motion, x in zip(self.motions, x2, strict=True)])
+        x2, courses = self._growth(a), zip(self.motions, self.accelerations(a), strict=True)
+        m = self._moved([(motion.speed, acceleration, 0.0) for motion, acceleration in courses])
         steady, parts = self._reactions
         reactions = {}
         for joint, force in steady.items():
@@ -126,7 +131,7 @@ class DrivenLinkage:
         drives those that are `geared`, too; `a` is its acceleration."""
         if number:
             own = self.inertia[number][number]
-            return own, self.efforts(a)[number] - own * self.motions[number].rest
+            return own, self.efforts(a)[number] - own * self.motions[number].own
         rates = [motion.rate for motion in self.motions]
         inertia: Any = 0.0
         bias: Any = 0.0

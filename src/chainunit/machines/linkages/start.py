@@ -87,12 +87,16 @@ class StartPose:
         return before != (len(self.poses), len(self.places), len(self.angles))
 
     def _slid(self) -> None:
-        """The point of each joint in which a driver slides, from its way and either link."""
+        """The point of each joint in which a driver slides, from its way and either link; or the angle of its line,
+        from both points."""
         for joint, way in self.slides:
             link, start = joint.by
+            line = self.points[link][joint.toward] - self.points[link][start]
+            if link not in self.angles and joint.on in self.places and joint.by in self.places:
+                drawn = self.places[joint.on] - self.places[joint.by]
+                self.angles[link] = math.remainder(phase(drawn) - phase(line), 2.0 * math.pi)
             if link not in self.angles:
                 continue
-            line = self.points[link][joint.toward] - self.points[link][start]
             moved = rect(way, self.angles[link] + phase(line))
             if joint.by in self.places:
                 self.places.setdefault(joint.on, self.places[joint.by] + moved)

@@ -1,0 +1,267 @@
+"""Linkages with two drivers: five machines against Newton-Euler equations of all links with Lagrange multipliers
+(`multibody`, which shares no line with the package), and the load port of each driver against their differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from multibody import Multibody
+from scipy.interpolate import CubicSpline
+
+from chainunit.machines.linkages.file import description_of, linkage_from
+from chainunit.machines.machine import Machine
+from chainunit.reading.tables import toml
+
+FIVE_BAR = """
+[ground]
+A = [0, 0]
+E = [1.2, 0]
+[driver]
+link = "left"
+[drivers.other]
+link = "right"
+{law}
+[links.left]
+points = {{ A = [0, 0], B = [0.4, 0] }}
+mass = 3
+inertia = 0.1
+centroid = [0.15, 0.02]
+[links.lower]
+points = {{ B = [0, 0], C = [1.0, 0], tool = [1.2, 0.1] }}
+mass = 2
+inertia = 0.2
+centroid = [0.5, 0.0]
+[links.right]
+points = {{ E = [0, 0], D = [0.3, 0] }}
+mass = 2.5
+inertia = 0.08
+centroid = [0.2, 0.01]
+[links.upper]
+points = {{ D = [0, 0], C = [1.1, 0] }}
+mass = 1
+inertia = 0.15
+centroid = [0.5, 0.1]
+[loads.tool]
+on = "lower.tool"
+force = ["-20 - drag * vx", "-100"]
+[inputs]
+drag = "30 N s/m"
+[start]
+points = {{ C = [0.8, 0.9] }}
+"""
+EXCAVATOR = """
+[ground]
+O = [0, 0]
+F = [0.2, -0.3]
+[driver]
+joint = "boom_cylinder"
+range = ["1.45 m", "1.75 m"]
+[drivers.stick_cylinder]
+joint = "stick"
+{law}
+[links.boom]
+points = {{ O = [0, 0], G = [1.6, 0.4], S = [3.2, 0], H = [1.8, 0.6] }}
+mass = 400
+inertia = 350
+centroid = [1.5, 0.2]
+[links.arm]
+points = {{ S = [0, 0], K = [-0.5, 0.2], B = [1.6, 0] }}
+mass = 200
+inertia = 60
+centroid = [0.5, 0.05]
+masses = {{ B = 250 }}
+[links.barrel1]
+points = {{ F = [0, 0], X = [1, 0] }}
+mass = 30
+inertia = 3
+centroid = [0.5, 0]
+[links.rod1]
+points = {{ G = [0, 0] }}
+mass = 15
+inertia = 1
+centroid = [-0.4, 0]
+[links.barrel2]
+points = {{ H = [0, 0], Y = [1, 0] }}
+mass = 25
+inertia = 2
+centroid = [0.4, 0]
+[links.rod2]
+points = {{ K = [0, 0] }}
+mass = 12
+inertia = 0.8
+centroid = [-0.3, 0.01]
+[joints.boom_cylinder]
+on = "rod1.G"
+by = "barrel1.F"
+toward = "X"
+[joints.stick]
+on = "rod2.K"
+by = "barrel2.H"
+toward = "Y"
+[start]
+phi = "1.6 m"
+points = {{ G = [1.4, 1.0], S = [2.9, 1.4], K = [2.6, 1.9], B = [3.6, 0.2] }}
+"""
+RAM_AND_CRANK = """
+[ground]
+A = [0, 0]
+R = [0.9, -0.3]
+T = [0.9, 0.3]
+[driver]
+link = "crank"
+positive = "clockwise"
+zero = "90 deg"
+[drivers.ram]
+joint = "way"
+range = [0.1, 0.5]
+[links.crank]
+points = {{ A = [0, 0], B = [0.2, 0] }}
+mass = 4
+inertia = 0.05
+[links.rod]
+points = {{ B = [0, 0], C = [0.8, 0] }}
+mass = 2
+inertia = 0.1
+centroid = [0.4, 0.0]
+[links.yoke]
+points = {{ C = [0, 0], D = [0.5, 0.1] }}
+mass = 1.5
+inertia = 0.06
+centroid = [0.2, 0.05]
+[links.slide]
+points = {{ D = [0, 0], P = [0, -0.2] }}
+mass = 6
+inertia = 0.2
+centroid = [0.02, 0.01]
+[joints.way]
+on = "slide.P"
+by = "ground.R"
+toward = "T"
+[start]
+points = {{ C = [0.6, 0.6] }}
+"""
+MACHINES = {
+    "geared five-bar": FIVE_BAR.format(law='phi = "-phi + 30 deg"'),
+    "five-bar with a servo on a table": FIVE_BAR.format(
+        law='phi = "0.4 * sin(phi) + swing"\nby = "motor"\n[tables.swing]\nphi = ["0 deg", "90 deg", "200 deg", '
+        '"300 deg"]\nvalue = ["40 deg", "65 deg", "50 deg", "35 deg"]'
+    ),
+    "five-bar with two motors": FIVE_BAR.format(law='range = ["0 deg", "90 deg"]\nstart = "40 deg"'),
+    "excavator": EXCAVATOR.format(law='range = ["1.2 m", "1.6 m"]'),
+    "ram and crank": RAM_AND_CRANK.format(),
+}
+FREE = ("five-bar with two motors", "excavator", "ram and crank")
+SWING = CubicSpline(np.radians([0, 90, 200, 300, 360]), np.radians([40, 65, 50, 35, 40]), bc_type="periodic")
+FRICTION = "[pins]\nfriction = 0.12\ndiameter = 0.05\ndamping = 0.4\n[guides]\nfriction = 0.1\ndamping = 3\n"
+LAWS = {
+    "geared five-bar": lambda x: (-x + math.radians(30.0), -1.0, 0.0),
+    "five-bar with a servo on a table": lambda x: (
+        0.4 * math.sin(x) + SWING(x % (2.0 * math.pi)),
+        0.4 * math.cos(x) + SWING(x % (2.0 * math.pi), 1),
+        -0.4 * math.sin(x) + SWING(x % (2.0 * math.pi), 2),
+    ),
+}
+"""Place of the second driver over that of the first one, with its first two derivatives, without the package."""
+
+
+def machine_of(name, more=""):
+    guides = "joint" in MACHINES[name]
+    data = toml(MACHINES[name] + (more if guides else more.partition("[guides]")[0]))
+    return Machine(linkage_from(data, "machine")[0]), description_of(data, "machine")
+
+
+def motion(machine, name, seed):
+    """Places, speeds and accelerations of both drivers, within their ranges."""
+    rng = np.random.default_rng(seed)
+    low, high = machine.model.span
+    place = low + (high - low) * rng.uniform(0.1, 0.9)
+    size = 0.4 if machine.model.slides else 3.0
+    (w, w2), (a, a2) = rng.uniform(-size, size, 2), rng.uniform(-5.0 * size, 5.0 * size, 2)
+    if name in LAWS:
+        second, rate, bend = LAWS[name](place)
+        return np.array([[place, second], [w, rate * w], [a, rate * a + bend * w * w]])
+    (entry,) = machine.model.described_by.structure.further
+    low, high = entry.span
+    return np.array([[place, low + (high - low) * rng.uniform(0.1, 0.9)], [w, w2], [a, a2]])
+
+
+def inputs(machine, name, moved):
+    """The inputs of the motion of both drivers; of a law those of the first one alone."""
+    second = machine.model.described_by.structure.further[0].name
+    values = dict(zip(("phi", "w", "a"), moved[:, 0], strict=True))
+    if name in FREE:
+        values |= {f"{second}.{key}": x for key, x in zip(("phi", "w", "a"), moved[:, 1], strict=True)}
+    return values | ({"drag": 30.0} if "drag" in machine.model.input_layout.names else {})
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_machine_is_that_of_all_its_equations(name, seed):
+    """Torque or force of each driver, all reactions, and all motion, to 1e-10 of the largest of a kind."""
+    machine, description = machine_of(name)
+    moved = motion(machine, name, seed)
+    out = machine.evaluate(inputs(machine, name, moved))
+    other = Multibody(description)
+    want = other.solution(other.followed(moved[0]), *moved)
+    second = description["drivers"][0]["name"]
+    if name == "geared five-bar":
+        want["tau"] += LAWS[name](moved[0, 0])[1] * want[f"{second}.tau"]
+    assert {"tau", f"{second}.tau", "kinetic_energy", "load_power"} < {*want}
+    forces = [key for key in want if key.endswith((".fx", ".fy", ".normal", ".moment", "tau"))]
+    assert len(forces) >= 2 * len(description["joints"]) + 2
+    size = max(abs(want[key]) for key in forces)
+    for key in forces:
+        assert out[key] == pytest.approx(want[key], abs=1e-10 * size), key
+    for key in ({*want} & {*out}) - {*forces}:
+        if not key.endswith(".angle"):
+            assert out[key] == pytest.approx(want[key], rel=1e-9, abs=1e-9), key
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_powers_of_both_drivers_are_the_power_of_the_machine(name):
+    """With friction: what the drivers give is what the machine stores and loses."""
+    machine, description = machine_of(name, FRICTION)
+    x, w, a = motion(machine, name, 5)
+    second, step = description["drivers"][0]["name"], 1e-4
+
+    def at(t):
+        place = x + w * t + 0.5 * a * t * t
+        moved = np.array([place, w + a * t, a])
+        return machine.evaluate(inputs(machine, name, moved))
+
+    out, before, after = at(0.0), at(-step), at(step)
+    energy = [each["kinetic_energy"] + each["potential_energy"] for each in (before, after)]
+    power = out["power"] + (0.0 if name == "geared five-bar" else out[f"{second}.power"])
+    assert power == pytest.approx(out["tau"] * w[0] + power - out["power"], rel=1e-12)
+    assert out["dissipated_power"] != 0.0
+    lost = (energy[1] - energy[0]) / (2.0 * step) + out["dissipated_power"]
+    assert power == pytest.approx(lost, rel=1e-6, abs=1e-5 * abs(out["power"]))
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_each_motion_has_its_load_port(name):
+    """The effort is J a + tau_bias, and the slopes of both are those of differences."""
+    machine, description = machine_of(name, FRICTION)
+    moved, step = motion(machine, name, 7), 1e-6
+    prefixes = ["", f"{description['drivers'][0]['name']}."] if name in FREE else [""]
+    for prefix in prefixes:
+        base = inputs(machine, name, moved)
+
+        def out(key="phi", change=0.0, prefix=prefix, base=base):
+            return machine.evaluate(base | {prefix + key: base[prefix + key] + change})
+
+        here = out()
+        for a in (0.0, 3.0):
+            there = out("a", a - base[f"{prefix}a"])
+            effort = here[f"{prefix}J"] * a + here[f"{prefix}tau_bias"]
+            assert there[f"{prefix}tau"] == pytest.approx(effort, rel=1e-10)
+        for output, key, slope in (
+            ("tau_bias", "phi", "tau_bias_dphi"), ("tau_bias", "w", "tau_bias_dw"), ("J", "phi", "dJ_dphi"),
+        ):  # fmt: skip
+            low, high = (out(key, sign * step)[f"{prefix}{output}"] for sign in (-1.0, 1.0))
+            want = (high - low) / (2.0 * step)
+            assert here[f"{prefix}{slope}"] == pytest.approx(
+                want, rel=1e-5, abs=1e-5 * abs(here[f"{prefix}J"])
+            )
