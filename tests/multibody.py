@@ -3,8 +3,8 @@ multipliers, with numpy alone. It shares no line with the package: neither group
 
 The unknowns are x, y and angle of the frame of each link. A revolute joint closes two points; a sliding one holds the
 point of `on` on the line of `by`, and the angle between both links; two wheels in mesh move alike along their common
-tangent at the pitch point; each driver has an equation after all these. A multiplier is the force (of a sliding joint the force
-across its line and the moment about the point) on `on` from `by`.
+tangent at the pitch point; each driver has an equation after all these. A multiplier is the force (of a sliding joint
+the force across its line and the moment about the point) on `on` from `by`.
 """
 
 from __future__ import annotations

@@ -5,14 +5,22 @@ from __future__ import annotations
 
 import math
 
+import fmpy
 import numpy as np
 import pytest
+from javascript_hosts import node
+from live_pages import in_node
 from multibody import Multibody
 from scipy.interpolate import CubicSpline
 
+from chainunit.core.native.compilers import compiler
+from chainunit.core.symbolic_trace import outputs_of
+from chainunit.fmu.export import export as export_python
+from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of, linkage_from
 from chainunit.machines.machine import Machine
 from chainunit.reading.tables import toml
+from chainunit.report.live.linkage import of_linkage
 
 FIVE_BAR = """
 [ground]
@@ -265,3 +273,67 @@ def test_each_motion_has_its_load_port(name):
             assert here[f"{prefix}{slope}"] == pytest.approx(
                 want, rel=1e-5, abs=1e-5 * abs(here[f"{prefix}J"])
             )
+
+
+FMUS = ("geared five-bar", "five-bar with a servo on a table", "excavator")
+
+
+@pytest.mark.second
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
+@pytest.mark.parametrize("name", FMUS)
+def test_fmus(name, make, tmp_path):
+    """The numbers of both drivers and all reactions through the FMU, before and after a step."""
+    machine, description = machine_of(name, FRICTION)
+    if make == "python":
+        file = export_python(machine.model, tmp_path / "unit.fmu")
+    else:
+        file = export(machine.model, tmp_path / "unit.fmu", fmi=int(make[-1]))
+    second, h = description["drivers"][0]["name"], 0.01
+    start = inputs(machine, name, motion(machine, name, 3))
+    end = dict(start)
+    for prefix in ("", f"{second}.") if name in FREE else ("",):
+        w, a = start[f"{prefix}w"], start[f"{prefix}a"]
+        end |= {f"{prefix}phi": start[f"{prefix}phi"] + h * w + 0.5 * h * h * a, f"{prefix}w": w + h * a}
+    names = [key for key in machine.evaluate(start) if key.endswith((".fx", ".fy", "tau", "power"))]
+    names += ["J", "tau_bias", "tau_bias_dphi"]
+    names += [f"{second}.{key}" for key in ("J", "dJ_dphi", "tau_bias_dw")] if name in FREE else []
+    rows = fmpy.simulate_fmu(
+        str(file), stop_time=h, step_size=h, output=names, fmi_type="CoSimulation", start_values=start
+    )
+    for row, values in ((rows[0], start), (rows[-1], end)):
+        want = machine.evaluate(values)
+        size = max(abs(want[key]) for key in names if key.endswith((".fx", ".fy")))
+        for key in names:
+            assert float(row[key]) == pytest.approx(float(want[key]), rel=1e-10, abs=1e-10 * size), key
+
+
+def test_a_free_driver_has_a_flange_and_a_load_port():
+    model = machine_of("excavator")[0].model
+    members = {terminal.name: terminal.members for terminal in model.terminals}
+    assert members["flange_stick_cylinder"] == {
+        key: f"stick_cylinder.{key}" for key in ("phi", "w", "a", "tau")
+    }
+    assert members["load_stick_cylinder"]["tau_bias_dw"] == "stick_cylinder.tau_bias_dw"
+    assert model.input_rates["stick_cylinder.w"] == "stick_cylinder.a"
+    outputs = [*outputs_of(model)]
+    assert {f"stick_cylinder.{key}" for key in ("tau", "J", "tau_bias_dphi")} <= {v.name for v in outputs}
+
+
+@node
+@pytest.mark.parametrize("name", ["geared five-bar", "five-bar with two motors"])
+def test_the_live_page_has_both_motions(name):
+    """Its turn is that of Python; a driver that is an input has a quantity of its own, within its range."""
+    machine, _ = machine_of(name)
+    live, changed = of_linkage(machine, 4.0, "machine.toml"), {"feed.drag": 12.0}
+    if name in FREE:
+        changed["feed.other.phi"] = 1.2
+        (quantity,) = [q for q in live.data["quantities"] if q["key"] == ["feed", "other", "phi"]]
+        assert (quantity["low"], quantity["high"]) == pytest.approx((0.0, math.radians(90.0)))
+    turn = in_node(live, f"const at = model.turn(values({changed})); return [[...at.place], at.columns];")
+    feed = {key.removeprefix("feed."): value for key, value in changed.items()}
+    places = np.array(turn[0])
+    want = machine.evaluate({"phi": places, "w": np.full_like(places, 4.0), **feed})
+    got = list(turn[1]["crank_torque"].values())
+    assert np.ptp(got) > 1.0
+    assert got == pytest.approx(want["tau"], rel=1e-9, abs=1e-9)
