@@ -1,7 +1,8 @@
-"""Jets: a value with its first three derivatives in one direction, on top of any other engine.
+"""Jets: a value with its first derivatives in one direction, on top of any other engine.
 
-A law of motion needs them: speed, acceleration, and the slope of the acceleration follow from one expression. The
-parts of a jet are numbers of the engine below, which may be dual.
+A law of motion needs them: speed, acceleration, and the slope of the acceleration follow from one expression. Each
+rule is that of the first derivative, on a jet with one derivative less. The parts of a jet are numbers of the engine
+below, which may be dual.
 """
 
 from __future__ import annotations
@@ -12,9 +13,6 @@ from types import SimpleNamespace
 from typing import Any
 
 from .engines import value
-
-ORDER = 3
-"""The highest derivative."""
 
 
 class Jet:
@@ -27,11 +25,20 @@ class Jet:
     def __init__(self, *parts: Any) -> None:
         self.parts = parts
 
+    @property
+    def lower(self) -> Jet:
+        """The jet without its highest derivative."""
+        return Jet(*self.parts[:-1])
+
+    def followed(self, f: Any, slope: Callable[[Jet, Jet], Jet]) -> Jet:
+        """A function of this jet with the value `f`; `slope` gives its derivative from the lower jet and its
+        derivative."""
+        return Jet(f, *slope(self.lower, Jet(*self.parts[1:])).parts) if len(self.parts) > 1 else Jet(f)
+
     def __add__(self, other: Any) -> Jet:
         if isinstance(other, Jet):
             return Jet(*(a + b for a, b in zip(self.parts, other.parts, strict=True)))
-        first, *rest = self.parts
-        return Jet(first + other, *rest)
+        return Jet(self.parts[0] + other, *self.parts[1:])
 
     __radd__ = __add__
 
@@ -47,114 +54,72 @@ class Jet:
     def __mul__(self, other: Any) -> Jet:
         if not isinstance(other, Jet):
             return Jet(*(a * other for a in self.parts))
-        (a, a1, a2, a3), (b, b1, b2, b3) = self.parts, other.parts
-        return Jet(
-            a * b,
-            a1 * b + a * b1,
-            a2 * b + 2.0 * (a1 * b1) + a * b2,
-            a3 * b + 3.0 * (a2 * b1 + a1 * b2) + a * b3,
-        )
+        product = self.parts[0] * other.parts[0]
+        return self.followed(product, lambda x, x1: x1 * other.lower + x * Jet(*other.parts[1:]))
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Jet:
-        return self * (reciprocal(other) if isinstance(other, Jet) else 1.0 / other)
+        return self * (1.0 / other)
 
     def __rtruediv__(self, other: Any) -> Jet:
-        return reciprocal(self) * other
+        def slope(x: Jet, x1: Jet) -> Jet:
+            per = 1.0 / x
+            return -(per * per * x1)
 
-    def through(self, f: Any, f1: Any, f2: Any, f3: Any) -> Jet:
-        """A function of the jet, from its value and its derivatives at the value of the jet."""
-        _, x1, x2, x3 = self.parts
-        return Jet(
-            f, f1 * x1, f1 * x2 + f2 * (x1 * x1), f1 * x3 + 3.0 * (f2 * (x1 * x2)) + f3 * (x1 * x1 * x1)
-        )
+        return self.followed(1.0 / self.parts[0], slope) * other
 
 
 def variable(x: Any) -> Jet:
-    """The variable in whose direction jets have their derivatives, at the value `x`."""
+    """The variable in whose direction jets have their three derivatives, at the value `x`."""
     return Jet(x, 1.0, 0.0, 0.0)
-
-
-def reciprocal(x: Jet) -> Jet:
-    """1 by a jet."""
-    r = 1.0 / x.parts[0]
-    r2 = r * r
-    return x.through(r, -r2, 2.0 * (r * r2), -6.0 * (r2 * r2))
 
 
 def jet(xp: Any) -> SimpleNamespace:
     """The engine on jets over `xp`; plain numbers pass through it unchanged. At a kink (`abs`, `minimum`, `maximum`)
     the derivatives are those of either side."""
 
-    def lift(f: Callable[[Any], Any], derivatives: Callable[[Any, Any], tuple[Any, Any, Any]]) -> Any:
-        """A function of one argument; `derivatives` gives the first three from argument and value."""
+    def lift(f: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Any:
+        """A function of one argument, with the function that is its derivative."""
 
         def g(x: Any) -> Any:
-            if not isinstance(x, Jet):
-                return f(x)
-            y = f(x.parts[0])
-            return x.through(y, *derivatives(x.parts[0], y))
+            return x.followed(f(x.parts[0]), lambda x, x1: slope(x) * x1) if isinstance(x, Jet) else f(x)
 
         return g
 
-    def of_root(x: Any, y: Any) -> tuple[Any, Any, Any]:
-        r = 1.0 / y
-        r3 = r * r * r
-        return 0.5 * r, -0.25 * r3, 0.375 * (r3 * (r * r))
-
-    def of_log(x: Any, y: Any) -> tuple[Any, Any, Any]:
-        r = 1.0 / x
-        return r, -(r * r), 2.0 * (r * r * r)
-
-    def of_arcsine(x: Any, y: Any) -> tuple[Any, Any, Any]:
-        r = 1.0 / xp.sqrt(1.0 - x * x)
-        r3 = r * r * r
-        return r, x * r3, r3 + 3.0 * (x * x) * (r3 * (r * r))
-
-    def of_tangent(x: Any, y: Any) -> tuple[Any, Any, Any]:
-        r = 1.0 / (1.0 + x * x)
-        return r, -2.0 * (x * (r * r)), (6.0 * (x * x) - 2.0) * (r * r * r)
-
-    def of_sine(x: Any, y: Any) -> tuple[Any, Any, Any]:
-        c = xp.cos(x)
-        return c, -y, -c
-
-    def of_cosine(x: Any, y: Any) -> tuple[Any, Any, Any]:
-        s = xp.sin(x)
-        return -s, -y, s
+    def both(a: Any, b: Any) -> tuple[Jet, Jet] | None:
+        """Two arguments as jets, if one of them is one."""
+        size = max(len(x.parts) if isinstance(x, Jet) else 0 for x in (a, b))
+        first, second = (x if isinstance(x, Jet) else Jet(x, *[0.0] * (size - 1)) for x in (a, b))
+        return (first, second) if size else None
 
     def atan2(y: Any, x: Any) -> Any:
-        if not (isinstance(y, Jet) or isinstance(x, Jet)):
+        if (pair := both(y, x)) is None:
             return xp.atan2(y, x)
-        y, x = (k if isinstance(k, Jet) else Jet(k, 0.0, 0.0, 0.0) for k in (y, x))
-        # turned back by the angle itself, so that the quotient is 0 here
-        c, s = x.parts[0], y.parts[0]
-        ratio = (y * c - x * s) / (x * c + y * s)
-        return ratio.through(xp.atan2(s, c), *of_tangent(ratio.parts[0], 0.0))
+        one, other = pair
+        return one.followed(
+            xp.atan2(one.parts[0], other.parts[0]),
+            lambda y, y1: (
+                (other.lower * y1 - y * Jet(*other.parts[1:])) / (other.lower * other.lower + y * y)
+            ),
+        )
 
     def maximum(a: Any, b: Any) -> Any:
-        if not (isinstance(a, Jet) or isinstance(b, Jet)):
+        if (pair := both(a, b)) is None:
             return xp.maximum(a, b)
-        a, b = (k if isinstance(k, Jet) else Jet(k, 0.0, 0.0, 0.0) for k in (a, b))
-        takes_a = value(a.parts[0]) >= value(b.parts[0])
-        parts = (y + takes_a * (x - y) for x, y in zip(a.parts[1:], b.parts[1:], strict=True))
-        return Jet(xp.maximum(a.parts[0], b.parts[0]), *parts)
+        (x, *slopes), (y, *others) = (one.parts for one in pair)
+        takes_first = value(x) >= value(y)
+        parts = (b1 + takes_first * (a1 - b1) for a1, b1 in zip(slopes, others, strict=True))
+        return Jet(xp.maximum(x, y), *parts)
 
-    def arccosine(x: Any) -> Any:
-        return -arcsine(x) + 0.5 * math.pi if isinstance(x, Jet) else xp.acos(x)
-
-    arcsine = lift(xp.asin, of_arcsine)
-    return SimpleNamespace(
-        sin=lift(xp.sin, of_sine),
-        cos=lift(xp.cos, of_cosine),
-        sqrt=lift(xp.sqrt, of_root),
-        asin=arcsine,
-        acos=arccosine,
-        exp=lift(xp.exp, lambda x, y: (y, y, y)),
-        log=lift(xp.log, of_log),
-        atan2=atan2,
-        abs=lambda x: maximum(x, -x),
-        minimum=lambda a, b: -maximum(-a, -b),
-        maximum=maximum,
-    )
+    engine = SimpleNamespace(atan2=atan2, maximum=maximum)
+    engine.sin = lift(xp.sin, lambda x: engine.cos(x))
+    engine.cos = lift(xp.cos, lambda x: -engine.sin(x))
+    engine.sqrt = lift(xp.sqrt, lambda x: 0.5 / engine.sqrt(x))
+    engine.asin = lift(xp.asin, lambda x: 1.0 / engine.sqrt(1.0 - x * x))
+    engine.acos = lambda x: 0.5 * math.pi - engine.asin(x)
+    engine.exp = lift(xp.exp, lambda x: engine.exp(x))
+    engine.log = lift(xp.log, lambda x: 1.0 / x)
+    engine.abs = lambda x: maximum(x, -x)
+    engine.minimum = lambda a, b: -maximum(-a, -b)
+    return engine

@@ -73,11 +73,6 @@ class _Piece(NamedTuple):
         value = self.value + t * (self.linear + t * (self.square + t * self.cubic))
         return value, (self.linear + t * (2.0 * self.square + t * (3.0 * self.cubic))) * self.per_width
 
-    def bends(self, way: Any) -> tuple[Any, Any]:
-        """Second and third derivative at a place of it."""
-        t, per = (way - self.place) * self.per_width, self.per_width * self.per_width
-        return (2.0 * self.square + t * (6.0 * self.cubic)) * per, 6.0 * self.cubic * (per * self.per_width)
-
 
 class TableCurve:
     """A table of one variable, between its points by cubic pieces that rise or fall as their ends do (Fritsch and
@@ -123,11 +118,8 @@ class TableCurve:
         if self.turns:
             x = xp.atan2(-xp.sin(x), -xp.cos(x)) + math.pi
         if isinstance(x, jets.Jet):
-            way, per = x.parts[0], engines.value(x.parts[0])
-            if not self.turns:
-                way, per = (xp.minimum(xp.maximum(k, 0.0), self._length) for k in (way, per))
-            piece = self._piece(per)
-            return x.through(*piece.at(way), *piece.bends(way))
+            x = x if self.turns else xp.minimum(xp.maximum(x, 0.0), self._length)
+            return self._piece(engines.value(x.parts[0])).at(x)[0]
         way = engines.value(x)
         if not self.turns:
             way = xp.minimum(xp.maximum(way, 0.0), self._length)

@@ -7,16 +7,17 @@ share the effort by the speeds with which they move: a gear hands on the effort 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ..core.engines import Dual, dual, slope
-from ..core.planar import Vec2
 from ..groups.driver import Course
-from ..groups.joints import Joint
 from ..groups.loads import Effect
 from .linkage import Linkage, Topology
-from .machine import MachineState, Mechanism, Steadiness
+from .machine import InMotion, MachineState, Mechanism, Steadiness
+
+Free = Mapping[int, tuple[Any, Any, Any]]
+"""Place, speed and acceleration of the drivers that move by themselves, by number."""
 
 
 class DriverMotion(NamedTuple):
@@ -30,14 +31,11 @@ class DriverMotion(NamedTuple):
     own: Any = 0.0
 
 
-def motions_of(
-    xp: Any, linkage: Linkage, q: Any, w: Any, free: Mapping[int, tuple[Any, Any, Any]] | None = None
-) -> list[DriverMotion]:
-    """The motion of each driver, the first of which has the place `q` and the speed `w` [rad, rad/s; m, m/s]; `free`
-    are place, speed and acceleration of those that move by themselves, by number."""
+def motions_of(xp: Any, linkage: Linkage, q: Any, w: Any, free: Free) -> list[DriverMotion]:
+    """The motion of each driver, the first of which has the place `q` and the speed `w` [rad, rad/s; m, m/s]."""
     motions = [DriverMotion(q, w, 1.0)]
     for k, driver in enumerate(linkage.drivers[1:], 1):
-        if free and k in free:
+        if k in free:
             place, speed, acceleration = free[k]
             motions.append(DriverMotion(place, speed, own=acceleration))
         else:
@@ -105,8 +103,8 @@ class DrivenLinkage:
             for bias, row in zip(self.bias, self.inertia, strict=True)
         ]
 
-    def moving(self, a: Any) -> MovingLinkage:
-        """The linkage in motion at the acceleration `a` of the first driver."""
+    def moving(self, a: Any) -> InMotion:
+        """The linkage in motion over the time at the acceleration `a` of the first driver."""
         x2, courses = self._growth(a), zip(self.motions, self.accelerations(a), strict=True)
         m = self._moved([(motion.speed, acceleration, 0.0) for motion, acceleration in courses])
         steady, parts = self._reactions
@@ -115,7 +113,7 @@ class DrivenLinkage:
             for part, x in zip(parts, x2, strict=True):
                 force = force.plus(part[joint], x)
             reactions[joint] = force
-        return MovingLinkage(m, reactions, self.effects, self, a)
+        return InMotion(m, reactions, self.effects, 1.0, 0.0)
 
     @property
     def kinetic_energy(self) -> Any:
@@ -142,68 +140,70 @@ class DrivenLinkage:
         return inertia, bias
 
 
-class MovingLinkage(NamedTuple):
-    """A linkage in motion over the time, in the form that outputs take: its mechanism, the force in each joint [N],
-    the effects of its loads, its drivers, and the acceleration of the first one."""
-
-    m: Mechanism
-    forces: Mapping[Joint, Vec2]
-    effects: Mapping[str, Effect]
-    driven: DrivenLinkage
-    first: Any
-    w: float = 1.0
-
-    def reactions(self, a: Any) -> Mapping[Joint, Vec2]:
-        """The force in each joint on its link [N]."""
-        return self.forces
+def driven_from(xp: Any, m: Mechanism, q: Any, w: Any, free: Free) -> DrivenLinkage:
+    """The linkage of a mechanism whose first driver has the place `q` and the speed `w`."""
+    return DrivenLinkage(xp, m.linkage, motions_of(xp, m.linkage, q, w, free), m.derived, m.topology)
 
 
-Port = Callable[[Any, Any, Any], tuple[Any, Any]]
-"""Inertia and bias of a driver, of engine, place and speed."""
-
-
-def slopes_of(xp: Any, port: Port, place: Any, speed: Any) -> tuple[Any, Any, Any]:
-    """The derivatives of the inertia by the place, and of the bias by place and speed."""
-    engine = dual(xp)
-    inertia, bias = port(engine, Dual(place, 1.0), speed)
-    _, by_speed = port(engine, place, Dual(speed, 1.0))
-    return slope(inertia), slope(bias), slope(by_speed)
-
-
-def driven_by_first(xp: Any, m: Mechanism, w: Any) -> DrivenLinkage:
-    """The linkage of a mechanism whose first driver has the speed `w`, and the others follow or stand."""
-    return DrivenLinkage(xp, m.linkage, motions_of(xp, m.linkage, m.q, w), m.derived, m.topology)
-
-
-class SharedState(MachineState):
-    """A linkage at one place and speed of its first driver, of which some further drivers have motors of their own:
+class DrivenState(MachineState):
+    """A linkage at one place and speed of its first driver, of which further drivers have motors of their own:
     inertia and torque are what the first one gives, energies and losses those of the whole machine."""
 
-    __slots__ = ("_shares", "_slopes", "_total", "driven")
+    __slots__ = ("_free", "_geared", "driven")
 
-    def __init__(self, xp: Any, m: Mechanism, w: Any, geared: Sequence[bool]) -> None:
+    def __init__(self, xp: Any, m: Mechanism, w: Any, geared: Sequence[bool], free: Free) -> None:
         """
         Parameters
         ----------
         geared : whether the first driver drives each of the drivers, itself among them
         """
         super().__init__(xp, m, w)
-        linkage, self._total, self.driven = m.linkage, self.J, driven_by_first(xp, m, w)
-
-        def port(engine: Any, q: Any, speed: Any) -> tuple[Any, Any]:
-            motions = motions_of(engine, linkage, q, speed)
-            return DrivenLinkage(engine, linkage, motions, m.derived, m.topology).port(0, geared)
-
-        self._shares = [
-            motion.rate if shares else 0.0 for motion, shares in zip(self.driven.motions, geared, strict=True)
-        ]
+        self._geared, self._free = geared, free
+        self.driven = driven_from(xp, m, m.q, w, free)
         self.J, self.bias = self.driven.port(0, geared)
-        self.dJ, *self._slopes = slopes_of(xp, port, m.q, w)
+
+    def port_slopes(self, number: int, a: Any = 0.0) -> tuple[Any, Any, Any]:
+        """Of the load port of a driver the derivatives of the inertia by its place, and of the bias by its place and
+        by its speed; `a` is the acceleration of the first one."""
+        engine = dual(self._xp)
+
+        def port(place: Any, speed: Any) -> tuple[Any, Any]:
+            free, q, w = dict(self._free), self.m.q, self.w
+            if number:
+                free[number] = place, speed, free[number][2]
+            else:
+                q, w = place, speed
+            return driven_from(engine, self.m, q, w, free).port(number, self._geared, a)
+
+        motion = self.driven.motions[number]
+        inertia, bias = port(Dual(motion.place, 1.0), motion.speed)
+        _, by_speed = port(motion.place, Dual(motion.speed, 1.0))
+        return slope(inertia), slope(bias), slope(by_speed)
+
+    @property
+    def inertia_slope(self) -> Any:
+        """See `MachineState`."""
+        return self.port_slopes(0)[0]
+
+    def slopes(self) -> tuple[Any, Any]:
+        """See `MachineState`."""
+        return self.port_slopes(0)[1:]
 
     @property
     def kinetic_energy(self) -> Any:
         """Kinetic energy of the whole machine [J]."""
-        return 0.5 * self._total * (self.w * self.w)
+        return self.driven.kinetic_energy
+
+    @property
+    def lost_power(self) -> Any:
+        """See `MachineState`; of the whole machine."""
+        return sum(effect.dissipative for effect in self.driven.effects.values())
+
+    @property
+    def _shares(self) -> list[Any]:
+        """The speeds of the drivers that the first one drives, by its own."""
+        motions = zip(self.driven.motions, self._geared, strict=True)
+        return [motion.rate if geared else 0.0 for motion, geared in motions]
 
     @property
     def friction(self) -> Any:
@@ -211,11 +211,10 @@ class SharedState(MachineState):
         return sum(share * lost for share, lost in zip(self._shares, self.driven.friction, strict=True))
 
     def torque_by_reactions(self, a: Any) -> Any:
-        """See `MachineState`."""
+        """See `MachineState`; without the motion of drivers that move by themselves."""
         efforts = zip(self._shares, self.steady.efforts, self.inertial()[0], strict=True)
         return sum(share * (effort + inertia * a) for share, effort, inertia in efforts)
 
-    def slopes(self) -> tuple[Any, Any]:
+    def moving(self, a: Any) -> InMotion:
         """See `MachineState`."""
-        by_angle, by_speed = self._slopes
-        return by_angle, by_speed
+        return self.driven.moving(a) if self._free else super().moving(a)

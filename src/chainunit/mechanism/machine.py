@@ -15,7 +15,7 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.engines import Dual, dual, slope
 from ..core.planar import ZERO, Link, Motion, Vec2, growth
@@ -283,6 +283,17 @@ def _wrenches(effects: Mapping[str, Effect]) -> Iterator[Wrench]:
         yield from effect.wrenches
 
 
+class InMotion(NamedTuple):
+    """A linkage in motion: its mechanism, the force in each joint on its link [N], the effects of its loads, and
+    speed and acceleration of the coordinate of the mechanism."""
+
+    m: Mechanism
+    reactions: Mapping[Joint, Vec2]
+    effects: Mapping[str, Effect]
+    w: Any
+    a: Any
+
+
 class MachineState:
     """A linkage at one crank angle and speed: the mechanism `m`, its inertia `J` [kg m2], the derivative `dJ` of the
     bodies' part of it by the angle, the effect of each load by name, and the torque at constant speed `bias` [N m],
@@ -331,6 +342,10 @@ class MachineState:
             reactions[joint] = f.plus(more, a)
         return reactions
 
+    def moving(self, a: Any) -> InMotion:
+        """The linkage in motion at crank acceleration `a`."""
+        return InMotion(self.m, self.reactions(a), self.effects, self.w, a)
+
     def torque_by_reactions(self, a: Any) -> Any:
         """The crank torque from the force passes, without friction [N m]: the second route."""
         return self.steady.torque + self.m.along(self.inertial()[0]) * a
@@ -359,6 +374,11 @@ class MachineState:
     def lost_torque(self) -> Any:
         """Torque at the crank against all dissipative loads [N m]; times `w` it is the lost power."""
         return sum(effect.dissipative for effect in self.effects.values())
+
+    @property
+    def lost_power(self) -> Any:
+        """Power that all dissipative loads take [W]."""
+        return self.lost_torque * self.w
 
     def margin(self) -> Any:
         """The least absolute margin of all groups; 1 for a crank alone, which has no dead position."""

@@ -18,9 +18,10 @@ from ...core.ports import further_terminals, way_terminals
 from ...core.quantities import Value, declared_class, fields_of, group, quantity
 from ...groups.driver import Course
 from ...mechanism.curves import TableCurve
-from ...mechanism.driven import DrivenLinkage
+from ...mechanism.driven import DrivenState, Free, driven_from
 from ...mechanism.driver_ports import ROTATING, SLIDING, DriverPort
 from ...mechanism.expressions import expression, value_of
+from ...mechanism.machine import MachineState
 from .structure import DriverEntry
 
 _PLACES = 12
@@ -79,7 +80,6 @@ class FurtherDrivers:
         self.names = dict(zip((entry.name for entry in entries), variables, strict=True))
         self.free = {k: entry for k, entry in enumerate(entries, 1) if entry.is_free}
         """the drivers that are inputs, by their numbers among all drivers"""
-        self.laws = {k: entry for k, entry in enumerate(entries, 1) if not entry.is_free}
         self.geared = (True, *(entry.geared and not entry.is_free for entry in entries))
         """whether the first driver drives each driver, itself among them"""
         self.declared = {entry.name: self._output(entry) for entry in entries}
@@ -88,7 +88,7 @@ class FurtherDrivers:
     @property
     def are_motored(self) -> bool:
         """Whether one that follows has a motor of its own."""
-        return any(not entry.geared for entry in self.laws.values())
+        return any(not entry.geared for entry in self.entries)
 
     def port(self, entry: DriverEntry) -> DriverPort:
         """The declarations of a driver."""
@@ -170,18 +170,38 @@ class FurtherDrivers:
 
     # values
 
-    def following(self, driven: DrivenLinkage, a: Any) -> dict[str, Any]:
-        """The outputs of the drivers that follow, at the acceleration `a` of the first one."""
-        efforts, accelerations, values = driven.efforts(a), driven.accelerations(a), {}
-        for k, entry in self.laws.items():
-            motion = driven.motions[k]
-            values[self.names[entry.name]] = self.port(entry).follower(
-                phi=motion.place,
-                w=motion.speed,
-                a=accelerations[k],
-                tau=efforts[k],
-                power=efforts[k] * motion.speed,
+    def motions(self, u: Any) -> Free:
+        """The motion of the drivers that are inputs."""
+        inputs = {k: getattr(u, self.names[entry.name]) for k, entry in self.free.items()}
+        return {k: (motion.phi, motion.w, motion.a) for k, motion in inputs.items()}
+
+    def outputs_at(self, xp: Any, s: MachineState, a: Any) -> dict[str, Any]:
+        """The outputs of all drivers in a state of the linkage, at the acceleration `a` of the first one."""
+        if not self.entries:
+            return {}
+        driven, values = s.driven if isinstance(s, DrivenState) else driven_from(xp, s.m, s.m.q, s.w, {}), {}
+        efforts, accelerations = driven.efforts(a), driven.accelerations(a)
+        for k, entry in enumerate(self.entries, 1):
+            motion, common = (
+                driven.motions[k],
+                {"tau": efforts[k], "power": efforts[k] * driven.motions[k].speed},
             )
+            if entry.is_free:
+                assert isinstance(s, DrivenState)
+                (J, bias), (dJ, *_) = driven.port(k, self.geared, a), s.port_slopes(k, a)
+                load = {"tau_bias": bias, "J": J, "dJ_dphi": dJ, "phi0": motion.place, "w0": motion.speed}
+            else:
+                load = {"phi": motion.place, "w": motion.speed, "a": accelerations[k]}
+            values[self.names[entry.name]] = self.declared[entry.name](**common, **load)
+        return values
+
+    def slopes_at(self, s: DrivenState, a: Any) -> dict[str, Any]:
+        """The slopes of the load ports of the drivers that are inputs."""
+        values = {}
+        for k, entry in self.free.items():
+            _, by_place, by_speed = s.port_slopes(k, a)
+            declared = self.port(entry).slopes
+            values[self.names[entry.name]] = declared(tau_bias_dphi=by_place, tau_bias_dw=by_speed)
         return values
 
     # places

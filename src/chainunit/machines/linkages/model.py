@@ -29,13 +29,13 @@ from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
-from ...mechanism.driven import DrivenLinkage, Port, SharedState, motions_of, slopes_of
+from ...mechanism.driven import DrivenState
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
 from ...mechanism.expressions import value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import DirectMachine, InverseMachine, names_of, words_on_motion
+from ...mechanism.models import DirectMachine, InverseMachine, names_of, slopes, words_on_motion
 from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of, with_differing
 from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
@@ -94,13 +94,13 @@ class FileMachine(InverseMachine):
     def __post_init__(self) -> None:
         further = self.described_by.further
         if further.free:
-            slopes = declared_class("Slopes", (self.driver_port.slopes,), further.slopes())
+            declared = declared_class("Slopes", (self.driver_port.slopes,), further.slopes())
             feed = fields_of(self.Inputs, without=(*names_of(ShaftMotion), *further.names.values()))
             feed_type = declared_class("Feed", (), [*feed, *further.feed()])
             feed_type.__module__, feed_type.__qualname__ = self.Parameters.__module__, f"{self.name}.Feed"
             self.follow(
                 Feed=feed_type,
-                parts=(Part(self.Outputs, self._outputs), Part(slopes, self._slopes)),
+                parts=(Part(self.Outputs, self._outputs), Part(declared, self._slopes)),
                 input_rates=MappingProxyType({"phi": "w", "w": "a", **further.input_rates()}),
                 terminals=(*self.driver_port.terminals, *further.terminals()),
             )
@@ -112,9 +112,11 @@ class FileMachine(InverseMachine):
         return [*described.start_derived] if described.is_start(xp, p) else super()._derived(xp, p)
 
     def state(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
-        """See `LinkageModel`; the drivers that are inputs stand."""
+        """See `LinkageModel`."""
         state, further = super().state(xp, p, u, q, w), self.described_by.further
-        return SharedState(xp, state.m, w, further.geared) if further.are_motored else state
+        if not (further.free or further.are_motored):
+            return state
+        return DrivenState(xp, state.m, w, further.geared, further.motions(u))
 
     def direct(self) -> DirectMachine:
         """See `InverseMachine`.
@@ -133,75 +135,10 @@ class FileMachine(InverseMachine):
             )
         return super().direct()
 
-    def _ports(self, xp: Any, p: Any, u: Any, m: Mechanism) -> tuple[DrivenLinkage, dict[int, Port]]:
-        """The linkage with the motion of all inputs, and the load port of each driver that is one."""
-        further, ratio = self.described_by.further, p.ratio
-        inputs = {k: getattr(u, further.names[entry.name]) for k, entry in further.free.items()}
-        motions = {k: (motion.phi, motion.w, motion.a) for k, motion in inputs.items()}
-
-        def driven(engine: Any, q: Any, w: Any, free: Mapping[int, tuple[Any, Any, Any]]) -> DrivenLinkage:
-            moving = motions_of(engine, m.linkage, q, w, free)
-            return DrivenLinkage(engine, m.linkage, moving, m.derived, m.topology)
-
-        def port(number: int, engine: Any, place: Any, speed: Any) -> tuple[Any, Any]:
-            q, w, free = m.q, u.w / ratio, dict(motions)
-            if number:
-                free[number] = place, speed, motions[number][2]
-            else:
-                q, w = place, speed
-            return driven(engine, q, w, free).port(number, further.geared, u.a / ratio)
-
-        return driven(xp, m.q, u.w / ratio, motions), {k: partial(port, k) for k in (0, *motions)}
-
-    def _outputs(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
-        """See `InverseMachine`; of a machine with several inputs over their motion."""
-        further, ratio = self.described_by.further, p.ratio
-        if not further.free:
-            return super()._outputs(xp, p, u, x, s)
-        a, w = u.a / ratio, u.w / ratio
-        driven, ports = self._ports(xp, p, u, s.m)
-        moving, efforts = driven.moving(a), driven.efforts(a)
-        loads = {}
-        for k, entry in further.free.items():
-            motion = driven.motions[k]
-            (J, bias), (dJ, _, _) = driven.port(k, further.geared, a), slopes_of(xp, ports[k], *motion[:2])
-            loads[further.names[entry.name]] = further.declared[entry.name](
-                tau=efforts[k], power=efforts[k] * motion.speed,
-                tau_bias=bias, J=J, dJ_dphi=dJ, phi0=motion.place, w0=motion.speed,
-            )  # fmt: skip
-        J, bias = driven.port(0, further.geared)
-        tau = J * a + bias
-        return self.Outputs(
-            tau=tau / ratio,
-            tau_bias=bias / ratio,
-            J=J / (ratio * ratio),
-            dJ_dphi=s.inertia_slope / (ratio * ratio * ratio),
-            phi0=u.phi,
-            w0=u.w,
-            power=tau * w,
-            kinetic_energy=driven.kinetic_energy,
-            potential_energy=sum(effect.energy for effect in driven.effects.values()),
-            dissipated_power=sum(effect.dissipative for effect in driven.effects.values()),
-            margin=s.margin(),
-            **loads,
-            **self.probes(xp, p, u, moving, 0.0),  # type: ignore[arg-type]
-        )
-
-    def _slopes(self, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+    def _slopes(self, xp: Any, p: Any, u: Any, x: Any, s: DrivenState) -> Any:
         """The slopes of the load ports of a machine with several inputs."""
-        further, per_turn = self.described_by.further, 1.0 / (p.ratio * p.ratio)
-        driven, ports = self._ports(xp, p, u, s.m)
-        slopes = {k: slopes_of(xp, port, *driven.motions[k][:2])[1:] for k, port in ports.items()}
-        loads = {
-            further.names[entry.name]: further.port(entry).slopes(
-                tau_bias_dphi=slopes[k][0], tau_bias_dw=slopes[k][1]
-            )
-            for k, entry in further.free.items()
-        }
-        by_place, by_speed = slopes[0]
-        return self.parts[1].layout.cls(
-            tau_bias_dphi=by_place * per_turn, tau_bias_dw=by_speed * per_turn, **loads
-        )
+        loads = self.described_by.further.slopes_at(s, u.a / p.ratio)
+        return self.parts[1].layout.cls(**vars(slopes(xp, p, u, x, s)), **loads)
 
 
 class LinkageDescription(LinkageOutputs):

@@ -13,7 +13,6 @@ from ...core.planar import Motion, Vec2
 from ...core.quantities import declared_class, group
 from ...groups.joints import GuideForce
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
-from ...mechanism.driven import MovingLinkage, SharedState, driven_by_first
 from ...mechanism.driver_ports import DriverPort
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism
@@ -88,17 +87,16 @@ class LinkageOutputs:
             declared[name] = declared_class(f"Link_{name}", (LinkTurning,), points)
         return declared
 
-    def probes(self, xp: Any, p: Any, u: Any, s: MachineState | MovingLinkage, a: Any) -> dict[str, Any]:
+    def probes(self, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
         """Reactions, rotation of links and motion of points at acceleration `a` of the driver."""
-        reactions, m, w = s.reactions(a), s.m, s.w
+        further = self.further.outputs_at(xp, s, a)
+        m, reactions, effects, w, a = s.moving(a)
         assert isinstance(m.linkage, DescribedLinkage)
         parts = m.linkage.parts
         losses = sum(
-            s.effects[name_of_load(load)].dissipative
-            for load in self.data["loads"]
-            if load["type"] != "spring"
+            effects[name_of_load(load)].dissipative for load in self.data["loads"] if load["type"] != "spring"
         )
-        values: dict[str, Any] = {"load_power": -(losses * w)}
+        values: dict[str, Any] = {"load_power": -(losses * w), **further}
         for name, joint in self.structure.joints.items():
             key, sign = parts.receivers[name]
             if joint.kind == PRISMATIC:
@@ -120,11 +118,6 @@ class LinkageOutputs:
                 in_frame = frame.coordinates(place)
                 fields[point] = _point_motion(moving.beside(in_frame.x, in_frame.y), w, a)
             values[self.variable("link", name)] = self.link_outputs[name](**fields)
-        if isinstance(s, MovingLinkage):
-            return values | self.further.following(s.driven, s.first)
-        if self.further.laws:
-            driven = s.driven if isinstance(s, SharedState) else driven_by_first(xp, m, w)
-            values |= self.further.following(driven, a)
         return values
 
     def _guide_reaction(
