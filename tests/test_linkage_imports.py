@@ -309,7 +309,7 @@ def test_two_inputs_are_two_drivers(tmp_path):
     cylinder = imported(written(tmp_path, CYLINDER_BAR), density="20 kg/m").tables
     (name,) = cylinder["drivers"]
     assert cylinder["drivers"][name]["joint"] == name and cylinder["drivers"][name]["range"][0] > 0.0
-    assert {f"{name}.phi", f"{name}.w", f"{name}.a"} <= {
+    assert {f"{name}_driver.{key}" for key in ("phi", "w", "a")} <= {
         *machine(written(tmp_path, CYLINDER_BAR), density="20 kg/m").model.input_layout.names
     }
     uneven = five_bar.replace('rpm="-30"', 'rpm="-20"')

@@ -116,9 +116,10 @@ class Linkage:
 
     def moved(self, courses: Sequence[Course]) -> Linkage:
         """The linkage whose drivers have these courses, whatever the coordinate is."""
+        present: tuple[Any, ...] = self.drivers
         drivers = (
             replace(driver, course=lambda xp, q, course=course: course)
-            for driver, course in zip(self.drivers, courses, strict=True)
+            for driver, course in zip(present, courses, strict=True)
         )
         first = next(drivers)
         groups = tuple(next(drivers) if isinstance(group, Driver) else group for group in self.groups)

@@ -99,7 +99,7 @@ class FurtherDrivers:
     ) -> dict[str, Callable[[Any, Any], Course]]:
         """The courses by joint, with the `values` of quantities; those that are inputs stand where the inputs `u`
         say, or at the `places` by name."""
-        courses: dict[str, Callable[[Any, Any], Course]] = {}
+        courses: dict[str, Any] = {}
         for entry in self.entries:
             if entry.law is not None:
                 courses[entry.joint] = LawCourse(entry.law, values, self.tables)
