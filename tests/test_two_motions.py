@@ -13,6 +13,7 @@ from live_pages import in_node
 from multibody import Multibody
 from scipy.interpolate import CubicSpline
 
+from chainunit import InputError
 from chainunit.core.native.compilers import compiler
 from chainunit.core.symbolic_trace import outputs_of
 from chainunit.fmu.export import export as export_python
@@ -21,6 +22,8 @@ from chainunit.machines.linkages.file import description_of, linkage_from
 from chainunit.machines.machine import Machine
 from chainunit.reading.tables import toml
 from chainunit.report.live.linkage import of_linkage
+from chainunit.study.linkage_result import linkage_data
+from chainunit.study.linkage_turn import linkage_findings
 
 FIVE_BAR = """
 [ground]
@@ -337,3 +340,76 @@ def test_the_live_page_has_both_motions(name):
     got = list(turn[1]["crank_torque"].values())
     assert np.ptp(got) > 1.0
     assert got == pytest.approx(want["tau"], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        ('phi = "1.5 * phi"', "drivers.other.phi: moves by 1.5 turns in a turn of the first driver"),
+        ('phi = "2 * phi"\nby = "belt"', 'drivers.other.by: is "belt"; must be "gear"'),
+        ('phi = "2 * phi"\nrange = [0, 1]', "drivers.other.range: follows from the law in phi"),
+        ('phi = "2 * w"', "drivers.other.phi: is \"2 * w\"; w is no parameter"),
+        ('phi = "sqrt(sin(phi))"', "drivers.other.phi: has no value at a place of the driver"),
+        ('phi = "max(left.B.y)"', "drivers.other.phi: "),
+        ("", 'drivers.other.range: is missing; a driver that is an input of its own needs one, such as ["-20 deg"'),
+        ('range = ["0 deg", "90 deg"]\nby = "gear"', "drivers.other.by: belongs to a driver with a law"),
+        ('range = ["0 deg", "90 deg"]\nstart = 2', "drivers.other.start: is 2; must be within"),
+        ('range = ["0 deg", "90 deg"]\nstart = "80 deg"', "this is with other at"),
+        ('phi = "phi"\njoint = "C"', "drivers.other.joint: is \"C\", which is a pin"),
+        ('phi = "phi"\nlaw = 3', "drivers.other.law: "),
+    ],
+)  # fmt: skip
+def test_a_wrong_driver_is_refused(law, message):
+    data = toml(FIVE_BAR.format(law=law))
+    if "this is with" in message:
+        data["links"]["upper"]["points"]["C"] = [0.8, 0]
+    if "joint" in law:
+        del data["drivers"]["other"]["link"]
+    with pytest.raises(InputError) as caught:
+        linkage_from(data, "machine")
+    assert message in str(caught.value)
+
+
+def test_what_a_machine_with_two_inputs_cannot_do():
+    """Its remedy works: a law gives it one input, a number in place of an extreme a load."""
+    model = machine_of("five-bar with two motors")[0].model
+    with pytest.raises(InputError, match="export without --direct, or give it a law"):
+        model.direct()
+    held = FIVE_BAR.format(law='phi = "40 deg"')
+    assert Machine(linkage_from(toml(held), "machine")[0]).model.direct().name == "machineDirect"
+    extreme = MACHINES["five-bar with two motors"].replace('"-100"', '"-drag * vy * step(y - min(y), 0.1)"')
+    with pytest.raises(InputError, match="depends on two inputs"):
+        linkage_from(toml(extreme), "machine")
+    linkage_from(toml(extreme.replace("min(y)", "0.2")), "machine")
+
+
+def test_a_driver_with_a_range_takes_any_ratio():
+    data = toml(FIVE_BAR.format(law='phi = "1.5 * phi + 10 deg"'))
+    data["driver"]["range"] = ["0 deg", "40 deg"]
+    out = Machine(linkage_from(data, "machine")[0]).evaluate({"phi": math.radians(20.0), "w": 2.0})
+    assert math.degrees(out["other.phi"]) == pytest.approx(40.0) and out["other.w"] == pytest.approx(3.0)
+
+
+def test_arrays_of_both_motions():
+    machine, _ = machine_of("excavator")
+    rows = [inputs(machine, "excavator", motion(machine, "excavator", seed)) for seed in range(4)]
+    together = machine.evaluate({key: np.array([row[key] for row in rows]) for key in rows[0]})
+    for k, row in enumerate(rows):
+        for key, value in machine.evaluate(row).items():
+            assert together[key][k] == pytest.approx(float(value), rel=1e-12, abs=1e-9), key
+
+
+@pytest.mark.parametrize("name", ["five-bar with a servo on a table", "five-bar with two motors"])
+def test_the_report_has_both_drivers(name):
+    machine, _ = machine_of(name, FRICTION)
+    findings = linkage_findings(machine, 4.0)
+    data = linkage_data(findings, "machine.toml", ())
+    assert data.degrees_of_freedom == (2 if name in FREE else 1)
+    places = np.linspace(0.0, 2.0 * math.pi, 5001)
+    feed = machine.model.feed_layout.by_name(machine.model.Feed())
+    out = machine.evaluate({"phi": places, "w": np.full_like(places, 4.0), **feed})
+    assert data.drivers["other"]["peak"].value == pytest.approx(np.max(np.abs(out["other.tau"])), rel=1e-6)
+    mean = np.trapezoid(out["other.power"], places) / (2.0 * math.pi)
+    assert data.drivers["other"]["power_mean"].value == pytest.approx(mean, rel=1e-6, abs=1e-9)
+    assert findings.turn.energy_gap < 1e-12
+    assert "left + driver (right) + RRR dyad" in findings.sentence

@@ -16,6 +16,9 @@ from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Body
 from .joints import GuideForce, Joint, Slide
 
+Reactions = Mapping[Joint, Vec2]
+"""The force in each joint on its link [N]."""
+
 
 class Moving(Protocol):
     """A linkage in motion, as loads see it."""
@@ -231,14 +234,7 @@ class PinLosses(NamedTuple):
     laws: Mapping[Joint, Any] = MappingProxyType({})
     by_reactions: bool = True
 
-    def effect(
-        self,
-        xp: Any,
-        m: Moving,
-        w: Any,
-        reactions: Mapping[Joint, Vec2],
-        along: Moving | None = None,
-    ) -> Effect:
+    def effect(self, xp: Any, m: Moving, w: Any, reactions: Reactions, along: Moving | None = None) -> Effect:
         """The torque of friction and damping in all pins along the coordinate, or `along` that of the same linkage in
         another motion."""
         w2, loss, constants = w * w, 0.0, self._constants()
@@ -298,14 +294,7 @@ class GuideLosses(NamedTuple):
     laws: Mapping[Joint, Any] = MappingProxyType({})
     by_reactions: bool = True
 
-    def effect(
-        self,
-        xp: Any,
-        m: Moving,
-        w: Any,
-        reactions: Mapping[Joint, Vec2],
-        along: Moving | None = None,
-    ) -> Effect:
+    def effect(self, xp: Any, m: Moving, w: Any, reactions: Reactions, along: Moving | None = None) -> Effect:
         """The effort of friction and damping in all guides along the coordinate; `along` as for pins."""
         w2, loss, constants = w * w, 0.0, self._constants()
         for joint, slide in m.slides.items():

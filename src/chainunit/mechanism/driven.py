@@ -49,7 +49,7 @@ class DrivenLinkage:
     [kg m2, kg m, kg], `bias` that at a constant speed of the first one and of those that move by themselves
     [N m, N], of which `friction` is a part; `effects` are those of the loads."""
 
-    __slots__ = ("_moved", "_reactions", "bias", "effects", "friction", "inertia", "motions")
+    __slots__ = ("_moved", "_reactions", "alone", "bias", "effects", "friction", "inertia", "motions")
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class DrivenLinkage:
             return Mechanism(xp, linkage.moved(courses), motions[0].place, derived, topology)
 
         numbers = range(len(motions))
-        alone = [moved([(1.0 if k == j else 0.0, 0.0, 0.0) for k in numbers]) for j in numbers]
+        alone = self.alone = [moved([(1.0 if k == j else 0.0, 0.0, 0.0) for k in numbers]) for j in numbers]
         m = moved([(motion.speed, motion.bend, 0.0) for motion in motions])
         steady = Steadiness(xp, m, 1.0, linkage.loads)
         self.effects: dict[str, Effect] = steady.effects | steady.losses
@@ -204,6 +204,11 @@ class DrivenState(MachineState):
         """The speeds of the drivers that the first one drives, by its own."""
         motions = zip(self.driven.motions, self._geared, strict=True)
         return [motion.rate if geared else 0.0 for motion, geared in motions]
+
+    @property
+    def directions(self) -> list[tuple[Any, Mechanism | None]]:
+        """See `MachineState`; in each one driver moves alone."""
+        return list(zip(self._shares, self.driven.alone, strict=True))
 
     @property
     def friction(self) -> Any:

@@ -366,6 +366,11 @@ class MachineState:
         return sum(effect.energy for effect in self.effects.values())
 
     @property
+    def directions(self) -> list[tuple[Any, Mechanism | None]]:
+        """The motions along which losses load the first driver, each with its share; None is the motion itself."""
+        return [(1.0, None)]
+
+    @property
     def friction(self) -> Any:
         """Torque at the crank against the loads that depend on reactions [N m]."""
         return sum(effect.dissipative for effect in self.steady.losses.values())

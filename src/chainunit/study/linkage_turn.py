@@ -225,8 +225,8 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
     joints = {name: description.variable("joint", name) for name in description.structure.joints}
     moving = [name for name in outputs if name.endswith((".angle", ".x", ".y"))]
     moments = [f"{joint}.moment" for joint in joints.values() if f"{joint}.moment" in outputs]
-    efforts = {entry: f"{description.further.names[entry.name]}" for entry in description.structure.further}
-    sought = [*moments, *(f"{name}.tau" for name in efforts.values())]
+    drivers = [(entry, description.further.names[entry.name]) for entry in description.structure.further]
+    sought = [*moments, *(f"{name}.tau" for _, name in drivers)]
     groups = [", ".join(group.links) for group in description.structure.groups]
 
     def sizes(q: Any) -> Any:
@@ -295,9 +295,9 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
             entry.name: DriverTurn(
                 entry.linear,
                 top[f"{name}.tau"],
-                float(np.trapezoid(outputs[f"{name}.power"], q) / np.ptp(q)),
+                float(means(way.outputs([f"{name}.power"]), *description.span)[0][0]),
             )
-            for entry, name in efforts.items()
+            for entry, name in drivers
         },
         {name: (_plain(-top[f"-{name}"]), _plain(top[name])) for name in moving},
         rest,

@@ -529,6 +529,7 @@ class _LinkageReader(LoadReader):
         for entry in drivers:
             if "law" in entry:
                 self.law(entry, value, values, splines(tables, span is None), span)
+        self.refuse()
         for entry, place in ((driver, value), *((entry, entry["start"]) for entry in drivers)):
             if entry["linear"]:
                 pose.slides.append((entries[entry["joint"]][0], place))

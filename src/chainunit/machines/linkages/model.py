@@ -24,7 +24,7 @@ from ...core.messages import unit_behind
 from ...core.model import About, FmuData, Part, Requirement
 from ...core.planar import ZERO
 from ...core.ports import ShaftMotion
-from ...core.quantities import Value, declared_class, fields_of, group, quantity, variable_of
+from ...core.quantities import Fields, Value, declared_class, fields_of, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
@@ -118,7 +118,7 @@ class FileMachine(InverseMachine):
             return state
         return DrivenState(xp, state.m, w, further.geared, further.motions(u))
 
-    def direct(self) -> DirectMachine:
+    def _direct_of(self, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> DirectMachine:
         """See `InverseMachine`.
 
         Raises
@@ -133,7 +133,7 @@ class FileMachine(InverseMachine):
                 f'law in [drivers.{name}], such as phi = "0 deg"',
                 key=f"drivers.{name}",
             )
-        return super().direct()
+        return super()._direct_of(base, parameters, **more)
 
     def _slopes(self, xp: Any, p: Any, u: Any, x: Any, s: DrivenState) -> Any:
         """The slopes of the load ports of a machine with several inputs."""
@@ -559,6 +559,11 @@ class LinkageDescription(LinkageOutputs):
             low, high = span if driver.linear else map(math.degrees, span)
             ends = f"from {low:g} {unit} to {high:g} {unit}"
             counts += f", {ends}: beyond, the linkage was not checked and may not close"
+        for entry in self.further.entries:
+            name, driver_effort = self.further.names[entry.name], "force" if entry.linear else "torque"
+            drive = "a gear drives it" if entry.geared else "a motor of its own drives it"
+            moves = "is an input of its own" if entry.is_free else f"follows by {entry.law}; {drive}"
+            counts += f". The driver {entry.name} {moves}; {name}.tau is its {driver_effort} along {name}.phi"
         kinds = dict.fromkeys(joint.kind for joint in self.structure.joints.values())
         limits = "".join(f" {KINDS[kind].limits}" for kind in kinds if KINDS[kind].limits)
         return (
