@@ -13,7 +13,7 @@ from live_pages import in_node
 from multibody import Multibody
 from scipy.interpolate import CubicSpline
 
-from chainunit import InputError
+from chainunit import GeometryError, InputError
 from chainunit.core.native.compilers import compiler
 from chainunit.core.symbolic_trace import outputs_of
 from chainunit.fmu.export import export as export_python
@@ -237,13 +237,13 @@ def test_the_powers_of_both_drivers_are_the_power_of_the_machine(name):
     x, w, a = motion(machine, name, 5)
     second, step = description["drivers"][0]["name"], 1e-4
 
-    def at(t):
+    def moment(t):
         place = x + w * t + 0.5 * a * t * t
         moved = np.array([place, w + a * t, a])
         return machine.evaluate(inputs(machine, name, moved))
 
-    out, before, after = at(0.0), at(-step), at(step)
-    energy = [each["kinetic_energy"] + each["potential_energy"] for each in (before, after)]
+    out, before, after = moment(0.0), moment(-step), moment(step)
+    energy = [row["kinetic_energy"] + row["potential_energy"] for row in (before, after)]
     power = out["power"] + (0.0 if name == "geared five-bar" else out[f"{second}.power"])
     assert power == pytest.approx(out["tau"] * w[0] + power - out["power"], rel=1e-12)
     assert out["dissipated_power"] != 0.0
@@ -413,3 +413,18 @@ def test_the_report_has_both_drivers(name):
     assert data.drivers["other"]["power_mean"].value == pytest.approx(mean, rel=1e-6, abs=1e-9)
     assert findings.turn.energy_gap < 1e-12
     assert "left + driver (right) + RRR dyad" in findings.sentence
+
+
+def test_a_law_with_parameters_must_come_back():
+    """With other values, too: else the FMU and the machine refuse them, with the parameter."""
+    law = 'phi = "ratio_of_wheels * phi + lead"\n[parameters]\nratio_of_wheels = 2\nlead = "20 deg"'
+    machine = Machine(linkage_from(toml(FIVE_BAR.format(law=law)), "machine")[0])
+    assert machine.replace(lead=0.1, ratio_of_wheels=-1.0).evaluate({"w": 1.0})["other.w"] == -1.0
+    with pytest.raises(GeometryError, match=r"other is not back after a turn .* ratio_of_wheels = 1.5"):
+        machine.replace(ratio_of_wheels=1.5)
+
+
+def test_degrees_beside_a_table():
+    law = 'phi = "swing + 10 deg"\n[tables.swing]\nphi = [0, 2, 4]\nvalue = ["20 deg", "40 deg", "30 deg"]'
+    out = Machine(linkage_from(toml(FIVE_BAR.format(law=law)), "machine")[0]).evaluate({"phi": 2.0})
+    assert math.degrees(out["other.phi"]) == pytest.approx(50.0)

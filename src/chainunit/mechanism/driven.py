@@ -22,13 +22,13 @@ Free = Mapping[int, tuple[Any, Any, Any]]
 
 class DriverMotion(NamedTuple):
     """The motion of a driver: its `place` and `speed`; its acceleration is `rate` times that of the first driver, and
-    a `bend` that its law gives, or the acceleration `own` of one that moves by itself."""
+    a `bend` that its law gives, or the acceleration `added` of one that moves by itself."""
 
     place: Any
     speed: Any
     rate: Any = 0.0
     bend: Any = 0.0
-    own: Any = 0.0
+    added: Any = 0.0
 
 
 def motions_of(xp: Any, linkage: Linkage, q: Any, w: Any, free: Free) -> list[DriverMotion]:
@@ -37,7 +37,7 @@ def motions_of(xp: Any, linkage: Linkage, q: Any, w: Any, free: Free) -> list[Dr
     for k, driver in enumerate(linkage.drivers[1:], 1):
         if k in free:
             place, speed, acceleration = free[k]
-            motions.append(DriverMotion(place, speed, own=acceleration))
+            motions.append(DriverMotion(place, speed, added=acceleration))
         else:
             place, rates = driver.course_at(xp, q)
             motions.append(DriverMotion(place, rates[0] * w, rates[0], rates[1] * (w * w)))
@@ -92,7 +92,7 @@ class DrivenLinkage:
 
     def _growth(self, a: Any) -> list[Any]:
         """The accelerations besides those of `bias`."""
-        return [motion.rate * a + motion.own for motion in self.motions]
+        return [motion.rate * a + motion.added for motion in self.motions]
 
     def efforts(self, a: Any) -> list[Any]:
         """The effort of each driver along its place at the acceleration `a` of the first one [N m, N], with
@@ -128,8 +128,8 @@ class DrivenLinkage:
         """The inertia that a driver feels, and its effort without its own acceleration. The first one, number 0,
         drives those that are `geared`, too; `a` is its acceleration."""
         if number:
-            own = self.inertia[number][number]
-            return own, self.efforts(a)[number] - own * self.motions[number].own
+            alone = self.inertia[number][number]
+            return alone, self.efforts(a)[number] - alone * self.motions[number].added
         rates = [motion.rate for motion in self.motions]
         inertia: Any = 0.0
         bias: Any = 0.0

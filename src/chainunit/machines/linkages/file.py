@@ -34,12 +34,12 @@ from .checks import (
     usual_inertia,
 )
 from .entries import is_among, is_given, sized
-from .further import LawCourse, splines
+from .further import BACK, LawCourse, splines
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
-from .names import model_name, name_fault
+from .names import model_name, name_fault, words_in
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
@@ -314,7 +314,8 @@ class _LinkageReader(LoadReader):
                     self.fault(
                         f"joints.{joint['name']}", f"gives {link} a point of its name, too; rename the joint"
                     )
-        drivers = [self.table("driver"), *(table for _, _, table in self.tables("drivers"))]
+        further = [table for table in self.table("drivers").values() if isinstance(table, Mapping)]
+        drivers = [self.table("driver"), *further]
         more, clashes = shared_pins(self.points, joints, drivers)
         self.all((f"joints.{name}", message) for name, message in clashes)
         return joints + more
@@ -395,7 +396,8 @@ class _LinkageReader(LoadReader):
                 f'is {shown(by)}; must be "{_GEAR}", if the first driver drives it, or "{_MOTOR}", if it has one of '
                 "its own",
             )
-        text = _DEGREES.sub(r"(\1 * deg)", law) if isinstance(law, str) and "phi" in law else law
+        named = isinstance(law, str) and words_in(_DEGREES.sub("", law))
+        text = _DEGREES.sub(r"(\1 * deg)", law) if named else law
         motion = {"phi": "m" if first.get("linear") else "rad", **self.table_units}
         entry["law"] = self.entry(f"{key}.phi", text, unit, motion)
         if isinstance(entry["law"], str):
@@ -562,8 +564,7 @@ class _LinkageReader(LoadReader):
                 raise InputError("has no value at a place of the driver") from None
             whole = course_places[-1].place - course_places[0].place
             turns = whole / WHOLE
-            back = abs(whole) < 1e-9 if entry["linear"] else abs(turns - round(turns)) < 1e-9
-            if span is None and not back:
+            if span is None and not abs(whole if entry["linear"] else math.sin(0.5 * whole)) < BACK:
                 moved = f"{whole:.6g} m" if entry["linear"] else f"{turns:.6g} turns"
                 raise InputError(
                     f"moves by {moved} in a turn of the first driver, and must come back after it: "

@@ -23,12 +23,15 @@ from ...mechanism.driver_ports import ROTATING, SLIDING, DriverPort
 from ...mechanism.expressions import expression, value_of
 from ...mechanism.machine import MachineState
 from .structure import DriverEntry
+from .way import WHOLE
 
 _PLACES = 12
 """Parts of the range of a driver at whose ends the linkage is checked."""
 _STRIDE = 5
 """Such parts between two places of the first driver at which a machine is checked with other lengths."""
 _MOTION = ("phi", "w", "a")
+BACK = 1e-9
+"""Half of an angle [rad], or a way [m], by which a driver may miss its place after a turn of the first one."""
 
 
 class LawCourse(NamedTuple):
@@ -182,10 +185,8 @@ class FurtherDrivers:
         driven, values = s.driven if isinstance(s, DrivenState) else driven_from(xp, s.m, s.m.q, s.w, {}), {}
         efforts, accelerations = driven.efforts(a), driven.accelerations(a)
         for k, entry in enumerate(self.entries, 1):
-            motion, common = (
-                driven.motions[k],
-                {"tau": efforts[k], "power": efforts[k] * driven.motions[k].speed},
-            )
+            motion = driven.motions[k]
+            common = {"tau": efforts[k], "power": efforts[k] * motion.speed}
             if entry.is_free:
                 assert isinstance(s, DrivenState)
                 (J, bias), (dJ, *_) = driven.port(k, self.geared, a), s.port_slopes(k, a)
@@ -205,6 +206,21 @@ class FurtherDrivers:
         return values
 
     # places
+
+    def varying(self, turns: bool) -> list[DriverEntry]:
+        """The drivers whose law depends on parameters, if the first one `turns` all the way round."""
+        fixed = {"phi", *self.tables}
+        return [
+            entry
+            for entry in self.entries
+            if turns and isinstance(entry.law, str) and {*expression(entry.law).names} - fixed
+        ]
+
+    def misfit(self, xp: Any, entry: DriverEntry, values: Mapping[str, Any], start: float) -> Any:
+        """The way by which a driver is not back after a turn of the first one, or the sine of half the angle."""
+        course = LawCourse(entry.law or 0.0, values, self.tables)
+        way = course(xp, start + WHOLE).place - course(xp, start).place
+        return way if entry.linear else xp.sin(0.5 * way)
 
     def words(self, name: str, place: float) -> str:
         """A place of a driver in words."""
@@ -237,5 +253,5 @@ class FurtherDrivers:
 
 def _even(entry: DriverEntry) -> list[float]:
     """Even places over the range of a driver."""
-    low, high = entry.span or (entry.start, entry.start + 2.0 * math.pi)
+    low, high = entry.span or (entry.start, entry.start + WHOLE)
     return [low + (high - low) * k / _PLACES for k in range(_PLACES + 1)]

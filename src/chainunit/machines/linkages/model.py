@@ -32,14 +32,14 @@ from ...mechanism.curves import TableCurve
 from ...mechanism.driven import DrivenState
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
-from ...mechanism.expressions import value_of
+from ...mechanism.expressions import expression, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import DirectMachine, InverseMachine, names_of, slopes, words_on_motion
 from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of, with_differing
 from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
-from .further import FurtherDrivers, splines
+from .further import BACK, FurtherDrivers, splines
 from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
 from .loads import (
@@ -517,7 +517,16 @@ class LinkageDescription(LinkageOutputs):
             for links, kind in groups.items()
             if kind == "triad"
         )
-        return (*margins, *fits, *(requirement_of_width(*width, names) for width in self.widths))
+        laws = (
+            Requirement(
+                f"sine of half the angle, or the way, by which {entry.name} is not back after a turn of the driver",
+                "1",
+                "the law must come back; let the driver swing by a range for another one",
+                tuple(name for name in names if name in expression(str(entry.law)).names),
+            )
+            for entry in self.further.varying(self.way.turns)
+        )
+        return (*margins, *fits, *laws, *(requirement_of_width(*width, names) for width in self.widths))
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad, with
@@ -536,6 +545,8 @@ class LinkageDescription(LinkageOutputs):
         for _, misfit in misfits(linkage, derived):
             yield misfit, -math.inf, MOST_MISFIT
         values = linkage.parts.geometry.values
+        for entry in self.further.varying(self.way.turns):
+            yield self.further.misfit(xp, entry, values, self.way.start), -BACK, BACK
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
 
