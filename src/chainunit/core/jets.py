@@ -1,8 +1,8 @@
 """Jets: a value with its first derivatives in one direction, on top of any other engine.
 
 A law of motion needs them: speed, acceleration, and the slope of the acceleration follow from one expression. Each
-rule is that of the first derivative, on a jet with one derivative less. The parts of a jet are numbers of the engine
-below, which may be dual.
+function has the rule of its first derivative alone, which takes a jet with one derivative less. The parts of a jet
+are numbers of the engine below, which may be dual.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def variable(x: Any) -> Jet:
 
 def jet(xp: Any) -> SimpleNamespace:
     """The engine on jets over `xp`; plain numbers pass through it unchanged. At a kink (`abs`, `minimum`, `maximum`)
-    the derivatives are those of either side."""
+    the derivatives of either side count."""
 
     def lift(f: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Any:
         """A function of one argument, with the function that is its derivative."""

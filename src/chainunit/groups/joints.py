@@ -307,7 +307,7 @@ class CrankDrive(Placed):
 class Guide(Hinge):
     """A sliding joint at one position: the line through a point of the other link in the direction `d`, on which the
     link starts, at the way `s`; `arm` goes from the start of the other link, or of the rail before the group, to the
-    start of the link. A `line` makes the way that of a driver, with the derivatives `course` by q: it is how far the
+    start of the link. With a `line` a driver gives the way, with the derivatives `course` by q: it is how far the
     force of the driver lies to the left of the start of the link [m]."""
 
     __slots__ = ("_course", "_d", "_line", "_other", "_s")

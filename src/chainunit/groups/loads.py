@@ -235,8 +235,8 @@ class PinLosses(NamedTuple):
     by_reactions: bool = True
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Reactions, along: Moving | None = None) -> Effect:
-        """The torque of friction and damping in all pins along the coordinate, or `along` that of the same linkage in
-        another motion."""
+        """The torque of friction and damping in all pins along the coordinate, or `along` another motion
+        of the linkage."""
         w2, loss, constants = w * w, 0.0, self._constants()
         for joint, turn in m.turns.items():
             per_newton, smooth2, damping = constants.get(joint) or constants[None]

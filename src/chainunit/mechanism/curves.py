@@ -88,7 +88,7 @@ class TableCurve:
         places : rising, of an angle within one turn [rad, m]
         values : at these places
         turns : whether the coordinate is an angle
-        spline : whether the pieces are those of a spline
+        spline : whether the pieces form a spline
         """
         self.turns, self._first = turns, places[0]
         abscissas, values = [place - places[0] for place in places], list(values)
@@ -150,8 +150,8 @@ class TableCurve:
 
 
 def _spline_slopes(rises: Sequence[float], widths: Sequence[float], turns: bool) -> list[float]:
-    """The slopes at the places of a spline but the last one, which are those of all of them around a turn; over a way
-    it begins and ends level."""
+    """The slopes of a spline at its places without the last one, which around a turn is the first one again; over a
+    way it begins and ends level."""
     size, after = len(rises), [1.0 / width for width in widths]
     system, right = np.zeros((size, size)), np.zeros(size)
     for k in range(size):

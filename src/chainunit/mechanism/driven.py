@@ -2,7 +2,7 @@
 
 With the places x of the drivers the efforts are F = M(x) x'' + h(x, x'). A mechanism in which one driver alone moves
 gives a column of M, one that moves as the drivers do, over the time, gives h. Two drivers that depend on each other
-share the effort by the speeds with which they move: a gear hands on the effort of the driver behind it.
+share the effort by the speeds with which they move: a gear hands on the effort of the driver that it drives.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Free = Mapping[int, tuple[Any, Any, Any]]
 
 
 class DriverMotion(NamedTuple):
-    """The motion of a driver: its `place` and `speed`; its acceleration is `rate` times that of the first driver, and
-    a `bend` that its law gives, or the acceleration `added` of one that moves by itself."""
+    """The motion of a driver: its `place` and `speed`; its acceleration is `rate` times the one of the first driver,
+    and a `bend` that its law gives, or the acceleration `added` of one that moves by itself."""
 
     place: Any
     speed: Any
@@ -87,7 +87,7 @@ class DrivenLinkage:
         self._moved = moved
 
     def accelerations(self, a: Any) -> list[Any]:
-        """The acceleration of each driver at that of the first one."""
+        """The acceleration of each driver at the acceleration `a` of the first one."""
         return [further + motion.bend for further, motion in zip(self._growth(a), self.motions, strict=True)]
 
     def _growth(self, a: Any) -> list[Any]:
@@ -147,7 +147,7 @@ def driven_from(xp: Any, m: Mechanism, q: Any, w: Any, free: Free) -> DrivenLink
 
 class DrivenState(MachineState):
     """A linkage at one place and speed of its first driver, of which further drivers have motors of their own:
-    inertia and torque are what the first one gives, energies and losses those of the whole machine."""
+    inertia and torque are what the first one gives; energies and losses belong to the whole machine."""
 
     __slots__ = ("_free", "_geared", "driven")
 

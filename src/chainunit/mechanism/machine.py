@@ -101,8 +101,8 @@ class Mechanism:
         return tuple(solved.course for solved, _ in self._groups if solved.course is not None)
 
     def along(self, efforts: Sequence[Any], order: int = 0) -> Any:
-        """The effort along q [N m, N] from those of the drivers along their places, or with `order` 1 its derivative
-        at constant efforts."""
+        """The effort along q [N m, N] from the `efforts` of the drivers along their places, or with `order` 1 its
+        derivative while they are constant."""
         total: Any = 0.0
         for effort, course in zip(efforts, self.courses, strict=True):
             if course is not STEADY:

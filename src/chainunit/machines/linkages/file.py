@@ -386,7 +386,7 @@ class _LinkageReader(LoadReader):
                 if not low <= start <= high:
                     raise InputError(f"is {shown(table['start'])}; must be within {key}.range")
                 entry |= {"start": start}
-            return entry | {"span": span}
+            return entry | {"span": [low, high]}
         for other in ("range", "start"):
             if other in table:
                 self.fault(f"{key}.{other}", "follows from the law in phi; take one of both out")

@@ -78,8 +78,8 @@ class FollowedLinkage:
         return signed(self.at(q).margins(), signs)
 
     def courses(self, near: Mapping[str, float] | None = None) -> dict[str, list[float]]:
-        """The angle of each link at the closed places of the way, without jumps, and before them the angle that it
-        has at about the first one: that of the start, or the one `near` to it [rad].
+        """The angle of each link at the closed places of the way, without jumps, and before them an angle
+        near to the first one: at the start, or as `near` says [rad].
 
         Raises
         ------

@@ -1,8 +1,8 @@
 """The drivers of a linkage besides the first one: their courses, their inputs, and their outputs.
 
 One that follows has a law, an expression of the place ``phi`` of the first one; a gear drives it, or a motor of its
-own. One without a law is an input of its own, with a flange and a load port. Where the first driver moves alone, as
-over its way, such a driver stands where its input says.
+own. One without a law is an input of its own, with a flange and a load port. While the first driver alone moves over
+its way, such a driver stands at the place that its input gives.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ class FurtherDrivers:
     def courses(
         self, values: Mapping[str, Any], u: Any, places: Mapping[str, Any] | None = None
     ) -> dict[str, Callable[[Any, Any], Course]]:
-        """The courses by joint, with the `values` of quantities; those that are inputs stand where the inputs `u`
-        say, or at the `places` by name."""
+        """The courses by joint, with the `values` of quantities; inputs stand at the places that `u` gives, or
+        at the `places` by name."""
         courses: dict[str, Any] = {}
         for entry in self.entries:
             if entry.law is not None:
@@ -117,7 +117,7 @@ class FurtherDrivers:
         """The fields of the inputs: the motion of each driver that is one."""
         fields = []
         for entry in self.free.values():
-            low, high = entry.span or (-math.inf, math.inf)
+            low, high = entry.span
             place, unit = ("way", "m") if entry.linear else ("angle", "rad")
             phi = quantity(unit, f"{place} of the driver", default=entry.start, min=low, max=high)
             base = self.port(entry).motion
@@ -253,5 +253,5 @@ class FurtherDrivers:
 
 def _even(entry: DriverEntry) -> list[float]:
     """Even places over the range of a driver."""
-    low, high = entry.span or (entry.start, entry.start + WHOLE)
+    low, high = entry.span
     return [low + (high - low) * k / _PLACES for k in range(_PLACES + 1)]

@@ -245,7 +245,7 @@ class LinkageDescription(LinkageOutputs):
         return self._loaded(self._parts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), u), p)
 
     def _parts(self, geometry: LinkGeometry, u: Any, places: Mapping[str, Any] | None = None) -> LinkageParts:
-        """The parts with the drivers that are inputs where the inputs say, or at `places` by name."""
+        """The parts with the drivers that are inputs at the places that `u` gives, or at `places` by name."""
         courses = self.further.courses(geometry.values, u, places)
         return LinkageParts(geometry, self.sides, courses)
 
@@ -399,7 +399,7 @@ class LinkageDescription(LinkageOutputs):
 
     def _courses(self, followed: FollowedLinkage, p: Any) -> list[dict[str, list[float]]]:
         """The courses of the links over the way of the first driver, at all places of the drivers that are inputs;
-        the margins are added to those of `followed`."""
+        `followed` gets all margins."""
         grid = self.further.grid()
         visited = [(grid[0], followed.courses())]
         for places in grid[1:]:
@@ -413,8 +413,11 @@ class LinkageDescription(LinkageOutputs):
             try:
                 visited.append((places, other.courses({name: course[0] for name, course in near.items()})))
             except InputError as error:
-                where = " and ".join(self.further.words(name, place) for name, place in places.items())
-                raise InputError(f"{error}; this is with {where}", key=error.key) from None
+                others = " and ".join(self.further.words(name, place) for name, place in places.items())
+                raise InputError(
+                    f"{error}; this is with {others}, in its range in [drivers], which may be narrower",
+                    key=error.key,
+                ) from None
             followed.margins += other.margins
         return [courses for _, courses in visited]
 

@@ -38,10 +38,10 @@ class DriverEntry:
     angle `zero` [rad], and the place counts counter-clockwise if `sense` is +1; if it `swings`, it has a range. A
     slide: the joint is prismatic, and the place is the way in it.
 
-    A driver besides the first one has a `name`. Its place follows that of the first one by a `law`, an expression of
-    ``phi``, and it is `geared` if the first one drives it; without a law it is an input, which goes through its
-    `span`, None for a whole turn. `start` is its place at the start, and `rate` how often it turns at most while the
-    first one turns once."""
+    A driver besides the first one has a `name`. Its place follows the place of the first one by a `law`, an
+    expression of ``phi``, and it is `geared` if the first one drives it; without a law it is an input, which goes
+    through its `span`. `start` is its place at the start, and `rate` how often it turns at most while the first one
+    turns once."""
 
     joint: str
     link: str
@@ -52,7 +52,7 @@ class DriverEntry:
     name: str = ""
     law: Entry | None = None
     geared: bool = True
-    span: Sequence[float] | None = None
+    span: Sequence[float] = (0.0, 0.0)
     start: float = 0.0
     rate: float = 1.0
 
@@ -87,7 +87,7 @@ def groups_of(
         for entry, joint in grounded
         if entry is not driver
     ]
-    first = 1 if driving[0] in cylinders else 0
+    first = int(driving[0] in cylinders)
     groups[first:first] = alone
     triad = next((group for group in groups if group.kind == "triad"), None)
     if triad is not None and any(entry.is_free for entry in drivers):
