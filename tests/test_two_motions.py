@@ -153,6 +153,57 @@ toward = "T"
 [start]
 points = {{ C = [0.6, 0.6] }}
 """
+THREE = """
+[ground]
+A = [0, 0]
+E = [1.2, 0]
+[driver]
+link = "main"
+range = ["10 deg", "70 deg"]
+[drivers.bucket]
+[links.main]
+points = { A = [0, 0], B = [0.5, 0], H = [0.1, 0.1] }
+mass = 4
+inertia = 0.2
+centroid = [0.2, 0.03]
+[links.arm]
+points = { B = [0, 0], K = [0.1, 0.2], T = [0.6, 0] }
+mass = 2
+inertia = 0.05
+centroid = [0.25, 0.02]
+[links.barrel]
+points = { H = [0, 0], Y = [1, 0] }
+mass = 0.5
+inertia = 0.01
+centroid = [0.2, 0]
+[links.rod]
+points = { K = [0, 0] }
+mass = 0.4
+inertia = 0.01
+centroid = [-0.1, 0]
+[links.side]
+points = { E = [0, 0], D = [0.3, 0] }
+mass = 1.5
+inertia = 0.03
+centroid = [0.1, 0.01]
+[links.tie]
+points = { D = [0, 0], M = [0.8, 0] }
+mass = 0.8
+inertia = 0.04
+centroid = [0.5, 0]
+[links.flap]
+points = { T = [0, 0], M = [0.7, 0] }
+mass = 0.6
+inertia = 0.02
+centroid = [0.3, 0.02]
+[joints.stick_cylinder]
+on = "rod.K"
+by = "barrel.H"
+toward = "Y"
+[start]
+phi = "40 deg"
+points = { K = [0.27, 0.51], T = [0.7, 0.83], M = [1.35, 1.09] }
+"""
 MACHINES = {
     "geared five-bar": FIVE_BAR.format(law='phi = "-phi + 30 deg"'),
     "five-bar with a servo on a table": FIVE_BAR.format(
@@ -428,3 +479,32 @@ def test_degrees_beside_a_table():
     law = 'phi = "swing + 10 deg"\n[tables.swing]\nphi = [0, 2, 4]\nvalue = ["20 deg", "40 deg", "30 deg"]'
     out = Machine(linkage_from(toml(FIVE_BAR.format(law=law)), "machine")[0]).evaluate({"phi": 2.0})
     assert math.degrees(out["other.phi"]) == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize("names", [("stick", "bucket"), ("bucket", "stick")])
+def test_three_drivers_in_any_order(names):
+    """A crank in the ground, a second one by a law behind a cylinder on it in the file, or before it."""
+    arm = THREE.partition("[drivers.bucket]")
+    blocks = {
+        "stick": '[drivers.stick]\njoint = "stick_cylinder"\nrange = ["0.35 m", "0.55 m"]\n',
+        "bucket": '[drivers.bucket]\nlink = "side"\nphi = "0.5 * sin(phi) + 60 deg"\nby = "motor"\n',
+    }
+    data = toml(arm[0] + "".join(blocks[name] for name in names) + arm[2])
+    machine, description = Machine(linkage_from(data, "machine")[0]), description_of(data, "machine")
+    phi, w, a = 0.7, 1.5, -2.0
+    bucket = (
+        0.5 * math.sin(phi) + math.radians(60.0),
+        0.5 * math.cos(phi) * w,
+        0.5 * (math.cos(phi) * a - math.sin(phi) * w * w),
+    )
+    motions = {"stick": (0.45, 0.1, 0.3), "bucket": bucket}
+    values = dict(zip(("phi", "w", "a"), (phi, w, a), strict=True))
+    values |= {f"stick.{key}": x for key, x in zip(("phi", "w", "a"), motions["stick"], strict=True)}
+    out = machine.evaluate(values)
+    other = Multibody(description)
+    moved = np.array([(phi, w, a), *(motions[name] for name in names)]).T
+    want = other.solution(other.followed(moved[0]), *moved)
+    size = max(abs(want[key]) for key in want if key.endswith((".fx", ".fy")))
+    for key in want:
+        if key.endswith((".fx", ".fy", "tau")):
+            assert out[key] == pytest.approx(want[key], abs=1e-10 * size), key

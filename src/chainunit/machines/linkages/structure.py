@@ -161,8 +161,11 @@ class Structure:
         }
         joints = {joint["name"]: JointEntry.from_table(joint) for joint in data["joints"]}
         driver, ground, start = DriverEntry(**data["driver"]), data["ground"], data["start"]
-        further = tuple(DriverEntry(**entry) for entry in data.get("drivers", ()))
-        groups = groups_of([*links], [*joints.values()], [driver, *further])
+        others = [DriverEntry(**entry) for entry in data.get("drivers", ())]
+        groups = groups_of([*links], [*joints.values()], [driver, *others])
+        driven = [group.links for group in groups if group.kind in (DRIVER, CYLINDER)]
+        # in the order of their groups
+        further = sorted(others, key=lambda entry: next(k for k, g in enumerate(driven) if entry.link in g))
         loaded = (load[key] for load in data["loads"] for key in ("on", "by") if key in load)
         marked = {tuple(end) for end in loaded if len(end) == 2}
         for group in groups:
@@ -179,7 +182,7 @@ class Structure:
             links,
             joints,
             driver,
-            further,
+            tuple(further),
             tuple(groups),
             pins,
             frozenset(marked),
