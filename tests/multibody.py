@@ -3,8 +3,8 @@ multipliers, with numpy alone. It shares no line with the package: neither group
 
 The unknowns are x, y and angle of the frame of each link. A revolute joint closes two points; a sliding one holds the
 point of `on` on the line of `by`, and the angle between both links; two wheels in mesh move alike along their common
-tangent at the pitch point; the driver has the last equation. A multiplier is the force (of a sliding joint the force
-across its line and the moment about the point) on `on` from `by`.
+tangent at the pitch point; each driver has an equation after all these. A multiplier is the force (of a sliding joint
+the force across its line and the moment about the point) on `on` from `by`.
 """
 
 from __future__ import annotations
@@ -54,8 +54,9 @@ class Multibody:
             )
             for point, mass in link["masses"].items():
                 self.bodies.append((link["name"], points[point], self.number(mass), 0.0))
-        self.joints = [joint for joint in data["joints"] if joint["name"] != data["driver"]["joint"]]
-        self.joints += [joint for joint in data["joints"] if joint["name"] == data["driver"]["joint"]]
+        self.drivers = [data["driver"], *data.get("drivers", ())]
+        driven = [driver["joint"] for driver in self.drivers]
+        self.joints = sorted(data["joints"], key=lambda joint: joint["name"] in driven)
         self.start = data["start"]["value"]
         self.rough = np.array([data["start"]["poses"][name] for name in self.names], float).ravel()
         self.wheels, self.phases = wheels or {}, {}
@@ -125,7 +126,7 @@ class Multibody:
         return on - arm - ratio * (by - arm)
 
     def equations(self, x, q):
-        """Misfits of all joints and of the driver, and their derivatives by the unknowns."""
+        """Misfits of all joints and of the drivers at their places `q`, and their derivatives by the unknowns."""
         gaps, rows = [], []
         for joint in self.joints:
             if joint["type"] == "gear":
@@ -154,20 +155,18 @@ class Multibody:
             (one, one_by), (other, other_by) = (self.angle(x, joint[end][0]) for end in ("on", "by"))
             gaps += [(p - r) @ n, one - other - self.number(joint["angle"])]
             rows += [n @ (p_by - r_by) - (p - r) @ d * other_by, one_by - other_by]
-        driver = self.data["driver"]
-        if driver["linear"]:
-            joint = self.joints[-1]
-            (p, p_by), (r, r_by) = (
-                self.place(x, link, self.points[link][name]) for link, name in (joint["on"], joint["by"])
-            )
-            d = self.line(x, joint)
-            other_by = self.angle(x, joint["by"][0])[1]
-            gaps.append((p - r) @ d - q)
-            rows.append(d @ (p_by - r_by) + (p - r) @ turned(d) * other_by)
-        else:
-            angle, by = self.angle(x, driver["link"])
-            gaps.append(angle - self.number(driver["zero"]) - driver["sense"] * q)
-            rows.append(by)
+        for driver, place in zip(self.drivers, np.atleast_1d(q), strict=True):
+            if driver["linear"]:
+                joint = next(joint for joint in self.joints if joint["name"] == driver["joint"])
+                (p, p_by), (r, r_by) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+                d = self.line(x, joint)
+                other_by = self.angle(x, joint["by"][0])[1]
+                gaps.append((p - r) @ d - place)
+                rows.append(d @ (p_by - r_by) + (p - r) @ turned(d) * other_by)
+            else:
+                angle, by = self.angle(x, driver["link"])
+                gaps.append(angle - self.number(driver["zero"]) - driver["sense"] * place)
+                rows.append(by)
         return np.array(gaps), np.array(rows)
 
     def closed(self, q, near, steps=30):
@@ -193,29 +192,33 @@ class Multibody:
             k += 1 if joint["type"] == "gear" else 2
             if joint["type"] == "prismatic":
                 found.add(k - 1)
-        return found | (set() if self.data["driver"]["linear"] else {k})
+        return found | {k + n for n, driver in enumerate(self.drivers) if not driver["linear"]}
 
     def followed(self, q, most=0.1):
         """The pose at `q`, followed from the start in small steps."""
-        x = self.closed(self.start, self.rough)
-        count = max(1, math.ceil(abs(q - self.start) / most))
+        start = np.array([self.start, *(driver["start"] for driver in self.drivers[1:])])
+        q = np.atleast_1d(q)
+        x = self.closed(start, self.rough)
+        count = max(1, math.ceil(np.max(np.abs(q - start)) / most))
         for k in range(1, count + 1):
             assert x is not None
-            x = self.closed(self.start + (q - self.start) * k / count, x, 12)
+            x = self.closed(start + (q - start) * k / count, x, 12)
         return x
 
     def solution(self, x, q, w, a):
-        """Torque, reactions and motion at the pose `x`: outputs by the names of the package."""
+        """Torque, reactions and motion at the pose `x`: outputs by the names of the package; `q`, `w` and `a` are of
+        the driver, or of all drivers, whose efforts are ``tau`` and the name of each with ``.tau``."""
         size = x.size
         _, rows = self.equations(x, q)
-        driver = self.data["driver"]
-        by_q = np.zeros(size)
-        by_q[-1] = 1.0 if driver["linear"] else driver["sense"]
-        x1 = np.linalg.solve(rows, by_q)
-        # rows(x) x1 = by_q, so that rows x2 = -(rows along x1) x1
-        along = self.equations(x.astype(complex) + 1e-30j * x1, q)[1].imag / 1e-30
-        x2 = np.linalg.solve(rows, -along @ x1)
-        v, accel = x1 * w, x1 * a + x2 * w * w
+        q, w, a = (np.atleast_1d(each).astype(float) for each in (q, w, a))
+        signs = np.array([1.0 if driver["linear"] else driver["sense"] for driver in self.drivers])
+        by_q = np.zeros((size, signs.size))
+        by_q[-signs.size :] = np.diag(signs)
+        v = np.linalg.solve(rows, by_q @ w)
+        # rows(x) v = by_q w, so that rows x'' = by_q a - (rows along v) v
+        along = self.equations(x.astype(complex) + 1e-30j * v, q)[1].imag / 1e-30
+        accel = np.linalg.solve(rows, by_q @ a - along @ v)
+        q, w = q[0], w[0]
 
         def motion(link, local):
             p, by = self.place(x, link, local)
@@ -260,7 +263,8 @@ class Multibody:
             load_power += force @ speed
         factors = np.linalg.solve(rows.T, needed - applied)
         found = {"kinetic_energy": kinetic, "potential_energy": potential, "load_power": load_power}
-        found["tau"] = factors[-1] * by_q[-1]
+        names = ("tau", *(f"{driver['name']}.tau" for driver in self.drivers[1:]))
+        found |= dict(zip(names, factors[-signs.size :] * signs, strict=True))
         left = iter(factors)
         for joint in self.joints:
             one, name = next(left), joint["name"]

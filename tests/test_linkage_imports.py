@@ -278,24 +278,51 @@ def test_links_that_are_one(tmp_path):
 
 # what cannot be carried over
 
-ONE_MORE = (
-    '<connector x="500" y="0" id="20" anchor="true" input="true"/><connector x="500" y="40" id="21"/>'
-    + ('<Link id="20"><connector id="20"/><connector id="21"/></Link></linkage2>')
+FIVE_BAR = (
+    '<linkage2><connector x="0" y="0" id="0" anchor="true" input="true"/><connector x="200" y="0" id="1"/>'
+    '<connector x="600" y="900" id="2"/><connector x="1400" y="0" id="3"/>'
+    '<connector x="1200" y="0" id="4" anchor="true" input="true"/>'
+    '<Link id="0"><connector id="0"/><connector id="1"/></Link>'
+    '<Link id="1"><connector id="1"/><connector id="2"/></Link>'
+    '<Link id="2"><connector id="2"/><connector id="3"/></Link>'
+    '<Link id="3"><connector id="3"/><connector id="4"/></Link></linkage2>'
+)
+# the left crank turns, a cylinder on the ground moves the right one
+CYLINDER_BAR = FIVE_BAR.replace('id="4" anchor="true" input="true"', 'id="4" anchor="true"').replace(
+    "</linkage2>",
+    '<connector x="1800" y="600" id="5" anchor="true"/>'
+    '<Link id="5" actuator="true" throw="50"><connector id="5"/><connector id="3"/></Link></linkage2>',
 )
 
 
-def test_two_inputs_are_refused_by_name(tmp_path):
-    two = (
-        "connector 4, connector 20: 2 inputs: a linkage has one driver, and a second one is not possible yet"
+def test_two_inputs_are_two_drivers(tmp_path):
+    """Motors turn in step by their speeds, the slowest one first; a cylinder is an input of its own."""
+    five_bar = FIVE_BAR.replace('id="0" anchor="true"', 'id="0" anchor="true" rpm="-30"').replace(
+        'id="4" anchor="true"', 'id="4" anchor="true" rpm="15"'
     )
-    assert refusal(written(tmp_path, KLANN.replace("</linkage2>", ONE_MORE))).endswith(two)
-    cylinder = ONE_MORE.replace(' input="true"', "").replace('"20"><', '"20" actuator="true" throw="9"><', 1)
-    assert "connector 4, Link 20: 2 inputs" in refusal(
-        written(tmp_path, KLANN.replace("</linkage2>", cylinder))
+    source = imported(written(tmp_path, five_bar), density="20 kg/m")
+    assert source.tables["driver"]["link"] == "L3"
+    assert source.tables["drivers"] == {"motor_C0": {"link": "L0", "phi": "-2.0 * phi", "by": "motor"}}
+    assert any("connector 0 turns -2 times as fast as connector 4" in remark for remark in source.remarks)
+    out = Machine(source.machine()[0]).evaluate({"phi": 0.4, "w": 2.0})
+    assert out["motor_C0.phi"] == pytest.approx(-0.8) and out["motor_C0.w"] == pytest.approx(-4.0)
+    assert out["L0.w"] == pytest.approx(-4.0) and out["L3.w"] == pytest.approx(2.0)
+    cylinder = imported(written(tmp_path, CYLINDER_BAR), density="20 kg/m").tables
+    (name,) = cylinder["drivers"]
+    assert cylinder["drivers"][name]["joint"] == name and cylinder["drivers"][name]["range"][0] > 0.0
+    assert {f"{name}_driver.{key}" for key in ("phi", "w", "a")} <= {
+        *machine(written(tmp_path, CYLINDER_BAR), density="20 kg/m").model.input_layout.names
+    }
+    uneven = five_bar.replace('rpm="-30"', 'rpm="-20"')
+    assert "moves by -1.33333 turns in a turn of the first driver" in refusal(written(tmp_path, uneven))
+    address = "j=A,0,0,l,R,t,0,t\nB,0.3,0,l|m,R,f,0,f\nC,0.8,0.9,m|n,R,f,0,f\nD,1.5,0,n|o,R,f,0,f\n"
+    address += (
+        "E,1.2,0,o,R,t,0,t&l=l,1,1,0,0,A|B\nm,1,1,0,0,B|C\nn,1,1,0,0,C|D\no,1,1,0,0,D|E&f=&s=10,true,true,m"
     )
-    assert 'joint "A", joint "D": 2 inputs' in refusal(
-        FORCE.replace("D,1,0,CD,R,t,0,0.1,f", "D,1,0,CD,R,t,0,0.1,t")
-    )
+    assert imported(address).tables["drivers"]["motor_E"]["phi"] == "1.0 * phi"
+
+
+def test_a_linkage_that_lacks_an_input_is_refused():
     five_bar = COUPLER_POINT.replace("L[L2, L3]", "L[L2, L4]").replace(
         "P[35, 95], L[L2]", "P[90, 50], L[L4, L3]"
     )

@@ -1,6 +1,6 @@
 """Wrong linkage files, as people write them: what is changed in a right one, and what the reader tells."""
 
-from chainunit.mechanism.assur import ONE_DRIVER
+from chainunit.mechanism.assur import FURTHER_DRIVERS
 
 PRESS = """\
 title = "press"
@@ -224,7 +224,7 @@ CHANGES = [
      [(35, "start.phi", "is 0 if it is not given; must be an angle in driver.range")]),
     # drivers of other programs
     ([("[driver]", "[[driver]]"), ("[links.crank]", '[[driver]]\nlink = "rod"\n[links.crank]')],
-     [(14, "driver", "stands there 2 times: a linkage has one driver, and a second one is not possible yet")]),
+     [(14, "driver", f"stands there 2 times; {FURTHER_DRIVERS}: write [driver]")]),
     ([("[driver]", "[[driver]]")], [(14, "driver", "is a list; write [driver]")]),
     ([("[driver]\nlink = \"crank\"\nzero = \"0 deg\"", "[driver]"), ("[driver]", "")],
      [(0, "driver", "the link that the motor turns")]),
@@ -427,8 +427,8 @@ FILES = [
      [(10, "links.one", "the links one, two, leg_b, leg_c, leg_d, leg_e form one group with 6 links")]),
     (SLIDES, [(9, "links.block", "three sliding joints, one, two and three")]),
     (TRIAD, [(13, "links.leg_s", "slides in both of its joints, rail and slot")]),
-    (FIVE_BAR, [(8, "links.lower", f"if two motors or cylinders move the machine: {ONE_DRIVER}; else add a joint")]),
-    (EXCAVATOR, [(9, "links.stick", f"if two motors or cylinders move the machine: {ONE_DRIVER}; else add")]),
+    (FIVE_BAR, [(8, "links.lower", f"motors or cylinders move the machine, {FURTHER_DRIVERS}; else add a joint")]),
+    (EXCAVATOR, [(9, "links.stick", f"motors or cylinders move the machine, {FURTHER_DRIVERS}; else add")]),
     (BRANCHES, [(11, "start.points.B", '["237.8 mm", "569.8 mm"] or ["650 mm", "3.136 mm"]')]),
     (SLOT, [(15, "start.angles.arm", '"71.57 deg" or "-108.4 deg"')]),
     ("", [(0, "links", "give at least the link that the driver turns")]),

@@ -164,18 +164,31 @@ def measured_terminal(**signals: str) -> Terminal:
     return Terminal("measured", MEASURED, "the measured signals of the motor", members, rule="bus")
 
 
-def way_terminals(load: bool) -> tuple[Terminal, ...]:
+def way_terminals(load: bool, driver: str = "") -> tuple[Terminal, ...]:
     """The terminals of a driver that slides: our own, the one that tools with Modelica's library know, and with
-    `load` its load port. None of them fits a shaft."""
-    members = {member: member for member in ("phi", "w", "a", "tau")}
+    `load` its load port. None of them fits a shaft. The variables of a further `driver` carry its name."""
+    prefix, suffix = (f"{driver}.", f"_{driver}") if driver else ("", "")
+    members = {member: prefix + member for member in ("phi", "w", "a", "tau")}
     title = "the driver and its force"
-    terminal = Terminal("flange", f"{OWN}.linear_flange", title, members, {"tau": "inflow"})
+    terminal = Terminal(f"flange{suffix}", f"{OWN}.linear_flange", title, members, {"tau": "inflow"})
+    modelica = {"s": members["phi"], "f": members["tau"]}
     outside = Terminal(
-        "flange_a", TRANSLATIONAL, f"{title}, as Modelica's", {"s": "phi", "f": "tau"}, {"f": "inflow"}
+        f"flange_a{suffix}", TRANSLATIONAL, f"{title}, as Modelica's", modelica, {"f": "inflow"}
     )
-    port = {member: member for member in Layout(LoadPort).names}
+    port = {member: prefix + member for member in Layout(LoadPort).names}
     title = "the load port: a load as the driver sees it"
-    return terminal, outside, *([Terminal("load", f"{OWN}.linear_load", title, port)] if load else [])
+    return (
+        terminal,
+        outside,
+        *([Terminal(f"load{suffix}", f"{OWN}.linear_load", title, port)] if load else []),
+    )
+
+
+def further_terminals(driver: str) -> tuple[Terminal, ...]:
+    """The terminals of a driver that turns beside the first one; its variables carry its name."""
+    terminal = flange("inflow", f"{driver}.", f"flange_{driver}")
+    port = load_terminal(f"{driver}.", f"load_{driver}")
+    return terminal, _as_modelica(terminal, f"flange_a_{driver}"), port
 
 
 def load_terminal(prefix: str = "", name: str = "load") -> Terminal:

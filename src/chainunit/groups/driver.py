@@ -1,31 +1,45 @@
 """The drivers, which move in a given way: a crank on a fixed bearing, a ram on a fixed rail, and a cylinder that is
 pinned at both ends, with the lever that it swings.
 
-Each has the coordinate q of the linkage. In the packaged machines q is the crank angle, which counts from the upward
-vertical, positive clockwise, so that the derivative of the crank's counter-clockwise angle by q is -1. The rows of a
-driver have one more, which says how q moves it; its multiplier is the torque, or the force, along q.
+The first one of a linkage has its coordinate q; a further one has a `course` over q. In the packaged machines q is
+the crank angle, which counts from the upward vertical, positive clockwise, so that the derivative of the crank's
+counter-clockwise angle by q is -1. The rows of a driver have one more, which says how its place moves it; its
+multiplier is the torque, or the force, along its place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.planar import ZERO, Vec2
 from .body import Bar, Mass
 from .dyad import meeting
 from .group import Group, SolvedGroup
-from .joints import CrankDrive, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
+from .joints import STEADY, CrankDrive, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
 
 UPWARD = Vec2(0.0, 1.0)
 
 
+class Course(NamedTuple):
+    """The `place` of a driver [rad, m], and its derivatives by the coordinate q up to the third."""
+
+    place: Any
+    rates: Sequence[Any] = STEADY
+
+
 class Driver(Group):
-    """The link that is driven, as data: its bar, and the pin that shows its motion."""
+    """The link that is driven, as data: its bar, the pin that shows its motion, and its `course` by engine and q;
+    without one q is its place."""
 
     bar: Bar
     end: str
+    course: Callable[[Any, Any], Course] | None
+
+    def course_at(self, xp: Any, q: Any) -> Course:
+        """Its place and the derivatives of it at the coordinate `q`."""
+        return Course(q) if self.course is None else self.course(xp, q)
 
     @property
     def inertia(self) -> Any:
@@ -44,6 +58,7 @@ class Crank(Driver):
     end: str
     start: Vec2 = UPWARD
     sense: float = -1.0
+    course: Callable[[Any, Any], Course] | None = None
 
     @property
     def pins(self) -> dict[str, str]:
@@ -64,13 +79,14 @@ class Crank(Driver):
         return mass.I + mass.m * arm2
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The crank at the angle `q` [rad]."""
+        """The crank at the coordinate `q`."""
         bearing, start = linkage.pins[self.bar.pin], self.start
-        c, s = xp.cos(q), xp.sin(q) * self.sense
+        angle, rates = self.course_at(xp, q)
+        c, s = xp.cos(angle), xp.sin(angle) * self.sense
         u = Vec2(start.x * c - start.y * s, start.y * c + start.x * s)
-        joints = Hinge(0, base=bearing), CrankDrive(0, int(self.sense))
+        joints = Hinge(0, base=bearing), CrankDrive(0, int(self.sense), rates)
         ends = [] if self.bar.length is None else [(0, u * self.bar.length)]
-        return SolvedGroup([(bearing, u)], joints, ends=ends)
+        return SolvedGroup([(bearing, u)], joints, ends=ends, course=rates)
 
 
 @dataclass
@@ -83,6 +99,7 @@ class Ram(Driver):
     rail: Rail
     guide: str
     end: str = ""
+    course: Callable[[Any, Any], Course] | None = None
 
     @property
     def joints(self) -> tuple[JointData, ...]:
@@ -94,26 +111,28 @@ class Ram(Driver):
         return 0.0 if self.bar.mass is None else self.bar.mass.m
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
-        """The ram at the way `q` [m]."""
+        """The ram at the coordinate `q`."""
         rail = self.rail.at_position(linkage.links)
-        way = rail.u * q
-        return SolvedGroup([(rail.pin.p + way, rail.u)], [Guide(0, rail.u, q, way, rail, line=0.0)])
+        place, rates = self.course_at(xp, q)
+        way = rail.u * place
+        guide = Guide(0, rail.u, place, way, rail, line=0.0, course=rates)
+        return SolvedGroup([(rail.pin.p + way, rail.u)], [guide], course=rates)
 
 
 @dataclass
 class Cylinder(Driver):
     """A cylinder with its lever, as data.
 
-    The barrel P-.. on a ground pin and the rod ..-C slide along each other; the lever Q-C stands on another ground
-    pin. q is the way in the sliding joint. With e = C - P = L d + offset n, where d is the direction of the cylinder
-    and L = q + shift, barrel and rod together are one side of a triangle whose length |e| is known. The margin is the
-    sine of the angle between cylinder and lever.
+    The barrel P-.. and the rod ..-C slide along each other; the lever Q-C swings. P and Q are pins of the ground or,
+    of a further driver, of links before it. The place is the way in the sliding joint. With e = C - P = L d + offset
+    n, where d is the direction of the cylinder and L = way + shift, barrel and rod together are one side of a
+    triangle whose length |e| is known. The margin is the sine of the angle between cylinder and lever.
 
     The frames of barrel (`bar`) and `rod` start at their pins and have the direction of the cylinder. `end` is the
     pin between rod and lever, which the lever carries. `shift` and `offset` place this pin from that of the barrel,
-    along and across, at q = 0 [m]; `rod_offset` is how far the line of the force lies to the left of the rod's pin
-    [m]. `side` is +1 where the pin lies to the left of the ray from the barrel's pin to that of the lever, -1 where
-    to the right. `guide` is the pin at which the reaction of the sliding joint acts on the rod.
+    along and across, at a way of 0 [m]; `rod_offset` is how far the line of the force lies to the left of the rod's
+    pin [m]. `side` is +1 where the pin lies to the left of the ray from the barrel's pin to that of the lever, -1
+    where to the right. `guide` is the pin at which the reaction of the sliding joint acts on the rod.
     """
 
     bar: Bar
@@ -125,6 +144,7 @@ class Cylinder(Driver):
     rod_offset: Any
     guide: str
     side: float
+    course: Callable[[Any, Any], Course] | None = None
 
     @property
     def joints(self) -> tuple[JointData, ...]:
@@ -145,15 +165,16 @@ class Cylinder(Driver):
         """The cylinder at the way `q` of its rod [m]: its three pins make a triangle, of which q gives the length of
         one side; the inner pin stands on one of two sides of the line between the other pins."""
         p, o = linkage.pins[self.bar.pin], linkage.pins[self.lever.pin]
-        way, h, b = q + self.shift, self.offset, self.lever.length
+        place, rates = self.course_at(xp, q)
+        way, h, b = place + self.shift, self.offset, self.lever.length
         square = way * way + h * h
         e, r = meeting(xp, p.p, o.p, square, b * b, self.side)
         d = (e * way - e.turned() * h) * (1.0 / square)
         poses = (p, d), (o.p + r, d), (o, r * (1.0 / b))
         joints = (
             Hinge(0, base=p),
-            Guide(1, d, q, e, 0, line=self.rod_offset),
+            Guide(1, d, place, e, 0, line=self.rod_offset, course=rates),
             Hinge(1, ZERO, 2, r),
             Hinge(2, base=o),
         )
-        return SolvedGroup(poses, joints, size=b * xp.sqrt(square))
+        return SolvedGroup(poses, joints, size=b * xp.sqrt(square), course=rates)

@@ -20,7 +20,7 @@ class SolvedGroup:
     """A group at one position: its `links` in the order of the group's bars, the `pins` that it adds, the `margin`,
     which is 0 in a dead position, and the `slides` in its sliding joints, in the order of the group's `guides`."""
 
-    __slots__ = ("_joints", "_matrix", "_rates", "_seats", "links", "margin", "pins", "slides")
+    __slots__ = ("_joints", "_matrix", "_rates", "_seats", "course", "links", "margin", "pins", "slides")
 
     def __init__(
         self,
@@ -29,6 +29,7 @@ class SolvedGroup:
         margin: Any = None,
         size: Any = 1.0,
         ends: Sequence[Seat] = (),
+        course: Sequence[Any] | None = None,
     ) -> None:
         """
         Parameters
@@ -36,8 +37,9 @@ class SolvedGroup:
         poses : start and unit vector of each link; a start on a pin before the group as its motion
         margin : margin, None for the determinant of the joints over the `size`
         ends : pins that the group adds besides those between its links
+        course : of a driver, the derivatives of its place by q
         """
-        self._joints = joints
+        self._joints, self.course = joints, course
         matrix = self._matrix = GroupMatrix(
             UNKNOWNS * len(poses), [row for joint in joints for row in joint.rows()]
         )

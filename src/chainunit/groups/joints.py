@@ -23,6 +23,8 @@ Seat = tuple[int, Vec2]
 """A pin on a link: the number of the link in its group, and the arm from its start."""
 TURNS, SLIDES = "turns", "slides"
 """Forms of the relative motion in a joint."""
+STEADY: tuple[Any, Any, Any] = (1.0, 0.0, 0.0)
+"""Derivatives by q of the place of a driver that has the coordinate q itself."""
 UNKNOWNS = 4
 """Number of the unknowns of a link: derivatives of its start along x and y, of its angle, and of its way along the
 line on which it starts."""
@@ -287,19 +289,20 @@ def _bent(e: Vec2, arm: Vec2, rates: Rates, link: int, sign: float) -> Vec2:
 
 
 class CrankDrive(Placed):
-    """The drive of a crank: its angle changes by `sense`, 1 or -1, with q."""
+    """The drive of a crank: its angle changes by `sense`, 1 or -1, with the place of the driver, which has the
+    derivatives `course` by q."""
 
-    __slots__ = ("_link", "_sense")
+    __slots__ = ("_course", "_link", "_sense")
 
-    def __init__(self, link: int, sense: int) -> None:
-        self._link, self._sense = link, sense
+    def __init__(self, link: int, sense: int, course: Sequence[Any] = STEADY) -> None:
+        self._link, self._sense, self._course = link, sense, course
 
     def rows(self) -> list[Row]:
         """Its row: of the angle."""
         return [{UNKNOWNS * self._link + 2: self._sense}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        return [0.0 if rates else 1.0]
+        return [self._course[len(rates)]]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
         return None, next(multipliers)
@@ -308,15 +311,24 @@ class CrankDrive(Placed):
 class Guide(Hinge):
     """A sliding joint at one position: the line through a point of the other link in the direction `d`, on which the
     link starts, at the way `s`; `arm` goes from the start of the other link, or of the rail before the group, to the
-    start of the link. A `line` makes the way the coordinate: it is how far the force of the driver lies to the left
-    of the start of the link [m]."""
+    start of the link. With a `line` a driver gives the way, with the derivatives `course` by q: it is how far the
+    force of the driver lies to the left of the start of the link [m]."""
 
-    __slots__ = ("_d", "_line", "_other", "_s")
+    __slots__ = ("_course", "_d", "_line", "_other", "_s")
 
-    def __init__(self, link: int, d: Vec2, s: Any, arm: Vec2, other: int | Link, line: Any = None) -> None:
+    def __init__(
+        self,
+        link: int,
+        d: Vec2,
+        s: Any,
+        arm: Vec2,
+        other: int | Link,
+        line: Any = None,
+        course: Sequence[Any] = STEADY,
+    ) -> None:
         by, base = (other, None) if isinstance(other, int) else (None, other.carried(arm))
         super().__init__(link, ZERO, by, arm, base)
-        self._d, self._s, self._other, self._line = d, s, other, line
+        self._d, self._s, self._other, self._line, self._course = d, s, other, line, course
 
     @property
     def seat(self) -> Seat | None:
@@ -342,11 +354,11 @@ class Guide(Hinge):
                 turns.append(before[1])
             angle = turns[order]
         e = Vec2(*super().right(rates, before))
-        if order == 0:
-            e = e + d if self._line is not None else e
-        elif order == 1:
+        if self._line is not None and (order == 0 or self._course is not STEADY):
+            e = e.plus(d, self._course[order])
+        if order == 1:
             e = e.plus(d.turned(), 2.0 * (turns[0] * self._speed(rates, 0)))
-        else:
+        elif order == 2:
             t1, s1 = turns[0], self._speed(rates, 0)
             across = 3.0 * (turns[1] * s1 + t1 * self._speed(rates, 1))
             e = e.plus(d.turned(), across).plus(d, -3.0 * (t1 * t1 * s1))
@@ -354,7 +366,7 @@ class Guide(Hinge):
 
     def _speed(self, rates: Rates, order: int) -> Any:
         """The derivative of the way by q."""
-        return rates[order][UNKNOWNS * self._link + 3] if self._line is None else 1.0 - order
+        return rates[order][UNKNOWNS * self._link + 3] if self._line is None else self._course[order]
 
     def slide(self, rates: Rates) -> Slide:
         """The motion along its line."""

@@ -16,13 +16,20 @@ from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Body
 from .joints import GuideForce, Joint, Slide
 
+Reactions = Mapping[Joint, Vec2]
+"""The force in each joint on its link [N]."""
+
 
 class Moving(Protocol):
     """A linkage in motion, as loads see it."""
 
     @property
     def q(self) -> Any:
-        """The coordinate [rad, m]."""
+        """The place of the first driver [rad, m]."""
+
+    @property
+    def rate(self) -> Any:
+        """The derivative of that place by the coordinate, 1 if it is the coordinate itself."""
 
     @property
     def links(self) -> Mapping[str, Link]:
@@ -227,12 +234,14 @@ class PinLosses(NamedTuple):
     laws: Mapping[Joint, Any] = MappingProxyType({})
     by_reactions: bool = True
 
-    def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
-        """The torque of friction and damping in all pins along the coordinate."""
+    def effect(self, xp: Any, m: Moving, w: Any, reactions: Reactions, along: Moving | None = None) -> Effect:
+        """The torque of friction and damping in all pins along the coordinate, or `along` another motion
+        of the linkage."""
         w2, loss, constants = w * w, 0.0, self._constants()
         for joint, turn in m.turns.items():
             per_newton, smooth2, damping = constants.get(joint) or constants[None]
             k2, _, ratio = _friction_terms(xp, reactions[joint].squared(), turn, w2, smooth2)
+            k2 = k2 if along is None else turn * along.turns[joint]
             loss = loss + k2 * (per_newton * ratio + damping)
         return Effect(dissipative=loss * w)
 
@@ -285,15 +294,15 @@ class GuideLosses(NamedTuple):
     laws: Mapping[Joint, Any] = MappingProxyType({})
     by_reactions: bool = True
 
-    def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
-        """The effort of friction and damping in all guides along the coordinate."""
+    def effect(self, xp: Any, m: Moving, w: Any, reactions: Reactions, along: Moving | None = None) -> Effect:
+        """The effort of friction and damping in all guides along the coordinate; `along` as for pins."""
         w2, loss, constants = w * w, 0.0, self._constants()
         for joint, slide in m.slides.items():
             friction, smooth2, per = constants.get(joint) or constants[None]
             for press in self._presses(m, joint, reactions[joint]):
                 _, _, ratio = _friction_terms(xp, press * press, slide.s1, w2, smooth2)
                 per = per + friction * ratio
-            loss = loss + slide.s1 * slide.s1 * per
+            loss = loss + slide.s1 * (slide if along is None else along.slides[joint]).s1 * per
         return Effect(dissipative=loss * w)
 
     def slope(

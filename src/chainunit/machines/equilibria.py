@@ -242,10 +242,10 @@ def friction_torque(state: MachineState) -> Any:
     with its reaction at rest, which is without friction."""
     losses = [loss for loss in state.m.linkage.loads.values() if isinstance(loss, PinLosses | GuideLosses)]
     return sum(
-        loss._replace(damping=0.0)
-        .effect(numpy_(), state.m, _SLIDING, state.steady.reactions)
-        .dissipative
-        for loss in losses
+        share * loss._replace(damping=0.0).effect(
+            numpy_(), state.m, _SLIDING, state.steady.reactions, along
+        ).dissipative
+        for loss in losses for share, along in state.directions
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ decomposition of the equations; where all their ranks are full, it is that into 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.errors import InputError
@@ -19,7 +19,7 @@ GROUND = "ground"
 REVOLUTE, PRISMATIC = "revolute", "prismatic"
 
 
-ONE_DRIVER = "a linkage has one driver, and a second one is not possible yet"
+FURTHER_DRIVERS = "give each of the others a table [drivers.NAME] beside [driver]"
 
 
 class FreeLinksError(InputError):
@@ -63,10 +63,10 @@ class AssurGroup(NamedTuple):
     joints: tuple[JointOf, ...]
 
 
-def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> list[AssurGroup]:
-    """The groups of the links that hang on the ground and on the `driver`, in an order in which they can be solved.
+def decompose(links: Sequence[str], joints: Sequence[JointOf], drivers: Collection[str]) -> list[AssurGroup]:
+    """The groups of the links that hang on the ground and on the `drivers`, in an order in which they can be solved.
 
-    `joints` are all but that of the driver with the ground.
+    `joints` are all but those of the drivers with the ground.
 
     Raises
     ------
@@ -74,12 +74,12 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> l
         for a linkage with too many or too few degrees of freedom, or with a group of a class that is not covered, in
         one line that names the links and the joints.
     """
-    unknown = [link for link in links if link != driver]
+    unknown = [link for link in links if link not in drivers]
     matched = _matching(dict.fromkeys(unknown, 3), joints)
     free = {link: 3 - sum(1 for matched_link in matched.values() if matched_link == link) for link in unknown}
     if any(free.values()):
         raise _freedoms(unknown, joints, matched, free)
-    groups, placed = [], {GROUND, driver}
+    groups, placed = [], {GROUND, *drivers}
     for part in _strong_parts(_dependences(unknown, joints, matched)):
         groups.append(_classified(tuple(part), joints, placed))
         placed |= {*part}
@@ -87,7 +87,10 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> l
 
 
 def in_order_of_motion(
-    pins: Mapping[str, Sequence[str]], links: Sequence[str], joints: Sequence[JointOf], driver: str
+    pins: Mapping[str, Sequence[str]],
+    links: Sequence[str],
+    joints: Sequence[JointOf],
+    drivers: Collection[str],
 ) -> dict[str, list[str]]:
     """By pin, the links that meet in it, in the order in which their motion is known: the first one carries the pin,
     and the others hang on it.
@@ -100,14 +103,14 @@ def in_order_of_motion(
     ----------
     pins : by pin, the names of the links in it
     links, joints : all links, and the other joints
-    driver : the link whose motion is given
+    drivers : the links whose motions are given
     """
-    ranks = {GROUND: -2, driver: -1}
+    ranks = {GROUND: -2, **dict.fromkeys(drivers, -1)}
     points = {pin: f"{pin}." for pin in pins}  # no link has a name with a point
     unknowns = {link: 3 for link in links if link not in ranks} | dict.fromkeys(points.values(), 2)
     all_joints = [joint for joint in joints if not {joint.on, joint.by} <= ranks.keys()]
     for pin, meeting in pins.items():
-        # ground and driver both say where the pin of the driver is: one of them is enough
+        # ground and driver both say where the pin of a driver is: one of them is enough
         placed = [link for link in meeting if link in ranks]
         joined = [link for link in meeting if link not in ranks] + placed[:1]
         all_joints += [JointOf(pin, REVOLUTE, link, points[pin]) for link in joined]
@@ -195,7 +198,7 @@ def _freedoms(
         loose |= more
     names = [link for link in unknown if link in loose]
     lone = [link for link in names if sum(link in (j.on, j.by) for j in joints) < 2]
-    hint = f"; if two motors or cylinders move the machine: {ONE_DRIVER}; else"
+    hint = f"; if several motors or cylinders move the machine, {FURTHER_DRIVERS}; else"
     if lone:
         joined = any(lone[0] in (j.on, j.by) for j in joints)
         hint = f"; {lone[0]} has {'one joint' if joined else 'no joint'};"

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import engines
+from ..core import engines, jets
 
 ROUNDED = 0.1
 """Part of the way of a `ramp` over which each of its corners is rounded."""
@@ -76,15 +76,19 @@ class _Piece(NamedTuple):
 
 class TableCurve:
     """A table of one variable, between its points by cubic pieces that rise or fall as their ends do (Fritsch and
-    Carlson). Over an angle it repeats itself each turn; over a way its ends go on."""
+    Carlson), or by a cubic spline, which has a continuous second derivative, too. Over an angle it repeats itself
+    each turn; over a way its ends go on."""
 
-    def __init__(self, places: Sequence[float], values: Sequence[float], turns: bool) -> None:
+    def __init__(
+        self, places: Sequence[float], values: Sequence[float], turns: bool, spline: bool = False
+    ) -> None:
         """
         Parameters
         ----------
         places : rising, of an angle within one turn [rad, m]
         values : at these places
         turns : whether the coordinate is an angle
+        spline : whether the pieces form a spline
         """
         self.turns, self._first = turns, places[0]
         abscissas, values = [place - places[0] for place in places], list(values)
@@ -94,6 +98,8 @@ class TableCurve:
         widths = [b - a for a, b in pairwise(abscissas)]
         rises = [(b - a) / h for a, b, h in zip(values, values[1:], widths, strict=False)]
         slopes = [_mean_slope(rises[k - 1], rises[k], widths[k - 1], widths[k]) for k in range(len(rises))]
+        if spline:
+            slopes = _spline_slopes(rises, widths, turns)
         slopes.append(slopes[0])
         if not turns:
             slopes[0] = slopes[-1] = 0.0
@@ -111,6 +117,9 @@ class TableCurve:
         x = q - self._first
         if self.turns:
             x = xp.atan2(-xp.sin(x), -xp.cos(x)) + math.pi
+        if isinstance(x, jets.Jet):
+            x = x if self.turns else xp.minimum(xp.maximum(x, 0.0), self._length)
+            return self._piece(engines.value(x.parts[0])).at(x)[0]
         way = engines.value(x)
         if not self.turns:
             way = xp.minimum(xp.maximum(way, 0.0), self._length)
@@ -138,6 +147,21 @@ class TableCurve:
     @cached_property
     def _arrays(self) -> tuple[Any, Any]:
         return np.array(self._later), np.array(self._pieces).T
+
+
+def _spline_slopes(rises: Sequence[float], widths: Sequence[float], turns: bool) -> list[float]:
+    """The slopes of a spline at its places without the last one, which around a turn is the first one again; over a
+    way it begins and ends level."""
+    size, after = len(rises), [1.0 / width for width in widths]
+    system, right = np.zeros((size, size)), np.zeros(size)
+    for k in range(size):
+        system[k, k] += 2.0 * (after[k - 1] + after[k])
+        system[k, k - 1] += after[k - 1]
+        system[k, (k + 1) % size] += after[k]
+        right[k] = 3.0 * (rises[k - 1] * after[k - 1] + rises[k] * after[k])
+    if not turns:
+        system[0], right[0] = np.eye(size)[0], 0.0
+    return [float(slope) for slope in np.linalg.solve(system, right)]
 
 
 def _mean_slope(before: float, after: float, left: float, right: float) -> float:

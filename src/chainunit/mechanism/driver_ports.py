@@ -22,6 +22,23 @@ class DriverWords(NamedTuple):
     place: str
 
 
+@declaration
+class DriverEffort:
+    """The effort of a driver beside the first one."""
+
+    tau: Value = quantity("N.m", "torque needed along its angle", nominal=100.0)
+    power: Value = quantity("W", "power that it takes, tau w", nominal=100.0)
+
+
+@declaration
+class FollowedDriver(DriverEffort):
+    """A driver that follows the first one: its motion, and its effort."""
+
+    phi: Value = quantity("rad", "angle of the driver")
+    w: Value = quantity("rad/s", "speed of the driver")
+    a: Value = quantity("rad/s2", "acceleration of the driver", nominal=100.0)
+
+
 class DriverPort(NamedTuple):
     """The declarations of a driver: its motion, the values and slopes of its load port; of the direct model its
     start, the inertia added to it, its states, the effort that drives it, and its answer; its terminals, with the
@@ -43,6 +60,8 @@ class DriverPort(NamedTuple):
     """units of quantities at the driver, by those of a driver that turns, where they differ"""
     stop: str = ""
     """the output of the end stops; empty without them"""
+    follower: type = FollowedDriver
+    """of a driver that follows another one: its motion and its effort"""
 
     def unit(self, unit: str) -> str:
         """The unit of a quantity at the driver that is in `unit` where the driver turns."""
@@ -126,9 +145,10 @@ _UNITS = {
     "kg.m2/rad": "kg/m",
     "N.m/rad": "N/m",
     "N.m.s/rad": "N.s/m",
+    "W": "W",
 }
 """The units of a driver that slides, by those of one that turns."""
-_NOMINAL = {"rad/s2": 0.1, "N.m": 10.0, "N.m/rad": 10.0}
+_NOMINAL = {"rad/s2": 0.1, "N.m": 10.0, "N.m/rad": 10.0, "W": 1.0}
 """By the unit of a driver that turns, the factor of the nominal size."""
 _WORDS = {
     "; {driver} angle is phi/ratio": "",
@@ -141,6 +161,7 @@ _WORDS = {
     "motor acceleration": "acceleration of the driver",
     "angle of": "way of",
     "torque": "force",
+    "along its angle": "along its way",
     "inertia": "mass",
 }
 """The words on a driver that slides, by those on one that turns; the longer ones come first."""
@@ -189,5 +210,6 @@ SLIDING = DriverPort(
     DriverWords("force on the driver", "way"),
     MappingProxyType({unit: _UNITS[unit] for unit in ("rad", "rad/s", "N.m", "kg.m2", "N.m/rad")}),
     "end_stop_force",
+    _sliding("FollowedSlide", FollowedDriver, "A driver that slides and follows the first one."),
 )
 """A driver that a cylinder pushes."""

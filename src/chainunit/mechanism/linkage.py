@@ -7,13 +7,13 @@ draw and the paths of the forces follow from these data.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ..core.brief import briefly_shown
 from ..core.planar import Vec2
-from ..groups.driver import Driver
+from ..groups.driver import Course, Driver
 from ..groups.group import Group
 from ..groups.joints import TURNS, Joint
 from .extremes import MotionExtreme
@@ -66,8 +66,9 @@ class Topology(NamedTuple):
 @briefly_shown
 @dataclass
 class Linkage:
-    """A mechanism with one driver. Places in the frame [m], others in the frame of their link; loads as
-    `chainunit.groups.loads.Acting` describes them; `extremes` of its motion that a load refers to."""
+    """A mechanism with its first driver; further ones are among the groups. Places in the frame [m], others in the
+    frame of their link; loads as `chainunit.groups.loads.Acting` describes them; `extremes` of its motion that a load
+    refers to."""
 
     ground: Mapping[str, Vec2]
     driver: Driver
@@ -107,6 +108,22 @@ class Linkage:
         """The number of values that follow from the lengths, once before a run: of the groups, and of the
         extremes."""
         return sum(group.derived_count for group in self.groups) + len(self.extremes)
+
+    @property
+    def drivers(self) -> tuple[Driver, ...]:
+        """All drivers, the first one first."""
+        return self.driver, *(group for group in self.groups if isinstance(group, Driver))
+
+    def moved(self, courses: Sequence[Course]) -> Linkage:
+        """The linkage whose drivers have these courses, whatever the coordinate is."""
+        present: tuple[Any, ...] = self.drivers
+        drivers = (
+            replace(driver, course=lambda xp, q, course=course: course)
+            for driver, course in zip(present, courses, strict=True)
+        )
+        first = next(drivers)
+        groups = tuple(next(drivers) if isinstance(group, Driver) else group for group in self.groups)
+        return replace(self, driver=first, groups=groups)
 
     def before(self, group: int) -> Linkage:
         """The linkage without the group of this index and all later ones, without loads and extremes."""

@@ -15,24 +15,35 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.engines import Dual, dual, slope
 from ..core.planar import ZERO, Link, Motion, Vec2, growth
 from ..groups.body import NO_LOAD, Body, Load, body_on, reflected_inertia
 from ..groups.driver import Crank, Ram
 from ..groups.group import Group, SolvedGroup
-from ..groups.joints import Joint, Slide, Third
+from ..groups.joints import STEADY, Joint, Slide, Third
 from ..groups.loads import Effect, Moving, Wrench
 from .linkage import Connections, Linkage, Topology
 
 
 class Mechanism:
-    """The links of a linkage at the coordinate `q`, a crank angle [rad] or a way [m]: `links`, `pins` with points,
-    and `bodies` by name; `turns` the relative rotation in each revolute joint by q, `slides` the motion in each
-    sliding one."""
+    """The links of a linkage with its first driver at the place `q`, a crank angle [rad] or a way [m]: `links`,
+    `pins` with points, and `bodies` by name; `turns` the relative rotation in each revolute joint by q, `slides` the
+    motion in each sliding one."""
 
-    __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "q", "slides", "topology", "turns")
+    __slots__ = (
+        "_groups",
+        "bodies",
+        "derived",
+        "linkage",
+        "links",
+        "pins",
+        "q",
+        "slides",
+        "topology",
+        "turns",
+    )
 
     def __init__(
         self, xp: Any, linkage: Linkage, q: Any, derived: Sequence[Any] = (), topology: Topology | None = None
@@ -44,7 +55,7 @@ class Mechanism:
         derived : numbers that the groups derive from the lengths, see `derived_numbers`
         topology : the topology of the linkage, if it is known
         """
-        self.linkage, self.q = linkage, q
+        self.linkage, self.q, self.derived = linkage, q, derived
         self.topology = linkage.topology if topology is None else topology
         self.links: dict[str, Link] = {}
         self.pins = {name: Motion(place) for name, place in linkage.ground.items()}
@@ -74,6 +85,32 @@ class Mechanism:
     def _data(self) -> tuple[Group, ...]:
         return self.linkage.driver, *self.linkage.groups
 
+    @property
+    def _driven(self) -> list[tuple[SolvedGroup, Connections]]:
+        """The drivers, in their order."""
+        return [(solved, connections) for solved, connections in self._groups if solved.course is not None]
+
+    @property
+    def rate(self) -> Any:
+        """See `Moving`."""
+        return self.courses[0][0]
+
+    @property
+    def courses(self) -> tuple[Sequence[Any], ...]:
+        """The derivatives of the place of each driver by q."""
+        return tuple(solved.course for solved, _ in self._groups if solved.course is not None)
+
+    def along(self, efforts: Sequence[Any], order: int = 0) -> Any:
+        """The effort along q [N m, N] from the `efforts` of the drivers along their places, or with `order` 1 its
+        derivative while they are constant."""
+        total: Any = 0.0
+        for effort, course in zip(efforts, self.courses, strict=True):
+            if course is not STEADY:
+                total = total + effort * course[order]
+            elif order == 0:
+                total = effort
+        return total
+
     def with_bodies(self, linkage: Linkage) -> Mechanism:
         """The same motion with the bodies and loads of another linkage of the same lengths."""
         other = copy.copy(self)
@@ -95,16 +132,16 @@ class Mechanism:
                     pins[point] = link.third_derivative(self.pins[point].p - link.pin.p, *thirds[name])
         return thirds, pins
 
-    def reaction_turn(self, reactions: Mapping[Joint, Vec2], effort: Any) -> Iterator[Wrench]:
+    def reaction_turn(self, reactions: Mapping[Joint, Vec2], efforts: Sequence[Any]) -> Iterator[Wrench]:
         """The part of the reactions in the moments on the links as their arms turn with q, and in the forces as the
         guides turn."""
         # the force of a cylinder turns with it
-        driver, connections = self._groups[0]
-        barrel, *rod = driver.links
-        if rod:
-            more = barrel.u.turned() * (effort * barrel.t1)
-            yield Wrench(connections.links[1], more, 0.0)
-            yield Wrench(connections.links[0], -more, 0.0)
+        for (driver, connections), effort in zip(self._driven, efforts, strict=True):
+            barrel, *rod = driver.links
+            if rod:
+                more = barrel.u.turned() * (effort * barrel.t1)
+                yield Wrench(connections.links[1], more, 0.0)
+                yield Wrench(connections.links[0], -more, 0.0)
         for group, (_, connections) in zip(self._data, self._groups, strict=True):
             for joint, connected in zip(group.joints, connections.joints, strict=True):
                 reaction = reactions[connected.joint]
@@ -129,10 +166,10 @@ class Mechanism:
         alone = isinstance(self.linkage.driver, Crank | Ram)
         return [solved.margin for solved, _ in self._groups[alone:]]
 
-    def reactions(self, acting: Mapping[str, Load]) -> tuple[Any, dict[Joint, Vec2]]:
-        """The torque (or force) along the coordinate [N m, N] and the force in each joint on its link [N], from what
-        acts on the links, without friction: the force pass, independent of virtual work."""
-        loads = dict(acting)
+    def reactions(self, acting: Mapping[str, Load]) -> tuple[tuple[Any, ...], dict[Joint, Vec2]]:
+        """The torque (or force) of each driver along its place [N m, N] and the force in each joint on its link [N],
+        from what acts on the links, without friction: the force pass, independent of virtual work."""
+        loads, efforts = dict(acting), list[Any]()
         reactions: dict[Joint, Vec2] = {}
         for group, (solved, connections) in zip(reversed(self._data), reversed(self._groups), strict=True):
             forces, effort = solved.reactions([loads.get(name, NO_LOAD) for name in connections.links])
@@ -141,7 +178,9 @@ class Mechanism:
                 if connected.before is not None:
                     opposite = joint.opposite(self, connected.before, force)
                     add_wrenches(loads, [Wrench(connected.before, *opposite)])
-        return effort, reactions
+            if solved.course is not None:
+                efforts.append(effort)
+        return tuple(reversed(efforts)), reactions
 
 
 def add_wrenches(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
@@ -173,7 +212,7 @@ def bodies_on(links: Mapping[str, Link], linkage: Linkage) -> dict[str, Body]:
 class LiftedMechanism:
     """A mechanism in the form that loads take (`Moving`), with its derivatives by q as dual parts."""
 
-    __slots__ = ("_of", "bodies", "links", "pins", "q", "slides", "turns")
+    __slots__ = ("_of", "bodies", "links", "pins", "q", "rate", "slides", "turns")
 
     def __init__(self, m: Mechanism, links: Mapping[str, Third], pins: Mapping[str, Vec2]) -> None:
         """
@@ -181,7 +220,7 @@ class LiftedMechanism:
         ----------
         links, pins : third derivatives of the links and pins, see `Mechanism.third`
         """
-        self._of, self.q = m, Dual(m.q, 1.0)
+        self._of, self.q, self.rate = m, Dual(m.q, 1.0), m.rate
         self.links: Mapping[str, Link] = _OnDemand(lambda name: m.links[name].lifted(*links[name]))
         self.pins: Mapping[str, Motion] = _OnDemand(lambda name: m.pins[name].lifted(pins.get(name, ZERO)))
         self.bodies: Mapping[str, Body] = {}
@@ -212,17 +251,18 @@ def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
 
 class Steadiness:
     """A mechanism at constant crank speed `w`: the `effects` of the loads on links by name, the `reactions` in the
-    joints [N], the `torque` at the crank from these forces [N m], and the `losses`: the effects of the loads that
-    depend on the reactions."""
+    joints [N], the `efforts` of the drivers and the `torque` along q from these forces [N m], and the `losses`: the
+    effects of the loads that depend on the reactions."""
 
-    __slots__ = ("effects", "field", "losses", "reactions", "torque")
+    __slots__ = ("effects", "efforts", "field", "losses", "reactions", "torque")
 
     def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Any]) -> None:
         w2 = w * w
         self.effects = _effects(xp, m, w, loads)
         field = self.field = sum(effect.field for effect in self.effects.values())
         acting = {name: body.centrifugal(w2, field) for name, body in m.bodies.items()}
-        self.torque, self.reactions = m.reactions(add_wrenches(acting, _wrenches(self.effects)))
+        self.efforts, self.reactions = m.reactions(add_wrenches(acting, _wrenches(self.effects)))
+        self.torque = m.along(self.efforts)
         self.losses = _effects(xp, m, w, loads, self.reactions)
 
 
@@ -241,6 +281,17 @@ def _effects(
 def _wrenches(effects: Mapping[str, Effect]) -> Iterator[Wrench]:
     for effect in effects.values():
         yield from effect.wrenches
+
+
+class InMotion(NamedTuple):
+    """A linkage in motion: its mechanism, the force in each joint on its link [N], the effects of its loads, and
+    speed and acceleration of the coordinate of the mechanism."""
+
+    m: Mechanism
+    reactions: Mapping[Joint, Vec2]
+    effects: Mapping[str, Effect]
+    w: Any
+    a: Any
 
 
 class MachineState:
@@ -268,13 +319,14 @@ class MachineState:
             bias = bias + (effect.conservative + effect.dissipative)
             self.J = self.J + effect.inertia
         self.bias = bias
-        self._by_acceleration: tuple[Any, dict[Joint, Vec2]] | None = None
+        self._by_acceleration: tuple[tuple[Any, ...], dict[Joint, Vec2]] | None = None
 
     def torque(self, a: Any) -> Any:
         """The crank torque at crank acceleration `a` [N m], by virtual work."""
         return self.J * a + self.bias
 
-    def _inertial(self) -> tuple[Any, dict[Joint, Vec2]]:
+    def inertial(self) -> tuple[tuple[Any, ...], dict[Joint, Vec2]]:
+        """The efforts of the drivers and the reactions per acceleration of q, without friction."""
         if self._by_acceleration is None:
             wrenches = (k for effect in self.effects.values() for k in effect.inertial)
             acting = {name: body.inertial() for name, body in self.m.bodies.items()}
@@ -283,16 +335,20 @@ class MachineState:
 
     def reactions(self, a: Any) -> dict[Joint, Vec2]:
         """The force in each joint on its link at crank acceleration `a` [N], without friction."""
-        _, inertial = self._inertial()
+        _, inertial = self.inertial()
         reactions = {}
         for joint, f in self.steady.reactions.items():
             more = inertial[joint]
             reactions[joint] = f.plus(more, a)
         return reactions
 
+    def moving(self, a: Any) -> InMotion:
+        """The linkage in motion at crank acceleration `a`."""
+        return InMotion(self.m, self.reactions(a), self.effects, self.w, a)
+
     def torque_by_reactions(self, a: Any) -> Any:
         """The crank torque from the force passes, without friction [N m]: the second route."""
-        return self.steady.torque + self._inertial()[0] * a
+        return self.steady.torque + self.m.along(self.inertial()[0]) * a
 
     @property
     def inertia_slope(self) -> Any:
@@ -310,9 +366,24 @@ class MachineState:
         return sum(effect.energy for effect in self.effects.values())
 
     @property
+    def directions(self) -> list[tuple[Any, Mechanism | None]]:
+        """The motions along which losses load the first driver, each with its share; None is the motion itself."""
+        return [(1.0, None)]
+
+    @property
+    def friction(self) -> Any:
+        """Torque at the crank against the loads that depend on reactions [N m]."""
+        return sum(effect.dissipative for effect in self.steady.losses.values())
+
+    @property
     def lost_torque(self) -> Any:
         """Torque at the crank against all dissipative loads [N m]; times `w` it is the lost power."""
         return sum(effect.dissipative for effect in self.effects.values())
+
+    @property
+    def lost_power(self) -> Any:
+        """Power that all dissipative loads take [W]."""
+        return self.lost_torque * self.w
 
     def margin(self) -> Any:
         """The least absolute margin of all groups; 1 for a crank alone, which has no dead position."""
@@ -335,8 +406,9 @@ class MachineState:
         m, w2, field = self.m, self.w * self.w, self.steady.field
         links, pins = m.third_derivatives()
         acting = {name: body.centrifugal_slope(w2, field, links[name]) for name, body in m.bodies.items()}
-        add_wrenches(acting, m.reaction_turn(self.steady.reactions, self.steady.torque))
-        return self._slope(LiftedMechanism(m, links, pins), self.w, acting, m.turns2())
+        add_wrenches(acting, m.reaction_turn(self.steady.reactions, self.steady.efforts))
+        slope = self._slope(LiftedMechanism(m, links, pins), self.w, acting, m.turns2())
+        return slope if len(m.courses) == 1 else slope + m.along(self.steady.efforts, 1)
 
     def _by_speed(self) -> Any:
         acting = {name: body.centrifugal(2.0 * self.w) for name, body in self.m.bodies.items()}
@@ -350,7 +422,8 @@ class MachineState:
         m, reactions = self.m, self.steady.reactions
         effects = _effects(dual(self._xp), moving, w, self._loads)
         growing = (Wrench(k.link, growth(k.force), slope(k.moment)) for k in _wrenches(effects))
-        torque, more = m.reactions(add_wrenches(acting, growing))
+        efforts, more = m.reactions(add_wrenches(acting, growing))
+        torque = m.along(efforts)
         for load in self._loads.values():
             if load.by_reactions:
                 torque = torque + load.slope(self._xp, m, self.w, reactions, more, turning)

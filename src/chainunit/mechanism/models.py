@@ -299,7 +299,7 @@ def running(s: MachineState, a: Any) -> dict[str, Any]:
         "power": s.torque(a) * s.w,
         "kinetic_energy": s.kinetic_energy,
         "potential_energy": s.potential_energy,
-        "dissipated_power": s.lost_torque * s.w,
+        "dissipated_power": s.lost_power,
         "margin": s.margin(),
     }
 

@@ -84,7 +84,12 @@ def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
 
 
 def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
-    yield b.Text(line("The driver gives one degree of freedom: ", x.sentence, "."), central=True)
+    further = f.description.further
+    lead = "The driver gives one degree of freedom: "
+    if further.free:
+        lead = f"The drivers give {1 + len(further.free)} degrees of freedom: "
+    yield b.Text(line(lead, x.sentence, "."), central=True)
+    yield from (b.Text(text, central=True) for text in _drivers(f))
     yield from (b.Text(remark, central=True) for remark in x.drawn)
     if x.slips:
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=tuple(x.slips))
@@ -93,6 +98,24 @@ def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
         drawing(f.machine), "The linkage: its pins, links and dimensions", PICTURES[0],
         "A pair of hatched lines is a guide in the ground; a box is a block.",
     )  # fmt: skip
+
+
+def _drivers(f: LinkageFindings) -> Iterator[Line]:
+    """A sentence for each driver besides the first one."""
+    first, driven = f.description.structure.driver, f.description.further
+    noun = Name(first.joint if first.linear else first.link)
+    for entry in driven.entries:
+        name = Name(entry.name)
+        if entry.law is None:
+            yield line(
+                "The driver ", name, " is an input of its own. In this report it stands at its place at the start; "
+                "its effort is in the outputs ", Name(f"{driven.names[entry.name]}.tau"), ".",
+            )  # fmt: skip
+        else:
+            drive = "a gear drives it, and" if entry.geared else "a motor of its own drives it, and"
+            share = "contains" if entry.geared else "is without"
+            text = f" follows by {entry.law}: {drive} the effort of "
+            yield line("The driver ", name, text, noun, f" {share} its share.")
 
 
 def _motion(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
@@ -245,6 +268,14 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
             title=f"Reactions{on}",
             central=True,
         )
+    yield from table(
+        (x.drivers or {}).items(),
+        ("driver", lambda row: Name(row[0])),
+        ("largest force or torque", lambda row: number(row[1]["peak"])),
+        ("mean power", lambda row: number(row[1]["power_mean"])),
+        title="Drivers besides the first one",
+        central=True,
+    )
     yield from _figures(f, effort, inertia_word)
 
 

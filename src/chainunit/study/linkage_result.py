@@ -66,6 +66,9 @@ class LinkageData:
     over_the_way: Mapping[str, InUnit] = part("effort and inertia at each place of the driver")
     rest: LinkageAtRest = part("the linkage at rest")
     back: WayBack | None = part("the way back of a driver that swings", optional=True)
+    drivers: Mapping[str, Mapping[str, InUnit]] | None = part(
+        "largest effort and mean power of each driver besides the first one", optional=True
+    )
     drawn: list[str] = part("sentences on a linkage from a drawing of another program")
     slips: list[str] = part("values of the file without a unit that are of an unusual size, in words")
     notes: list[str] = part("values of the file of an unusual size, in words")
@@ -86,7 +89,7 @@ def linkage_data(
         source,
         f.machine.model.description,
         f.sentence,
-        1,
+        1 + len(description.further.free),
         InUnit(f.speed, unit("rad/s")),
         WayForces(f.turn, f.joints),
         f.groups,
@@ -108,6 +111,14 @@ def linkage_data(
         {"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
         _at_rest(f),
         WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
+        {
+            name: {
+                "peak": InUnit(turn.peak, "N" if turn.linear else "N.m"),
+                "power_mean": InUnit(turn.power_mean, "W"),
+            }
+            for name, turn in f.drivers.items()
+        }
+        or None,
         [*remarks],
         [str(value) for value in slips_of(tuple(unusual))],
         [value.sentence for value in unusual if value.with_unit],

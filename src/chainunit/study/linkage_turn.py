@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
 from ..machines.equilibria import Equilibria
 from ..machines.linkages.model import LinkageDescription
-from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import DYADS, PRISMATIC
 from ..mechanism.sampled_quantities import largest, means, roots
@@ -105,6 +104,14 @@ class Swing:
     time_ratio: Value = quantity("1", "time ratio: slow stroke over quick return")
 
 
+class DriverTurn(NamedTuple):
+    """A driver besides the first one, over the way of that: its largest effort [N m, N], and its mean power [W]."""
+
+    linear: bool
+    peak: float
+    power_mean: float
+
+
 @briefly_shown
 @dataclass(frozen=True)
 class LinkageFindings:
@@ -125,6 +132,8 @@ class LinkageFindings:
     """of each link that swings"""
     dead_centres: dict[str, list[float]]
     """places of the driver at which each of these joints and links turns back, by the name of its variables"""
+    drivers: dict[str, DriverTurn]
+    """of each driver besides the first one"""
     limits: dict[str, tuple[float, float]]
     """least and largest value of the angle of each link and of each place of a point, by output"""
     rest: Equilibria
@@ -142,7 +151,7 @@ class LinkageFindings:
     def sentence(self) -> str:
         """The groups in one line: ``crank + RRR dyad (coupler, rocker) + RRP dyad (rod, ram)``."""
         groups = self.description.structure.groups
-        pinned = groups and groups[0].kind == CYLINDER
+        pinned = len(groups) > len(self.description.at_start.groups)
         parts = [] if pinned else [self.machine.model.driver_noun]
         for group in groups:
             kind = f"{group.kind} dyad" if group.kind in DYADS else group.kind
@@ -216,6 +225,8 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
     joints = {name: description.variable("joint", name) for name in description.structure.joints}
     moving = [name for name in outputs if name.endswith((".angle", ".x", ".y"))]
     moments = [f"{joint}.moment" for joint in joints.values() if f"{joint}.moment" in outputs]
+    drivers = [(entry, description.further.names[entry.name]) for entry in description.structure.further]
+    sought = [*moments, *(f"{name}.tau" for _, name in drivers)]
     groups = [", ".join(group.links) for group in description.structure.groups]
 
     def sizes(q: Any) -> Any:
@@ -228,13 +239,13 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         ]
         return np.array(
             [np.abs(bias), inertia, -inertia, *(-margin for margin in margins), *forces,
-             *(np.abs(part_outputs[name]) for name in moments), *(part_outputs[name] for name in moving),
+             *(np.abs(part_outputs[name]) for name in sought), *(part_outputs[name] for name in moving),
              *(-part_outputs[name] for name in moving)]
         )  # fmt: skip
 
     names = [
         "torque", "inertia", "-inertia", *(f"-margin {name}" for name in groups),
-        *(f"force {name}" for name in joints), *moments, *moving, *(f"-{name}" for name in moving),
+        *(f"force {name}" for name in joints), *sought, *moving, *(f"-{name}" for name in moving),
     ]  # fmt: skip
     turns = machine.model.turns
     places, values = largest(sizes, q, around=turns)
@@ -243,8 +254,7 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
 
     (mean, torque_rms), forces_rms = _means(way, joints.values(), description.span)
     torque = np.broadcast_to(state.bias, q.shape)
-    losses = sum(effect.dissipative for load, effect in state.effects.items() if load in ("pins", "guides"))
-    gap = np.abs(state.torque_by_reactions(0.0) + losses - torque)
+    gap = np.abs(state.torque_by_reactions(0.0) + state.friction - torque)
     sign = np.sign(np.broadcast_to(way.state(places[:1])[0].bias, 1)[0])
     turn = LinkageTurn(
         torque_peak=float(sign * top["torque"]),
@@ -280,6 +290,14 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         {
             description.variable("joint" if isinstance(motion, Stroke) else "link", name): back
             for name, motion, back in motions
+        },
+        {
+            entry.name: DriverTurn(
+                entry.linear,
+                top[f"{name}.tau"],
+                float(means(way.outputs([f"{name}.power"]), *description.span)[0][0]),
+            )
+            for entry, name in drivers
         },
         {name: (_plain(-top[f"-{name}"]), _plain(top[name])) for name in moving},
         rest,

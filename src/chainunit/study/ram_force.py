@@ -77,7 +77,7 @@ def rams(study: StudyRecord) -> Iterator[RamForce]:
             continue
         ram = joint.on[0] if joint.by[0] == GROUND else joint.by[0]
         pin = next((k for k, j in joints.items() if j.kind == REVOLUTE and ram in (j.on[0], j.by[0])), None)
-        if pin is None or name == description.structure.driver.joint:
+        if pin is None or any(name == driver.joint for driver in description.structure.drivers):
             continue
         guide, force = (
             attrgetter(description.variable("joint", joint_name))(turn.outputs) for joint_name in (name, pin)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core.errors import InputError
@@ -56,7 +56,7 @@ def quantity_names(names: Mapping[str, Sequence[str]], links: Entries) -> Iterat
             yield key, "is a variable of every linkage; choose another name"
         elif name in seen:
             yield key, f"is a name in [{seen[name]}], too; choose another one"
-        elif kind != "tables" and name in link_names:
+        elif kind not in ("tables", "drivers") and name in link_names:
             yield key, "is the name of a link, too; choose another one"
         seen.setdefault(name, kind)
 
@@ -80,13 +80,15 @@ def freedom_faults(
     links: Entries,
     joints: Entries,
     loads: Entries,
-    driver: Mapping[str, Any],
+    drivers: Entries,
 ) -> Iterator[Fault]:
     """Too many or too few degrees of freedom, and groups of a class that is not covered. Too many may come from a
     name of a point that is not spelled as that of the pin that it was meant to be."""
     names = [link["name"] for link in links]
     try:
-        groups_of(names, [JointEntry.from_table(j) for j in joints], DriverEntry(**driver))
+        groups_of(
+            names, [JointEntry.from_table(j) for j in joints], [DriverEntry(**driver) for driver in drivers]
+        )
     except InputError as error:
         used = {tuple(entry[end]) for entry in (*joints, *loads) for end in ("on", "by") if end in entry}
         used |= {(joint["by"][0], joint["toward"]) for joint in joints if "toward" in joint}
@@ -95,8 +97,8 @@ def freedom_faults(
         yield f"links.{error.key}" if error.key in names else "joints", f"{error}{hint}"
 
 
-def length_faults(points: Places, joints: Entries, driver: str) -> Iterator[Fault]:
-    """Lines without a direction and links without a length, but for the driver, at the start values of the
+def length_faults(points: Places, joints: Entries, drivers: Collection[str]) -> Iterator[Fault]:
+    """Lines without a direction and links without a length, but for the drivers, at the start values of the
     parameters."""
     ends: dict[str, list[tuple[str, str]]] = {}
     for joint in joints:
@@ -104,7 +106,7 @@ def length_faults(points: Places, joints: Entries, driver: str) -> Iterator[Faul
             ends.setdefault(link, []).append((point, joint["type"]))
         yield from KINDS[joint["type"]].start_faults(joint, points)
     for link, those in ends.items():
-        if link in (GROUND, driver) or len(those) != 2 or {kind for _, kind in those} != {REVOLUTE}:
+        if link in (GROUND, *drivers) or len(those) != 2 or {kind for _, kind in those} != {REVOLUTE}:
             continue
         (one, _), (other, _) = those
         if math.dist(points[link][one], points[link][other]) == 0.0:

@@ -7,6 +7,7 @@ Each entry that is a quantity is a number in SI units, a text with a unit ("80 m
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,8 +17,9 @@ from typing import Any
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
 from ...core.inputs import TOML, file_text
-from ...mechanism.assur import DYADS, GROUND, ONE_DRIVER, PRISMATIC, REVOLUTE
-from ...mechanism.expressions import value_of
+from ...mechanism.assur import DYADS, FURTHER_DRIVERS, GROUND, PRISMATIC, REVOLUTE
+from ...mechanism.curves import TableCurve
+from ...mechanism.expressions import expression, value_of
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
@@ -31,11 +33,12 @@ from .checks import (
     study_fault,
 )
 from .entries import is_among, is_given, sized, usual_distance, usual_inertia
+from .further import BACK, LawCourse, splines
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
-from .names import model_name, name_fault
+from .names import model_name, name_fault, words_in
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
@@ -43,15 +46,23 @@ from .structure import CYLINDER
 from .way import WHOLE
 
 TABLES = (
-    "title", "name", "about", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "links",
-    "joints", "loads", "pins", "guides", "start", "groups",
+    "title", "name", "about", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "drivers",
+    "links", "joints", "loads", "pins", "guides", "start", "groups",
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
+_LAW_PLACES = 96
+"""Places of the first driver at which a law is checked."""
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
 _DRIVES = ("belt", "chain", "cam", "rack", "rolling")
 """Kinds of joints of other programs."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
+_FURTHER_KEYS = (*_DRIVER_KEYS, "phi", "by", "start")
+_GEAR, _MOTOR = "gear", "motor"
+_RANGES = '["-20 deg", "75 deg"]', "[0.2, 0.6]"
+"""Examples of the range of a driver that turns and of one that slides."""
+_DEGREES = re.compile(r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*(?:deg\b|°)")
+"""An angle in degrees inside an expression."""
 
 
 def read_linkage(file: Path) -> InverseMachine:
@@ -169,7 +180,11 @@ class _LinkageReader(LoadReader):
         ground = self.points[GROUND] = self.points_in("ground", self.table("ground"))
         links = [self.link(name) for name in self.link_names()]
         joints = self.joints()
-        driver, span = self.driver(joints)
+        driver, span = self.driver("driver", self.table("driver"), joints)
+        drivers = [
+            self.further_driver(name, key, table, driver, joints)
+            for name, key, table in self.tables("drivers", _FURTHER_KEYS)
+        ]
         loads = [self.load(name) for name in self.table("loads")]
         common, groups, about = self.common(), self.groups(), self.about()
         losses = self.differing(joints, common)
@@ -178,11 +193,12 @@ class _LinkageReader(LoadReader):
             "parameters": [*(entry["name"] for entry in parameters), *self.derived],
             "inputs": [entry["name"] for entry in inputs],
             "tables": [*self.table("tables")],
+            "drivers": [*self.table("drivers")],
         }
         self.all(quantity_names(names, links))
         self.all([*spring_faults(loads, joints), *guide_faults(data, joints)])
         self.refuse()
-        self.all(freedom_faults(self.points, links, joints, loads, driver))
+        self.all(freedom_faults(self.points, links, joints, loads, [driver, *drivers]))
         owned = [
             {"name": f"{quantity}_of_{link['name']}", "value": x}
             for link in links
@@ -190,7 +206,7 @@ class _LinkageReader(LoadReader):
         ]
         values = self.start_values([*parameters, *inputs, *owned])
         self.refuse()
-        start = self.start(values, links, joints, driver, span)
+        start = self.start(values, links, joints, driver, span, drivers, tables)
         self.refuse()
         for joint in joints:
             for carrier, points in joint.pop("points", {}).items():
@@ -212,14 +228,14 @@ class _LinkageReader(LoadReader):
             "groups": groups,
             "start": start,
         }
-        more = {"derived": [*self.derived.items()], "losses": losses}
+        more = {"derived": [*self.derived.items()], "losses": losses, "drivers": drivers}
         return described | {key: entries for key, entries in more.items() if entries}
 
     def fault_drivers(self) -> None:
         """Fault a list of drivers; the reader goes on with the first one."""
         drivers = self.data.get("driver")
         if isinstance(drivers, list) and drivers and isinstance(drivers[0], Mapping):
-            several = f"stands there {len(drivers)} times: {ONE_DRIVER}; take all but one out, and"
+            several = f"stands there {len(drivers)} times; {FURTHER_DRIVERS}:"
             self.fault("driver", f"{several if len(drivers) > 1 else 'is a list;'} write [driver]")
             self.data = {**self.data, "driver": drivers[0]}
 
@@ -325,7 +341,9 @@ class _LinkageReader(LoadReader):
                     self.fault(
                         f"joints.{joint['name']}", f"gives {link} a point of its name, too; rename the joint"
                     )
-        more, clashes = shared_pins(self.points, joints, self.table("driver"))
+        further = [table for table in self.table("drivers").values() if isinstance(table, Mapping)]
+        drivers = [self.table("driver"), *further]
+        more, clashes = shared_pins(self.points, joints, drivers)
         self.all((f"joints.{name}", message) for name, message in clashes)
         return joints + more
 
@@ -365,18 +383,72 @@ class _LinkageReader(LoadReader):
                     self.fault(f"{key}.{other_key}", message)
         return joint
 
-    def driver(self, joints: list[dict[str, Any]]) -> tuple[dict[str, Any], list[float] | None]:
-        """The driver, and its range; None for one that turns all the way round."""
-        table = self.table("driver")
-        self.keys("driver", table, _DRIVER_KEYS)
+    def further_driver(
+        self,
+        name: str,
+        key: str,
+        table: Mapping[str, Any],
+        first: Mapping[str, Any],
+        joints: list[dict[str, Any]],
+    ) -> dict[str, Any]:
+        """A driver besides the first one: it follows that by a law, or is an input of its own."""
+        entry, span = self.driver(key, table, joints)
+        entry |= {"name": name}
+        if not entry.get("link"):
+            return entry
+        unit, law, by = "m" if entry["linear"] else "rad", table.get("phi"), table.get("by", _GEAR)
+        if law is None:
+            if span is None:
+                self.fault(
+                    f"{key}.range",
+                    "is missing; a driver that is an input of its own needs one, such as "
+                    f"{_RANGES[entry['linear']]}; one that follows the "
+                    'first driver has a law, such as phi = "2 * phi + 30 deg"',
+                )
+            if "by" in table:
+                self.fault(f"{key}.by", "belongs to a driver with a law in phi, and this one is an input")
+            low, high = span or (0.0, 0.0)
+            with self.at(f"{key}.start"):
+                start = self.number(f"{key}.start", table.get("start", 0.5 * (low + high)), unit)
+                if not low <= start <= high:
+                    raise InputError(f"is {shown(table['start'])}; must be within {key}.range")
+                entry |= {"start": start}
+            return entry | {"span": [low, high]}
+        for other in ("range", "start"):
+            if other in table:
+                self.fault(f"{key}.{other}", "follows from the law in phi; take one of both out")
+        if by not in (_GEAR, _MOTOR):
+            self.fault(
+                f"{key}.by",
+                f'is {shown(by)}; must be "{_GEAR}", if the first driver drives it, or "{_MOTOR}", if it has one of '
+                "its own",
+            )
+        named = isinstance(law, str) and words_in(_DEGREES.sub("", law))
+        text = _DEGREES.sub(r"(\1 * deg)", law) if named else law
+        motion = {"phi": "m" if first.get("linear") else "rad", **self.table_units}
+        entry["law"] = self.entry(f"{key}.phi", text, unit, motion)
+        if isinstance(entry["law"], str):
+            parsed = expression(entry["law"])
+            if parsed.extremes:
+                self.fault(f"{key}.phi", f"has {parsed.extremes[0]}, which depends on it; give a number")
+            with self.at(f"{key}.phi"):
+                self.count(parsed)
+        return entry | {"geared": by == _GEAR}
+
+    def driver(
+        self, key: str, table: Mapping[str, Any], joints: list[dict[str, Any]]
+    ) -> tuple[dict[str, Any], list[float] | None]:
+        """The driver in a table, and its range; None for one that turns all the way round."""
+        if key == "driver":
+            self.keys(key, table, _DRIVER_KEYS)
         if "joint" in table:
-            return self.slide(table, joints)
+            return self.slide(key, table, joints)
         link = table.get("link")
         links = [name for name in self.points if name != GROUND]
         if not is_among(link, links):
             if links and isinstance(self.data.get("driver", {}), Mapping):
                 self.fault(
-                    "driver.link" if table else "driver",
+                    f"{key}.link" if table else key,
                     f"{is_given(link)}; must be the link that the motor turns{meant(str(link), links)} links: "
                     f"{', '.join(links)}",
                 )
@@ -384,30 +456,31 @@ class _LinkageReader(LoadReader):
         pivots = [j for j in joints if {j["on"][0], j["by"][0]} == {GROUND, link} and j["type"] == REVOLUTE]
         if len(pivots) != 1:
             self.fault(
-                "driver.link",
+                f"{key}.link",
                 f"{link} must have one revolute joint with the ground; it has {len(pivots)}: give it a point with "
                 "the name of a point in [ground]",
             )
             return {}, None
         positive = table.get("positive", "counter-clockwise")
         if positive not in ("clockwise", "counter-clockwise"):
-            self.fault("driver.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
-        zero = self.entry("driver.zero", table.get("zero", 0.0), "rad")
+            self.fault(f"{key}.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
+        zero = self.entry(f"{key}.zero", table.get("zero", 0.0), "rad")
         sense = -1.0 if positive == "clockwise" else 1.0
         driver = {"joint": pivots[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}
         if "range" not in table:
             return driver, None
-        return driver | {"swings": True}, self.span(table["range"], "angle", "rad", '["-20 deg", "75 deg"]')
+        span = self.span(key, table["range"], "angle", "rad", _RANGES[0])
+        return driver | {"swings": True}, span
 
     def slide(
-        self, table: Mapping[str, Any], joints: list[dict[str, Any]]
+        self, key: str, table: Mapping[str, Any], joints: list[dict[str, Any]]
     ) -> tuple[dict[str, Any], list[float] | None]:
         """The driver that slides in the prismatic joint that its table names, with the link that moves, and its range
         [m]; nothing and None, with a fault, for another joint."""
         for name in ("link", "zero", "positive"):
             if name in table:
                 self.fault(
-                    f"driver.{name}", "belongs to a driver that turns; a driver with a joint slides in it"
+                    f"{key}.{name}", "belongs to a driver that turns; a driver with a joint slides in it"
                 )
         kinds = {joint["name"]: joint["type"] for joint in joints}
         sliding = {joint["name"]: joint for joint in joints if joint["type"] == PRISMATIC}
@@ -415,20 +488,22 @@ class _LinkageReader(LoadReader):
         if not is_among(name, sliding):
             pin = ", which is a pin" * is_among(name, kinds)
             self.fault(
-                "driver.joint",
+                f"{key}.joint",
                 f"is {shown(name)}{pin}; must be a prismatic joint, a table "
                 f"[joints.NAME] with `toward`: {', '.join(sliding) or 'there is none'}",
             )
             return {}, None
         (on, _), (by, _) = sliding[name]["on"], sliding[name]["by"]
-        span = self.span(table.get("range"), "way", "m", "[0.2, 0.6]")
+        span = None
+        if key == "driver" or "range" in table:
+            span = self.span(key, table.get("range"), "way", "m", _RANGES[1])
         return {"joint": name, "link": by if on == GROUND else on, "linear": True}, span
 
-    def span(self, limits: Any, place: str, unit: str, example: str) -> list[float]:
+    def span(self, key: str, limits: Any, place: str, unit: str, example: str) -> list[float]:
         """The range of the driver, between two values of its `place`."""
-        with self.at("driver.range"):
+        with self.at(f"{key}.range"):
             must = f"the least and the most {place} of the driver, such as {example}"
-            low, high = self.numbers("driver.range", limits, (unit, unit), must)
+            low, high = self.numbers(f"{key}.range", limits, (unit, unit), must)
             if not low < high:
                 raise InputError(f"is {shown(limits)}; must rise, from the least to the most {place}")
             if unit == "rad" and high - low > WHOLE * (1.0 + 1e-12):
@@ -449,6 +524,8 @@ class _LinkageReader(LoadReader):
         joints: list[dict[str, Any]],
         driver: dict[str, Any],
         span: Sequence[float] | None,
+        drivers: list[dict[str, Any]],
+        tables: Mapping[str, Any],
     ) -> dict[str, Any]:
         """The value of the driver at the start, and the poses of all links there; `values` are those of the
         parameters."""
@@ -462,7 +539,7 @@ class _LinkageReader(LoadReader):
             link: {name: (number(x), number(y)) for name, (x, y) in places.items()}
             for link, places in self.points.items()
         }
-        self.all(length_faults(points, joints, driver["link"]))
+        self.all(length_faults(points, joints, [entry["link"] for entry in (driver, *drivers)]))
         self.doubt_bodies(links, points, joints, number)
         entries = {j["name"]: (JointEntry.from_table(j), number(j.get("angle", 0.0))) for j in joints}
         in_frames = {
@@ -479,14 +556,51 @@ class _LinkageReader(LoadReader):
                 low, high = (f"{math.degrees(end):g} deg" for end in span)
                 raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)
-        if linear:
-            pose.slide = entries[driver["joint"]][0], value
-        else:
-            pose.angles[driver["link"]] = number(driver["zero"]) + driver["sense"] * value
+        for entry in drivers:
+            if "law" in entry:
+                self.law(entry, value, values, splines(tables, span is None), span)
+        self.refuse()
+        for entry, place in ((driver, value), *((entry, entry["start"]) for entry in drivers)):
+            if entry["linear"]:
+                pose.slides.append((entries[entry["joint"]][0], place))
+            else:
+                pose.angles[entry["link"]] = number(entry["zero"]) + entry["sense"] * place
         self.refuse()
         with self.at("start"):
             return {"value": value, "poses": pose.complete()}
         return {}
+
+    def law(
+        self,
+        entry: dict[str, Any],
+        start: float,
+        values: Mapping[str, float],
+        tables: Mapping[str, TableCurve],
+        span: Sequence[float] | None,
+    ) -> None:
+        """Add its place at the `start` of the first driver, and its rate, to a driver that follows; refuse a law that
+        has no value on the way, or that does not come back after a turn."""
+        course = LawCourse(entry["law"], values, tables)
+        low, high = span or (start, start + WHOLE)
+        with self.at(f"drivers.{entry['name']}.phi"):
+            try:
+                course_places = [
+                    course(MATH, low + (high - low) * k / _LAW_PLACES) for k in range(_LAW_PLACES + 1)
+                ]
+                entry["start"] = float(course(MATH, start).place)
+            except (ArithmeticError, ValueError):
+                raise InputError("has no value at a place of the driver") from None
+            whole = course_places[-1].place - course_places[0].place
+            turns = whole / WHOLE
+            if span is None and not abs(whole if entry["linear"] else math.sin(0.5 * whole)) < BACK:
+                moved = f"{whole:.6g} m" if entry["linear"] else f"{turns:.6g} turns"
+                raise InputError(
+                    f"moves by {moved} in a turn of the first driver, and must come back after it: "
+                    + ("" if entry["linear"] else "take the slower of both for [driver], or ")
+                    + "let [driver] swing by a range"
+                )
+            if not entry["linear"]:
+                entry["rate"] = max(1.0, *(abs(float(point.rates[0])) for point in course_places))
 
     def doubt_bodies(
         self,

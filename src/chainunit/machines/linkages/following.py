@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property, partial
 from itertools import takewhile
@@ -77,8 +77,9 @@ class FollowedLinkage:
     def _margins_at(self, signs: Sequence[float], q: float) -> list[float]:
         return signed(self.at(q).margins(), signs)
 
-    def turns(self) -> dict[str, tuple[float, float]]:
-        """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad].
+    def courses(self, near: Mapping[str, float] | None = None) -> dict[str, list[float]]:
+        """The angle of each link at the closed places of the way, without jumps, and before them an angle
+        near to the first one: at the start, or as `near` says [rad].
 
         Raises
         ------
@@ -86,7 +87,8 @@ class FollowedLinkage:
             if the linkage does not close, or passes a dead position, with the place of the driver.
         """
         places = self.way.closed_places()
-        angles = {name: [self.structure.poses[name][2]] for name in self.structure.links}
+        poses = {name: self.structure.poses[name][2] for name in self.structure.links}
+        angles = {name: [angle] for name, angle in (near or poses).items()}
         margins = self.margins = []
         try:
             check_triads(self.linkage, self.derived)
@@ -110,10 +112,16 @@ class FollowedLinkage:
                 raise self._open_group(k, q)
             if not least > LEAST_MARGIN:
                 raise dead_group(self.structure.groups[k], self.way.words(q), least)
-        turns = {}
-        for name, (_, *samples) in angles.items():
-            rate = self.way.rate(samples)
-            rest = [angle - rate * (q - places[0]) for angle, q in zip(samples, places, strict=True)]
+        return angles
+
+    def turns(self, courses: Sequence[Mapping[str, Sequence[float]]]) -> dict[str, tuple[float, float]]:
+        """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad], from its
+        `courses`."""
+        places, turns = self.way.closed_places(), {}
+        for name in self.structure.links:
+            rate, rest = self.way.rate(courses[0][name][1:]), list[float]()
+            for course in courses:
+                rest += (a - rate * (q - places[0]) for a, q in zip(course[name][1:], places, strict=True))
             turns[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * places[0]
         return turns
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from ...core.errors import InputError
 from ...core.model import Requirement
 from ...core.planar import ZERO, Vec2
+from ...groups.joints import STEADY
 from ...groups.loads import Effect, Moving, Wrench
 from ...mechanism.curves import TableCurve
 from ...mechanism.expressions import Width, expression, value_of
@@ -149,7 +150,8 @@ def _motion(
     """The quantities that both kinds of loads know, for these entries of the load."""
     used = {name for entry in entries if isinstance(entry, str) for name in expression(entry).names}
     table_values = {name: table.value(xp, m.q) for name, table in load.tables.items() if name in used}
-    names = {**load.values, **table_values, "phi": m.q, "w": w, "angle_rate": m.links[load.link].t1 * w}
+    speed = w if m.rate is STEADY[0] else w * m.rate
+    names = {**load.values, **table_values, "phi": m.q, "w": speed, "angle_rate": m.links[load.link].t1 * w}
     return names | ({"angle": load.angle(xp, m)} if "angle" in used else {})
 
 

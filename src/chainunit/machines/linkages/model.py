@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial, reduce
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
@@ -20,22 +21,25 @@ import numpy as np
 from ...core.engines import MATH, numpy_
 from ...core.errors import InputError
 from ...core.messages import unit_behind
-from ...core.model import About, FmuData, Requirement
+from ...core.model import About, FmuData, Part, Requirement
 from ...core.planar import ZERO
-from ...core.quantities import Value, declared_class, group, quantity, variable_of
+from ...core.ports import ShaftMotion
+from ...core.quantities import Fields, Value, declared_class, fields_of, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
+from ...mechanism.driven import DrivenState
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
-from ...mechanism.expressions import value_of
+from ...mechanism.expressions import expression, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import InverseMachine, words_on_motion
+from ...mechanism.models import DirectMachine, InverseMachine, names_of, slopes, words_on_motion
 from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, with_differing
 from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
+from .further import BACK, FurtherDrivers, splines
 from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
 from .loads import (
@@ -95,10 +99,54 @@ class FileMachine(InverseMachine):
         """The linkage with the start values."""
         return self.described_by.at_start
 
+    def __post_init__(self) -> None:
+        further = self.described_by.further
+        if further.free:
+            declared = declared_class("Slopes", (self.driver_port.slopes,), further.slopes())
+            feed = fields_of(self.Inputs, without=(*names_of(ShaftMotion), *further.names.values()))
+            feed_type = declared_class("Feed", (), [*feed, *further.feed()])
+            feed_type.__module__, feed_type.__qualname__ = self.Parameters.__module__, f"{self.name}.Feed"
+            self.follow(
+                Feed=feed_type,
+                parts=(Part(self.Outputs, self._outputs), Part(declared, self._slopes)),
+                input_rates=MappingProxyType({"phi": "w", "w": "a", **further.input_rates()}),
+                terminals=(*self.driver_port.terminals, *further.terminals()),
+            )
+        super().__post_init__()
+
     def _derived(self, xp: Any, p: Any) -> list[Any]:
         """See `LinkageModel`; the numbers of the start values are known."""
         described = self.described_by
         return [*described.start_derived] if described.is_start(xp, p) else super()._derived(xp, p)
+
+    def state(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
+        """See `LinkageModel`."""
+        state, further = super().state(xp, p, u, q, w), self.described_by.further
+        if not (further.free or further.are_motored):
+            return state
+        return DrivenState(xp, state.m, w, further.geared, further.motions(u))
+
+    def _direct_of(self, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> DirectMachine:
+        """See `InverseMachine`.
+
+        Raises
+        ------
+        InputError
+            for a machine with two drivers that are inputs.
+        """
+        if free := self.described_by.further.free:
+            name = next(iter(free.values())).name
+            raise InputError(
+                "is an input of its own, and a direct model has one driver: export without --direct, or give it a "
+                f'law in [drivers.{name}], such as phi = "0 deg"',
+                key=f"drivers.{name}",
+            )
+        return super()._direct_of(base, parameters, **more)
+
+    def _slopes(self, xp: Any, p: Any, u: Any, x: Any, s: DrivenState) -> Any:
+        """The slopes of the load ports of a machine with several inputs."""
+        loads = self.described_by.further.slopes_at(s, u.a / p.ratio)
+        return self.parts[1].layout.cls(**vars(slopes(xp, p, u, x, s)), **loads)
 
 
 class LinkageDescription(LinkageOutputs):
@@ -115,6 +163,9 @@ class LinkageDescription(LinkageOutputs):
             for name, table in tables.items()
         }
         self.tables = {name: self.curves[name] for name, table in tables.items() if table["over"] == "phi"}
+        further = self.structure.further
+        variables = [self.variable("driver", driver.name) for driver in further]
+        self.further = FurtherDrivers(further, variables, splines(tables, self.way.turns))
         self.extremes = extremes_of(data["loads"])
         self.link_turns: dict[str, tuple[float, float]] = {}
         self.Parameters = self._parameters()
@@ -128,11 +179,11 @@ class LinkageDescription(LinkageOutputs):
                 port.start.__name__, (port.start,), [self._in_range(port.start, "phi_start")]
             )
             self.port, inputs = port._replace(start=start), [self._in_range(motion, "phi"), *inputs]
-        self.Inputs = declared_class("Inputs", (motion,), inputs)
+        self.Inputs = declared_class("Inputs", (motion,), [*inputs, *self.further.inputs()])
         p, u = self.Parameters(), self.Inputs()
         geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
         self.sides = start_sides(geometry)
-        self.at_start = self._loaded(LinkageParts(geometry, self.sides), p)
+        self.at_start = self._loaded(self._parts(geometry, u), p)
         self.sides |= turns_of_triads(self.at_start)
         self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
@@ -200,8 +251,19 @@ class LinkageDescription(LinkageOutputs):
 
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
-        geometry = LinkGeometry(xp, self.structure, self.values(xp, p, u))
-        return self._loaded(LinkageParts(geometry, self.sides), p)
+        return self._loaded(self._parts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), u), p)
+
+    def _parts(self, geometry: LinkGeometry, u: Any, places: Mapping[str, Any] | None = None) -> LinkageParts:
+        """The parts with the drivers that are inputs at the places that `u` gives, or at `places` by name."""
+        courses = self.further.courses(geometry.values, u, places)
+        return LinkageParts(geometry, self.sides, courses)
+
+    def _standing(self, xp: Any, p: Any, places: Mapping[str, Any]) -> DescribedLinkage:
+        """The linkage with the drivers that are inputs at these places."""
+        u = self.Inputs()
+        return self._loaded(
+            self._parts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), u, places), p
+        )
 
     def _loaded(self, parts: LinkageParts, p: Any) -> DescribedLinkage:
         """The linkage of these parts, with the loads on it."""
@@ -325,9 +387,17 @@ class LinkageDescription(LinkageOutputs):
         """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes. Refuse
         extremes of the angle of a link that turns round, too."""
         try:
-            turns = self.followed.turns()
+            courses = self._courses(self.followed, self.Parameters())
         except InputError as error:
-            raise InputError(f"{error}{self.followed.range_words()}", key=error.key) from None
+            words = "" if self.further.free else self.followed.range_words()
+            raise InputError(f"{error}{words}", key=error.key) from None
+        turns = self.followed.turns(courses)
+        if self.extremes and self.further.free:
+            raise InputError(
+                f"{self.extremes[0]}: depends on two inputs, and has no value; give a number, or give "
+                f'the other driver a law, phi = "..."',
+                key="loads",
+            )
         for name in self.extremes:
             _, link, _, axis = parts_of_extreme(name)
             if axis == "angle" and self.way.turns and turns[link][0]:
@@ -338,6 +408,30 @@ class LinkageDescription(LinkageOutputs):
                 )
         return turns
 
+    def _courses(self, followed: FollowedLinkage, p: Any) -> list[dict[str, list[float]]]:
+        """The courses of the links over the way of the first driver, at all places of the drivers that are inputs;
+        `followed` gets all margins."""
+        grid = self.further.grid()
+        visited = [(grid[0], followed.courses())]
+        for places in grid[1:]:
+
+            def way(other: Mapping[str, float], places: Mapping[str, float] = places) -> float:
+                return sum(abs(place - other[name]) for name, place in places.items())
+
+            _, near = min(visited, key=lambda visit: way(visit[0]))
+            other = self._followed(self._standing(MATH, p, places))
+            other.signs, other.derived = followed.signs, followed.derived
+            try:
+                visited.append((places, other.courses({name: course[0] for name, course in near.items()})))
+            except InputError as error:
+                others = " and ".join(self.further.words(name, place) for name, place in places.items())
+                raise InputError(
+                    f"{error}; this is with {others}, in its range in [drivers], which may be narrower",
+                    key=error.key,
+                ) from None
+            followed.margins += other.margins
+        return [courses for _, courses in visited]
+
     def is_start(self, xp: Any, p: Any) -> bool:
         """Whether the parameters are numbers with the start values, whose linkage is known."""
         return xp is MATH and p == self.Parameters()
@@ -346,7 +440,7 @@ class LinkageDescription(LinkageOutputs):
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
         parameters; empty if there is none."""
         try:
-            self._followed(self.linkage(MATH, p, self.Inputs())).turns()
+            self._courses(self._followed(self.linkage(MATH, p, self.Inputs())), p)
         except InputError as error:
             values = ", ".join(
                 f"{entry['name']} = {getattr(p, entry['name']):g}{unit_behind(entry['unit'])}"
@@ -437,7 +531,16 @@ class LinkageDescription(LinkageOutputs):
             for links, kind in groups.items()
             if kind == "triad"
         )
-        return (*margins, *fits, *(requirement_of_width(*width, names) for width in self.widths))
+        laws = (
+            Requirement(
+                f"sine of half the angle, or the way, by which {entry.name} is not back after a turn of the driver",
+                "1",
+                "the law must come back; let the driver swing by a range for another one",
+                tuple(name for name in names if name in expression(str(entry.law)).names),
+            )
+            for entry in self.further.varying(self.way.turns)
+        )
+        return (*margins, *fits, *laws, *(requirement_of_width(*width, names) for width in self.widths))
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and the largest misfit of each triad, with
@@ -446,14 +549,18 @@ class LinkageDescription(LinkageOutputs):
             linkage, derived, course = self.at_start, self.start_derived, self.followed.margins
         else:
             linkage, derived = self.linkage(xp, p, self.Inputs()), getattr(p, "derived", ())
-            course = [
-                signed(self._margins(xp, linkage, derived, q), self.followed.signs) for q in self.way.places()
-            ]
+            course = []
+            for k, q in enumerate(self.way.places()):
+                if self.further.free:
+                    linkage = self._standing(xp, p, self.further.lattice(k))
+                course.append(signed(self._margins(xp, linkage, derived, q), self.followed.signs))
         for margins_of_group in zip(*course, strict=True):
             yield reduce(partial(lesser, xp), margins_of_group), LEAST_MARGIN, math.inf
         for _, misfit in misfits(linkage, derived):
             yield misfit, -math.inf, MOST_MISFIT
         values = linkage.parts.geometry.values
+        for entry in self.further.varying(self.way.turns):
+            yield self.further.misfit(xp, entry, values, self.way.start), -BACK, BACK
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
 
@@ -477,6 +584,11 @@ class LinkageDescription(LinkageOutputs):
             low, high = span if driver.linear else map(math.degrees, span)
             ends = f"from {low:g} {unit} to {high:g} {unit}"
             counts += f", {ends}: beyond, the linkage was not checked and may not close"
+        for entry in self.further.entries:
+            name, driver_effort = self.further.names[entry.name], "force" if entry.linear else "torque"
+            drive = "a gear drives it" if entry.geared else "a motor of its own drives it"
+            moves = "is an input of its own" if entry.is_free else f"follows by {entry.law}; {drive}"
+            counts += f". The driver {entry.name} {moves}; {name}.tau is its {driver_effort} along {name}.phi"
         kinds = dict.fromkeys(joint.kind for joint in self.structure.joints.values())
         limits = "".join(f" {KINDS[kind].limits}" for kind in kinds if KINDS[kind].limits)
         return (

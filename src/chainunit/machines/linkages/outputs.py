@@ -18,6 +18,7 @@ from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism
 from ..parts import Force, force
 from .declarations import RESERVED, GuideReaction, LinkTurning, PointMotion, Running, WayRunning
+from .further import FurtherDrivers
 from .joint_kind import JointEntry
 from .loads import name_of_load
 from .names import LinkPoint, connected
@@ -50,13 +51,15 @@ class LinkageOutputs:
     data: Mapping[str, Any]
     structure: Structure
     port: DriverPort
+    further: FurtherDrivers
     link_turns: Mapping[str, tuple[float, float]]
     """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad]."""
 
     def variable(self, kind: str, name: str) -> str:
         """The name under which the variables of a link or a joint stand: with its kind if the name has another
         meaning already."""
-        shared = kind == "joint" and name in self.structure.links
+        shared = kind != "link" and name in self.structure.links
+        shared = shared or (kind == "driver" and name in self.structure.joints)
         return f"{name}_{kind}" if shared or name in RESERVED else name
 
     @cached_property
@@ -69,6 +72,7 @@ class LinkageOutputs:
             fields.append((self.variable("joint", name), kind, group(kind, description)))
         for name, kind in self.link_outputs.items():
             fields.append((self.variable("link", name), kind, group(kind, f"link {name}")))
+        fields += self.further.outputs()
         running = WayRunning if self.structure.driver.linear else Running
         return declared_class("Outputs", (self.port.values, running), fields)
 
@@ -85,15 +89,14 @@ class LinkageOutputs:
 
     def probes(self, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
         """Reactions, rotation of links and motion of points at acceleration `a` of the driver."""
-        reactions, m, w = s.reactions(a), s.m, s.w
+        further = self.further.outputs_at(xp, s, a)
+        m, reactions, effects, w, a = s.moving(a)
         assert isinstance(m.linkage, DescribedLinkage)
         parts = m.linkage.parts
         losses = sum(
-            s.effects[name_of_load(load)].dissipative
-            for load in self.data["loads"]
-            if load["type"] != "spring"
+            effects[name_of_load(load)].dissipative for load in self.data["loads"] if load["type"] != "spring"
         )
-        values: dict[str, Any] = {"load_power": -(losses * w)}
+        values: dict[str, Any] = {"load_power": -(losses * w), **further}
         for name, joint in self.structure.joints.items():
             key, sign = parts.receivers[name]
             if joint.kind == PRISMATIC:
@@ -124,8 +127,8 @@ class LinkageOutputs:
         assert isinstance(reaction, GuideForce)
         key, sign = parts.receivers[joint.name]
         slide, block = m.slides[key], m.pins[key[0]]
-        # the line of the driver has the direction in which the driver moves
-        along = sign if joint.name == self.structure.driver.joint else 1.0
+        # the line of a driver has the direction in which the driver moves
+        along = sign if any(joint.name == driver.joint for driver in self.structure.drivers) else 1.0
         d = slide.d * along
         moment = reaction.moment - (block.p - m.links[key[1]].pin.p).cross(reaction)
         s1, s2 = slide.s1 * sign * along, slide.s2 * sign * along

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from ...core.planar import Vec2
 from ...groups.body import Bar, Mass
-from ...groups.driver import Crank, Cylinder, Driver, Ram
+from ...groups.driver import Course, Crank, Cylinder, Driver, Ram
 from ...groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from ...groups.group import Group
 from ...groups.joints import Rail
@@ -17,7 +18,7 @@ from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry
 from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
-from .structure import CYLINDER
+from .structure import CYLINDER, DRIVER, DriverEntry
 
 
 class LinkageParts:
@@ -27,20 +28,28 @@ class LinkageParts:
     and link), with the sign that turns it into the force on the link that the description names first.
     """
 
-    def __init__(self, geometry: LinkGeometry, sides: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        geometry: LinkGeometry,
+        sides: Mapping[str, float],
+        courses: Mapping[str, Callable[[Any, Any], Course]] = MappingProxyType({}),
+    ) -> None:
         """
         Parameters
         ----------
         sides : the assembly modes, of a triad the turns of its ternary link, by the first link of each group
+        courses : those of the drivers besides the first one, by the joint of each
         """
         self.geometry, self.structure, self.sides = geometry, geometry.structure, sides
         self.frames: dict[str, LinkFrame] = {GROUND: OWN}
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
         self._carriers = {self.pin(GROUND, name): GROUND for name in self.structure.ground}
         """by pin, the first link that has it: all others hang on this one there"""
+        self._courses, first = courses, self.structure.driver
         groups = list(self.structure.groups)
-        cylinder = groups.pop(0) if groups and groups[0].kind == CYLINDER else None
-        self.driver = self._driver() if cylinder is None else self._cylinder(cylinder)
+        slide = self.structure.joints[first.joint]
+        cylinder = groups.pop(0) if first.linear and GROUND not in slide.links else None
+        self.driver = self._driver(first) if cylinder is None else self._cylinder(cylinder)
         self.groups: list[Group] = []
         for group in groups:
             self.groups.append(self._group(group))
@@ -113,26 +122,32 @@ class LinkageParts:
 
     # the driver and the groups
 
-    def _driver(self) -> Driver:
+    def _driver(self, entry: DriverEntry) -> Driver:
         """The driver: a crank about its pin, or a ram on its line in the ground."""
-        entry, geometry = self.structure.driver, self.geometry
+        geometry, course = self.geometry, self._courses.get(entry.joint)
         joint, link = self.structure.joints[entry.joint], entry.link
         if not entry.linear:
             zero = geometry.number(entry.zero)
             bar = self.hung(link, joint)
             end = next(iter(bar.points), bar.pin)
-            return Crank(bar, end, Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero)), entry.sense)
+            start = Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero))
+            return Crank(bar, end, start, entry.sense, course)
         sign = 1.0 if joint.on[0] == link else -1.0
         along = geometry.direction(joint, link) * sign
         frame = LinkFrame(geometry.point(link, joint.at(link)), along)
         rail = Rail(None, geometry.point(GROUND, joint.at(GROUND)), geometry.direction(joint, GROUND) * sign)
         bar = self.bar(link, frame)
-        return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)))
+        return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)), course)
 
     def _cylinder(self, group: AssurGroup) -> Driver:
         """The driver that is a cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
         barrel, rod, lever = group.links
-        geometry, slide = self.geometry, self.structure.joints[self.structure.driver.joint]
+        geometry = self.geometry
+        slide = next(
+            self.structure.joints[driver.joint]
+            for driver in self.structure.drivers
+            if self.structure.joints[driver.joint].links == {barrel, rod}
+        )
         p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
         inner = self._inner(c, rod, lever)
         # from the barrel to the rod
@@ -147,7 +162,8 @@ class LinkageParts:
         )
         swung, shift = self._rod(lever, q, c), near - far
         guide, side = self._guide(slide, rod), self.sides[barrel]
-        return Cylinder(barrel_bar, inner, rod_bar, swung, shift.x, shift.y, far.y, guide, side)
+        course = self._courses.get(slide.name)
+        return Cylinder(barrel_bar, inner, rod_bar, swung, shift.x, shift.y, far.y, guide, side, course)
 
     # joints by their letters: p and q join a link with those before, b and c are the pin between two links, g and h
     # are guides on links before, s is the slot between two links
@@ -155,6 +171,11 @@ class LinkageParts:
     def _group(self, group: AssurGroup) -> Group:
         """The group of that kind with the numbers of its links."""
         joints = [self.structure.joints[j.name] for j in group.joints]
+        if group.kind == DRIVER:
+            joint = joints[0].name
+            return self._driver(next(entry for entry in self.structure.further if entry.joint == joint))
+        if group.kind == CYLINDER:
+            return self._cylinder(group)
         if group.kind == "triad":
             return self._triad(group.links[0], group.links[1:], joints[:3], joints[3:])
         if group.kind in SINGLES:

@@ -12,7 +12,9 @@ from .names import owners_of
 
 
 def shared_pins(
-    points: Mapping[str, Iterable[str]], named: Sequence[Mapping[str, Any]], driver: Mapping[str, Any]
+    points: Mapping[str, Iterable[str]],
+    named: Sequence[Mapping[str, Any]],
+    drivers: Sequence[Mapping[str, Any]],
 ) -> tuple[list[dict[str, Any]], list[tuple[str, str]]]:
     """A revolute joint for each further link in a point of the same name, if none is named; and clashes: names that a
     joint has already, each with what is wrong.
@@ -21,7 +23,7 @@ def shared_pins(
     ----------
     points : by link, the ground too
     named : the joints that the file names
-    driver : the table of the driver
+    drivers : the tables of the drivers
     """
     owners = owners_of(points)
     joined = {frozenset((tuple(j["on"]), tuple(j["by"]))) for j in named if j["type"] == REVOLUTE}
@@ -29,8 +31,12 @@ def shared_pins(
     ordered = in_order_of_motion(
         {point: links for point, links in owners.items() if len(links) > 1 and point not in apart},
         [link for link in points if link != GROUND],
-        [in_decomposition(JointEntry.from_table(j)) for j in named if j["name"] != driver.get("joint")],
-        str(driver.get("link")),
+        [
+            in_decomposition(JointEntry.from_table(j))
+            for j in named
+            if all(j["name"] != driver.get("joint") for driver in drivers)
+        ],
+        [str(driver.get("link")) for driver in drivers],
     )
     # of three or more links, the one on which the others hang stands first
     owners |= {point: links for point, links in ordered.items() if len(links) > 2}

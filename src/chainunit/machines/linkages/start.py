@@ -30,8 +30,8 @@ class StartPose:
         self, points: Mapping[str, Mapping[str, complex]], joints: Sequence[tuple[JointEntry, float]]
     ) -> None:
         self.points, self.joints = points, joints
-        self.slide: tuple[JointEntry, float] | None = None
-        """the joint in which the driver slides, and its way there [m]"""
+        self.slides: list[tuple[JointEntry, float]] = []
+        """the joints in which drivers slide, each with its way there [m]"""
         self.poses: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
         """the origin of the frame of a link, and its angle [rad]"""
         self.places: dict[LinkPoint, complex] = {}
@@ -88,19 +88,21 @@ class StartPose:
         return before != (len(self.poses), len(self.places), len(self.angles))
 
     def _slid(self) -> None:
-        """The point of the joint in which the driver slides, from its way and either link."""
-        if self.slide is None:
-            return
-        joint, way = self.slide
-        link, start = joint.by
-        if link not in self.angles:
-            return
-        line = self.points[link][joint.toward] - self.points[link][start]
-        moved = rect(way, self.angles[link] + phase(line))
-        if joint.by in self.places:
-            self.places.setdefault(joint.on, self.places[joint.by] + moved)
-        elif joint.on in self.places:
-            self.places.setdefault(joint.by, self.places[joint.on] - moved)
+        """The point of each joint in which a driver slides, from its way and either link; or the angle of its line,
+        from both points."""
+        for joint, way in self.slides:
+            link, start = joint.by
+            line = self.points[link][joint.toward] - self.points[link][start]
+            if link not in self.angles and joint.on in self.places and joint.by in self.places:
+                drawn = self.places[joint.on] - self.places[joint.by]
+                self.angles[link] = math.remainder(phase(drawn) - phase(line), 2.0 * math.pi)
+            if link not in self.angles:
+                continue
+            moved = rect(way, self.angles[link] + phase(line))
+            if joint.by in self.places:
+                self.places.setdefault(joint.on, self.places[joint.by] + moved)
+            elif joint.on in self.places:
+                self.places.setdefault(joint.by, self.places[joint.on] - moved)
 
     def _pose(self, link: str, points: Mapping[str, complex]) -> None:
         """The pose of a link from its angle and a point, or from two points, if these are known."""

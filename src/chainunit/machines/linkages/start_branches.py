@@ -13,7 +13,6 @@ from ...mechanism.assur import AssurGroup
 from ...mechanism.machine import Mechanism
 from .geometry import TWO_WAYS
 from .model import LinkageDescription
-from .structure import CYLINDER
 
 _AS_FAR = 0.8
 """Share of its distance from the other way that a start may be away from the way that is taken."""
@@ -40,10 +39,10 @@ def check_start(described: LinkageDescription) -> None:
 def _other_way(described: LinkageDescription, group: AssurGroup) -> Mechanism:
     """The linkage at its start, up to a dyad, or a cylinder, that is assembled in the other way."""
     structure, linkage = described.structure, described.at_start
-    # a cylinder is the first group of the structure, and the driver of the linkage
-    drivers = len(structure.groups) - len(linkage.groups)
-    part = linkage.before(structure.groups.index(group) + 1 - drivers)
-    if group.kind == CYLINDER:
+    # a cylinder that is the first driver is no group of the linkage
+    count = structure.groups.index(group) + 1 - (len(structure.groups) - len(linkage.groups))
+    part = linkage.before(count)
+    if count == 0:
         part = replace(part, driver=_turned(part.driver))
     else:
         part = replace(part, groups=(*part.groups[:-1], _turned(part.groups[-1])))

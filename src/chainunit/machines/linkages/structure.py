@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,9 +34,14 @@ class LinkEntry:
 
 @dataclass(frozen=True)
 class DriverEntry:
-    """The driver as described. A rotation: the link turns about its ground joint, at q = 0 its x axis has the angle
-    `zero` [rad], and q counts counter-clockwise if `sense` is +1; if it `swings`, it has a range. A slide: the
-    joint is prismatic, and q is the way in it."""
+    """A driver as described. A rotation: the link turns about its ground joint, at the place 0 its x axis has the
+    angle `zero` [rad], and the place counts counter-clockwise if `sense` is +1; if it `swings`, it has a range. A
+    slide: the joint is prismatic, and the place is the way in it.
+
+    A driver besides the first one has a `name`. Its place follows the place of the first one by a `law`, an
+    expression of ``phi``, and it is `geared` if the first one drives it; without a law it is an input, which goes
+    through its `span`. `start` is its place at the start, and `rate` how often it turns at most while the first one
+    turns once."""
 
     joint: str
     link: str
@@ -44,23 +49,53 @@ class DriverEntry:
     zero: Entry = 0.0
     sense: float = 1.0
     swings: bool = False
+    name: str = ""
+    law: Entry | None = None
+    geared: bool = True
+    span: Sequence[float] = (0.0, 0.0)
+    start: float = 0.0
+    rate: float = 1.0
+
+    @property
+    def is_free(self) -> bool:
+        """Whether it is an input of its own beside the first driver."""
+        return bool(self.name) and self.law is None
 
 
-def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: DriverEntry) -> list[AssurGroup]:
-    """The groups of a linkage.
+def groups_of(
+    links: Sequence[str], joints: Sequence[JointEntry], drivers: Sequence[DriverEntry]
+) -> list[AssurGroup]:
+    """The groups of a linkage with these drivers: cylinders and further drivers are among them.
 
     Raises
     ------
     InputError
         if the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
-    seen = [in_decomposition(joint) for joint in joints if joint.name != driver.joint]
-    slide = next(joint for joint in joints if joint.name == driver.joint)
-    if GROUND in (slide.on[0], slide.by[0]):
-        groups = decompose(links, seen, driver.link)
-    else:
-        groups = _with_cylinder(links, seen, slide)
+    by_name, (driver, *_) = {joint.name: joint for joint in joints}, drivers
+    driving = [by_name[entry.joint] for entry in drivers]
+    seen = [in_decomposition(joint) for joint in joints if joint not in driving]
+    grounded = [
+        (entry, joint)
+        for entry, joint in zip(drivers, driving, strict=True)
+        if GROUND in (joint.on[0], joint.by[0])
+    ]
+    cylinders = [joint for joint in driving if GROUND not in (joint.on[0], joint.by[0])]
+    groups = _with_cylinders(links, seen, {entry.link for entry, _ in grounded}, cylinders, driving[0])
+    alone = [
+        AssurGroup(DRIVER, (entry.link,), (in_decomposition(joint),))
+        for entry, joint in grounded
+        if entry is not driver
+    ]
+    first = int(driving[0] in cylinders)
+    groups[first:first] = alone
     triad = next((group for group in groups if group.kind == "triad"), None)
+    if triad is not None and any(entry.is_free for entry in drivers):
+        raise InputError(
+            f"the links {', '.join(triad.links)} form a triad, and two drivers are inputs: a triad needs one; give "
+            'the other one a law, phi = "..."',
+            key=triad.links[0],
+        )
     if triad is not None and (driver.linear or driver.swings):
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
@@ -76,14 +111,14 @@ def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: Driver
 class Structure:
     """A linkage without numbers: entries by name, the groups in order, the names of pins, and the assembly.
 
-    `marked` are the points, by link and name, that joints or loads need on this very link; `poses` are rough poses
-    (x, y, angle) of all links at the driver's value `start`.
-    """
+    `driver` is the first one, and `further` are the others. `marked` are the points, by link and name, that joints or
+    loads need on this very link; `poses` are rough poses (x, y, angle) of all links at the driver's value `start`."""
 
     ground: Mapping[str, Sequence[Entry]]
     links: Mapping[str, LinkEntry]
     joints: Mapping[str, JointEntry]
     driver: DriverEntry
+    further: tuple[DriverEntry, ...]
     groups: tuple[AssurGroup, ...]
     pins: Mapping[LinkPoint, str]
     marked: frozenset[LinkPoint]
@@ -91,12 +126,18 @@ class Structure:
     poses: Mapping[str, tuple[float, float, float]]
 
     @property
+    def drivers(self) -> tuple[DriverEntry, ...]:
+        """All drivers."""
+        return self.driver, *self.further
+
+    @property
     def rate(self) -> float:
         """How often a link turns in a turn of the driver, at most, as single links turn faster than those before
         them."""
         singles = [group for group in self.groups if group.kind in SINGLES]
         rates = (SINGLES[g.kind].rate(self.joints[g.joints[1].name], g.links[0]) for g in singles)
-        return math.prod(max(1.0, rate) for rate in rates)
+        laws = max((driver.rate for driver in self.further), default=1.0)
+        return math.prod((max(1.0, rate) for rate in rates), start=laws)
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Structure:
@@ -120,7 +161,11 @@ class Structure:
         }
         joints = {joint["name"]: JointEntry.from_table(joint) for joint in data["joints"]}
         driver, ground, start = DriverEntry(**data["driver"]), data["ground"], data["start"]
-        groups = groups_of([*links], [*joints.values()], driver)
+        others = [DriverEntry(**entry) for entry in data.get("drivers", ())]
+        groups = groups_of([*links], [*joints.values()], [driver, *others])
+        driven = [group.links for group in groups if group.kind in (DRIVER, CYLINDER)]
+        # in the order of their groups
+        further = sorted(others, key=lambda entry: next(k for k, g in enumerate(driven) if entry.link in g))
         # points by link that stay apart from others in the same pin: of loads, and of joints between groups
         loaded = (load[key] for load in data["loads"] for key in ("on", "by") if key in load)
         marked = {tuple(end) for end in loaded if len(end) == 2}
@@ -128,50 +173,83 @@ class Structure:
             for joint in (joints[inner.name] for inner in group.joints):
                 outside = {end for end in (joint.on, joint.by) if end[0] not in group.links}
                 marked |= {PRISMATIC: {joint.on, joint.by}, REVOLUTE: outside}.get(joint.kind, set())
-        if driver.linear:
-            marked |= {joints[driver.joint].on, joints[driver.joint].by}
+        for entry in (driver, *further):
+            if entry.linear:
+                marked |= {joints[entry.joint].on, joints[entry.joint].by}
         pins = pin_names(ground, links, joints.values())
         poses = {name: tuple(pose) for name, pose in start["poses"].items()}
         return cls(
-            ground, links, joints, driver, tuple(groups), pins, frozenset(marked), start["value"], poses
+            ground,
+            links,
+            joints,
+            driver,
+            tuple(further),
+            tuple(groups),
+            pins,
+            frozenset(marked),
+            start["value"],
+            poses,
         )
 
 
 CYLINDER = "cylinder"
 """Kind of the group of a cylinder that is pinned at both ends, with the lever that it swings: barrel, rod, lever."""
+DRIVER = "driver"
+"""Kind of the group of a link that a driver besides the first one moves in the ground."""
 
 
-def _with_cylinder(links: Sequence[str], joints: Sequence[JointOf], slide: JointEntry) -> list[AssurGroup]:
-    """The groups of a linkage that a cylinder between two links drives, its own first.
+def _with_cylinders(
+    links: Sequence[str],
+    joints: Sequence[JointOf],
+    drivers: Collection[str],
+    slides: Sequence[JointEntry],
+    first: JointEntry,
+) -> list[AssurGroup]:
+    """The groups of a linkage with these `drivers` in the ground, and with cylinders, each by the slide between two
+    links; that of the `first` driver stands first.
 
-    At a given way barrel and rod are one link. With its lever it has to be a dyad on the ground.
+    At a given way barrel and rod are one link. With its lever it has to be a dyad, and that of the first driver one
+    on the ground.
 
     Raises
     ------
     InputError
         if it is not.
     """
-    rod, barrel = slide.on[0], slide.by[0]
-    one_link = {rod: barrel}
+    one_link = {slide.on[0]: slide.by[0] for slide in slides}
     merged = [
         joint._replace(on=on, by=by, third=third)
         for joint in joints
         for on, by, third in [[one_link.get(link, link) for link in (joint.on, joint.by, joint.third)]]
     ]
-    groups = decompose([link for link in links if link != rod], merged, "")
-    dyad = next(group for group in groups if barrel in group.links)
+    groups = decompose([link for link in links if link not in one_link], merged, drivers)
+    for slide in slides:
+        k, cylinder = _cylinder(groups, {joint.name: joint for joint in joints}, slide, slide is first)
+        del groups[k]
+        groups.insert(0 if slide is first else k, cylinder)
+    return groups
+
+
+def _cylinder(
+    groups: Sequence[AssurGroup], joints: Mapping[str, JointOf], slide: JointEntry, first: bool
+) -> tuple[int, AssurGroup]:
+    """The number of the dyad that a cylinder forms with its lever, and its group."""
+    rod, barrel = slide.on[0], slide.by[0]
+    k, dyad = next((k, group) for k, group in enumerate(groups) if barrel in group.links)
     if dyad.kind == "RRR":
         (lever,) = {*dyad.links} - {barrel}
-        unmerged = {joint.name: joint for joint in joints}
-        p, c, q = (unmerged[joint.name] for joint in dyad.joints[:: 1 if dyad.links[0] == barrel else -1])
-        near, far = p.other_link(GROUND), c.other_link(lever)
-        if GROUND in p.links and GROUND in q.links and {near, far} == {rod, barrel}:
-            cylinder = AssurGroup(CYLINDER, (near, far, lever), (p, c, q))
-            return [cylinder, *(group for group in groups if group is not dyad)]
+        p, c, q = (joints[joint.name] for joint in dyad.joints[:: 1 if dyad.links[0] == barrel else -1])
+        near, far = ({*joint.links} & {rod, barrel} for joint in (p, c))
+        if (
+            near | far == {rod, barrel}
+            and len(near) == 1
+            and (not first or GROUND in {*p.links} & {*q.links})
+        ):
+            return k, AssurGroup(CYLINDER, (*near, *far, lever), (p, c, q))
+    place = "of the ground" if first else "of the ground or of a link that is moved before it"
     raise InputError(
         f"the links {barrel} and {rod}, which the driver {slide.name} moves along each other, must be a cylinder: "
-        "one of them on a pin of the ground, the other one on a pin of a lever, and the lever on a pin of the "
-        "ground",
+        f"one of them on a pin {place}, the other one on a pin of a lever, and the lever on a pin {place}",
         key=barrel,
     )
 

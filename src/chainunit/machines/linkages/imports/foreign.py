@@ -41,13 +41,15 @@ class ForeignSlot(NamedTuple):
 
 
 class ForeignDriver(NamedTuple):
-    """A pin of the ground about which a motor turns its link; or two pins and a cylinder between them, which grows by
-    `throw` from its drawn length, or shrinks if that is below 0."""
+    """A pin of the ground about which a motor turns its link, at a `speed` [rev/min] if the source has one for each;
+    or two pins and a cylinder between them, which grows by `throw` from its drawn length, or shrinks if that is below
+    0."""
 
     title: str
     pins: tuple[str, ...]
     clockwise: bool = False
     throw: float = 0.0
+    speed: float = 1.0
 
 
 class ForeignLinkage(Faults):

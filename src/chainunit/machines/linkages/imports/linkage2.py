@@ -51,9 +51,9 @@ class LinkageDrawing(ForeignLinkage):
         pin = self.pin(f"C{_id(node)}", place, *[GROUND] * (node.get("anchor") == "true"))
         self.names["connector"][_id(node)] = pin
         if node.get("input") == "true":
-            self.drivers.append(ForeignDriver(title, (pin,)))
-            speed = abs(self.numbers(title, [node.get("rpm", "15")])[0])
-            self.remarks.append(f"the drawing turns {pin} at {speed:g} rev/min; give --speed for it")
+            (speed,) = self.numbers(title, [node.get("rpm", "15")])
+            self.drivers.append(ForeignDriver(title, (pin,), speed=speed))
+            self.remarks.append(f"the drawing turns {pin} at {abs(speed):g} rev/min; give --speed for it")
 
     def body(self, title: str, node: Element) -> None:
         """A link, or an actuator."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from typing import Any
 
-from ....mechanism.assur import GROUND, ONE_DRIVER
+from ....mechanism.assur import GROUND
 from .foreign import ForeignDriver, ForeignLinkage, Place, free_name
 
 Body = tuple[float, float, Place]
@@ -32,9 +32,6 @@ def tables_of(linkage: ForeignLinkage, scale: float, density: float) -> dict[str
     InputError
         with a line for each fault of the source, and for each thing that cannot be carried over.
     """
-    if len(linkage.drivers) > 1:
-        titles = ", ".join(driver.title for driver in linkage.drivers)
-        linkage.fault(titles, f"{len(linkage.drivers)} inputs: {ONE_DRIVER}")
     linkage.refuse()
     tables = _Tables(linkage, scale, density).tables()
     linkage.refuse()
@@ -96,15 +93,22 @@ class _Tables:
             self.linkage.remarks.append(
                 f"{noun} {', '.join(massless)} without mass; --density gives links a mass"
             )
-        driver, phi = self.driver()
+        # for a source that names no input
+        moving, slots = self.moving(), {slot.pin for slot in self.linkage.slots}
+        cranks = [pin for pin in self.pins[GROUND] if len(moving[pin]) == 1 and pin not in slots]
+        named = self.linkage.drivers or [ForeignDriver(self.linkage.program, (*cranks, "")[:1])]
+        # of motors the slowest one stands first, so that the others turn a whole number of times in a turn
+        first, *others = sorted(named, key=lambda driver: (len(driver.pins), abs(driver.speed)))
+        driver, phi = self.driver(first)
+        drivers = dict(self.further(first, other) for other in others)
         self.guides()
         loads = {
             point: {**load, "on": f"{self.body[link]}.{point}"}
             for point, (link, load) in self.linkage.loads.items()
         }
         return ({"gravity": 0.0} if self.linkage.weightless else {}) | {
-            "ground": ground, "driver": driver, "links": self.links, "joints": self.joints, "loads": loads,
-            "start": {"phi": phi, "poses": self.poses},
+            "ground": ground, "driver": driver, "drivers": drivers, "links": self.links, "joints": self.joints,
+            "loads": loads, "start": {"phi": phi, "poses": self.poses},
         }  # fmt: skip
 
     def vector(self, place: Place, origin: Place = (0.0, 0.0)) -> list[float]:
@@ -136,13 +140,30 @@ class _Tables:
         mass = self.density * length
         return mass, mass * length**2 / 12.0, (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))
 
-    def driver(self) -> tuple[dict[str, Any], float]:
-        """The table of the driver, and its value at the start."""
-        moving = {pin: [body for body in [*self.pins][1:] if pin in self.pins[body]] for pin in self.places}
-        slots = {slot.pin for slot in self.linkage.slots}
-        # for a source that names no input
-        cranks = [pin for pin in self.pins[GROUND] if len(moving[pin]) == 1 and pin not in slots]
-        driver = [*self.linkage.drivers, ForeignDriver(self.linkage.program, (*cranks, "")[:1])][0]
+    def moving(self) -> dict[str, list[str]]:
+        """The links of each pin that move."""
+        return {pin: [body for body in [*self.pins][1:] if pin in self.pins[body]] for pin in self.places}
+
+    def further(self, first: ForeignDriver, driver: ForeignDriver) -> tuple[str, dict[str, Any]]:
+        """The name and the table of a driver besides the first one: a motor turns in step with it, a cylinder is an
+        input of its own."""
+        table, start = self.driver(driver)
+        if "joint" in table:
+            return table["joint"], {**table, "start": start}
+        if not first.speed or not driver.speed:
+            self.linkage.fault(driver.title, "is an input that stands; give it a speed, or take it out")
+            return driver.title, table
+        ratio = driver.speed / first.speed
+        name = free_name(f"motor_{driver.pins[0]}", self.links)
+        self.linkage.remarks.append(
+            f"{driver.title} turns {ratio:g} times as fast as {first.title}, with a motor of its own, as "
+            f"[drivers.{name}] says"
+        )
+        return name, {**table, "phi": f"{ratio!r} * phi", "by": "motor"}
+
+    def driver(self, driver: ForeignDriver) -> tuple[dict[str, Any], float]:
+        """The table of a driver, and its value at the start."""
+        moving = self.moving()
         if len(driver.pins) == 2:
             return self.cylinder(driver, *driver.pins)
         turned = moving.get(driver.pins[0], [])
