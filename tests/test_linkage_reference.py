@@ -56,9 +56,9 @@ def test_the_start_values_are_reckoned_once(name, monkeypatch):
     """One linkage of numbers from the file to the check of the start values, and what is kept of it is right."""
     engines, make = [], LinkageParts.__init__
 
-    def counted(parts, geometry, sides):
+    def counted(parts, geometry, *more):
         engines.append(geometry.xp)
-        make(parts, geometry, sides)
+        make(parts, geometry, *more)
 
     monkeypatch.setattr(LinkageParts, "__init__", counted)
     linkage_model._machine_of.cache_clear()
