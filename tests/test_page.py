@@ -43,10 +43,10 @@ from chainunit.report.packing import unpacked
 from chainunit.study import config, judgement
 from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check
+from chainunit.study.organ_limits import CRANK_GOOD, ROCKER_GOOD_EMPTY
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
-from chainunit.study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 
 SHORT = """
 title = "A mill <b>& more</b> </script><!--"
@@ -398,7 +398,7 @@ def test_the_verdict_comes_first_everywhere(study, written):
     pushed = [r for r in verdict["model"]["reasons"] if r["topic"] == "pushed"]
     for reason in pushed:
         rod = reason["quantity"].removesuffix("_mean_pull")
-        assert reason["value"]["value"] == study.pulls[reason["run"]][rod].mean < 0.0
+        assert reason["value"]["value"] == study.organ_limits[reason["run"]][rod].mean < 0.0
     lines = said_of(study).splitlines()
     assert lines[:2] == [verdict["model"]["text"], verdict["motor"]["text"]]
     assert (

@@ -10,13 +10,10 @@ import pytest
 
 from chainunit.capabilities.chains.judgement import chains
 from chainunit.reading.results import as_data
-from chainunit.study.pulls import LeastPull
+from chainunit.study.organ_limits import CRANK_GOOD, ROCKER_GOOD, ROCKER_GOOD_EMPTY, LeastPull
 from chainunit.study.remark import Remark
 from chainunit.study.verdict import (
-    CRANK_GOOD,
     RESIDUAL,
-    ROCKER_GOOD,
-    ROCKER_GOOD_EMPTY,
     foreign_machine,
     rigid_links,
     two_bars,

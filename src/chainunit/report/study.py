@@ -15,9 +15,8 @@ from ..core.quantities import finite, variables
 from ..reading.results import InUnit
 from ..reading.text import shown_in
 from ..study.event_table import random_runs
-from ..study.given import GivenSection, description, given_sections
-from ..study.heading import Heading
-from ..study.origins import origin_of, place_of
+from ..study.given import GivenSection, description, given_sections, origin_of, place_of
+from ..study.provenance import Heading
 from ..study.record import StudyRecord
 from ..study.result import speed_control
 from ..study.transients import DIFFERENCE

@@ -13,12 +13,12 @@ from ..core.files import scratch
 from ..drives.catalogue import check_own
 from ..fmu.backends import Backend
 from ..work.progress import TaskProgress, quiet
+from .capability import PartBeside
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
-from .drive_tables import DriveTables
 from .motor_sources import MotorSource
-from .plans import PartBeside
+from .operation import DriveTables
 from .proposal import DriveProposal, motor_choice
 from .registry import parts_of_line
 

@@ -33,16 +33,22 @@ from ..reading.tables import (
 )
 from ..reading.text import DEFAULT_UNITS, Units, chosen_units
 from ..reading.toml_lines import lines_of
-from .checks import check_order
-from .drive_tables import DriveTables
+from .checks import (
+    check_order,
+    check_values,
+    endless,
+    independent,
+    loads_beyond,
+    missing_recordings,
+    plate_of,
+    without,
+)
 from .event import Event
 from .event_table import read_events
-from .file_reading import FileReading
 from .file_section import FileSection
-from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
-from .operation import OperatingConditions
+from .operation import DriveTables, OperatingConditions
 from .parts import (
     Parts,
     beside,
@@ -55,7 +61,6 @@ from .parts import (
 )
 from .proposal import DriveRequest, motor_choice
 from .registry import organ_models, registered
-from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
     Run,
@@ -109,6 +114,26 @@ class FileContents:
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""
         return any(name.startswith(f"{section}.") for name in self.given)
+
+
+@dataclasses.dataclass(frozen=True)
+class FileReading:
+    """A study file each of whose values is allowed, on the way to its `Config`."""
+
+    data: Mapping[str, Any]
+    """tables and keys as the file has them"""
+    form: Any
+    """its checked form, completed by the example"""
+    parts: Parts
+    values: Mapping[str, Any]
+    """by table, its declared quantities, completed by their start values"""
+    given: Mapping[str, Mapping[str, float]]
+    """by table, the quantities that file and example give"""
+    machine: Machine | None
+    """None for a machine that was refused"""
+    events: Mapping[str, Event]
+    source: str
+    """name of the file; paths in it are relative to it"""
 
 
 @briefly_shown

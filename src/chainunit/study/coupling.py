@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 from ..reading.text import number
 from .event import Role
-from .event_torques import from_event_on, peaks_in_events
 from .ram_force import TIMES, RamForce, rams
 from .readings import pull_out_torque
 from .record import StudyRecord
 from .remark import note, warning
 from .starts import StartFindings, transient_words
-from .torques import on_coupling, quasi_static_peak
+from .torques import from_event_on, on_coupling, peaks_in_events, quasi_static_peak
 from .verdict import START
 from .window import Phase
 

@@ -13,9 +13,16 @@ from ..core.quantities import Layout, Value, Variable, declaration, quantity
 from .arrays import peak
 from .drive import AbsentError, Drive
 from .limits import reaches
-from .readings import crank_speed, crank_torque, largest_torque, shaft_power
+from .readings import (
+    crank_speed,
+    crank_torque,
+    energy_gap,
+    energy_held,
+    largest_torque,
+    shaft_power,
+    stored_shares,
+)
 from .relay import TRIPS_AT, lasting_current, relay_trip
-from .stored import energy_gap, energy_held, stored_shares
 from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
 

@@ -20,8 +20,8 @@ from ..system import FmuComponent, foreign_component
 from .catalogue_drive import as_used, catalogue_drive, with_inertia
 from .cycle import Cycle
 from .drive import Drive
-from .drive_tables import DriveTables
 from .foreign_machine import declared_parameters
+from .operation import DriveTables
 from .registry import registered
 
 

@@ -105,7 +105,7 @@ class TwoBars(OrganModel):
             speed,
             resonance,
             slack_speed,
-            study.pulls,
+            study.organ_limits,
             residuals,
             empty={""} if has_empty_side(config.feed) else empty,
             actual=actual,

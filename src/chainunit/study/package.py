@@ -29,10 +29,10 @@ from .config import Config
 from .cycle import cycle
 from .drive import Drive
 from .operation import OperatingConditions
-from .organ_limits import limits_of_organs
+from .organ_limits import limits_of_organs, passed_limits
 from .registry import parts_of_line
 from .remarks import lengths_of_example
-from .verdict import on_limit, passed_limits
+from .verdict import on_limit
 
 
 def study_system(drive: Drive, operation: OperatingConditions) -> System:

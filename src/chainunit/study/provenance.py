@@ -1,4 +1,5 @@
-"""Where a result comes from: version, libraries and platform, the files of the study by their digests, and seeds."""
+"""Where a result comes from: its heading, version, libraries and platform, the files of the study by their digests,
+and seeds."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import json
 import platform
 import re
 import subprocess
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from hashlib import sha256
 from importlib import metadata
@@ -17,6 +18,7 @@ from typing import Any
 from .. import __version__
 from ..core.errors import InputError
 from ..core.files import digest, write_file
+from ..reading.results import part, result
 from .config import Config, FileContents
 from .parts import beside
 from .registry import registered
@@ -125,3 +127,18 @@ def _commit() -> str | None:
         )
         return done.stdout.strip() or None
     return None
+
+
+@result
+class Heading:
+    """Where a result comes from."""
+
+    chainunit: str = part("version of chainunit")
+    title: str = part("title of the study")
+    source: str = part("the study file")
+    report: Mapping[str, str] = part("labels of the report")
+
+    @classmethod
+    def of(cls, title: str, file: FileContents) -> Heading:
+        """The heading of a result of a study with that title and file."""
+        return cls(__version__, title, file.source, file.labels)

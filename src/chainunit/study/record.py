@@ -20,8 +20,8 @@ from .drive import Drive
 from .event import Event
 from .limits import reaches
 from .measures import Answers, not_known
+from .organ_limits import LeastPull
 from .proposal import DriveProposal
-from .pulls import LeastPull
 from .relay import LIGHT
 from .remark import Remark, RemarkCode, Value
 from .start_up import StartUp

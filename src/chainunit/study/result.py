@@ -13,14 +13,13 @@ from ..reading.results import InUnit, as_data, part, result
 from ..reading.tables import UnusualValue
 from ..reading.text import entries, entry, shown_in
 from .drive import Drive
-from .given import given_sections
-from .heading import Heading
+from .given import given_sections, origin_of, place_of
 from .judgement import MotorVerdict, motor_verdict
 from .line.rigid_line import RigidLine
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import Answers, measures_of
-from .origins import origin_of, place_of
+from .provenance import Heading
 from .record import StudyRecord
 from .remark import Remark
 from .verdict import Verdict

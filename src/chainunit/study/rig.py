@@ -19,10 +19,10 @@ from ..system import (
     certify,
     without,
 )
+from .cycle import no_feed
 from .drive import Drive
 from .drive_fmus import with_files
 from .event import Event, OverTime, Signals, Values
-from .load_cases import no_feed
 from .operation import OperatingConditions
 from .readings import machine_series
 

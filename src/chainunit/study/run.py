@@ -23,13 +23,12 @@ from .analysis import Work
 from .bearings import pin_loads
 from .choice import choose_for, with_parts_beside
 from .config import Config
+from .cycle import turns_by_load
 from .drive_fmus import export_coasting, export_drive
 from .event import Event
 from .event_table import random_runs
-from .event_torques import from_event_on
-from .load_cases import turns_by_load
 from .measures import read_answers, read_measure
-from .pulls import least_pulls
+from .organ_limits import least_pulls
 from .readings import crank_angle
 from .record import Spread, StudyRecord
 from .relay import class_holding, locked_rotor, protecting_class, start_seconds
@@ -38,7 +37,7 @@ from .rig import Rig
 from .start_up import start_up
 from .starts import StartAnalysis, StartFindings
 from .statics import statics
-from .torques import on_coupling, quasi_static_peak
+from .torques import from_event_on, on_coupling, quasi_static_peak
 from .transients import Transient, coast, compare, follow, lead_times, release
 from .window import Phase, Trip
 
@@ -326,7 +325,7 @@ class Runner:
         """Record the loads of the pins and the pulls in the rods."""
         drive = self.rig.drive
         if pulls := least_pulls(drive, run, drive.machine.loaded_sides(self.study.config.feed)):
-            self.study.pulls[name] = pulls
+            self.study.organ_limits[name] = pulls
         if loads := pin_loads(self.rig.drive, run):
             self.study.pins[name] = loads
 

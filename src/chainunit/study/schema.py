@@ -1,5 +1,5 @@
-"""The JSON Schema of study files, by which editors complete and check them. It is made from the keys
-(`keys`); the rules of their combinations are in `schema_rules`.
+"""The JSON Schema of study files, by which editors complete and check them: the keys (`keys`), the keys that follow
+from machine and motor, and the rules of keys that do not go together (`chainunit.study.rules`).
 
 An editor sees a date of TOML as a text. A schema can neither compare the sizes of two values, such as lengths
 with which the crank cannot turn, nor read another file: the reader of study files checks these.
@@ -8,20 +8,71 @@ with which the crank cannot turn, nor read another file: the reader of study fil
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from ..core.declared_numbers import may_be_share
 from ..core.quantities import Variable
 from ..drives.catalogue import catalogue
+from ..models import MACHINES, MOTORS
 from ..reading.unit_patterns import pattern, zero
-from .entry_values import MOST_FILES
+from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
+from .file_section import MOST_FILES
 from .keys import Key, KeyTable, entry_tables, key_tables
-from .parts import LONGEST_FILE
-from .schema_rules import OF_PARTS, rules
+from .parts import FMU, LINKAGE, LONGEST_FILE
+from .rules import all_rules, machine_is, motor_is
 from .sections import all_sections
+
+OF_PARTS = ("machine", "feed", "motor")
+"""Tables whose keys follow from the machine and the motor that the file names."""
+
+
+def rules() -> Iterator[Schema]:
+    """The conditions of a whole file."""
+    yield from (rule.schema() for rule in all_rules())
+    machines = is_one_of("system.machine", *MACHINES) | ends_with("system.machine", FMU)
+    yield from _needs(given("system.machine"), machines | ends_with("system.machine", LINKAGE))
+    yield from _needs(given("machine.linkage"), ~given("system.machine"))
+    yield from _needs(given("machine.linkage"), ends_with("machine.linkage", LINKAGE))
+    for name in MACHINES:
+        yield _where(machine_is(name), _of_machine(name))
+    packaged = [motor.designation for motor in catalogue()]
+    motors = motor_is(*MOTORS, *packaged) | ends_with("system.motor", FMU)
+    yield from _needs(given("system.motor") & ~given("catalogue"), motors)
+    for name in MOTORS:
+        condition = motor_is(name) | ~given("system.motor") if name == "DcMotor" else motor_is(name)
+        yield _where(condition, {"properties": {"motor": {"$ref": f"#/definitions/motor.{name}"}}})
+    for table, section in all_sections().items():
+        for key in section.required:
+            yield from _needs(given(table), given(f"{table}.{key}"))
+        if section.form.conditions is not None:
+            yield _where(given(table), {"properties": {table: dict(section.form.conditions())}})
+
+
+def _where(condition: Condition, then: Schema) -> Schema:
+    return {"if": condition.schema(), "then": then}
+
+
+def _needs(condition: Condition, needed: Condition) -> Iterator[Schema]:
+    yield _where(condition, needed.schema())
+
+
+def _of_machine(name: str) -> Schema:
+    """The tables and events of a machine."""
+    model = MACHINES[name]
+    inputs = {v.name for v in model.input_layout.variables}
+    inputs |= {v.name for motor in MOTORS.values() for v in motor.input_layout.variables}
+    events = [
+        kind
+        for kind, event_type in TYPES.items()
+        if {*event_type.inputs("left" if event_type.has_side else "")} <= inputs
+    ]
+    tables: Schema = {table: {"$ref": f"#/definitions/{table}.{name}"} for table in ("machine", "feed")}
+    tables["event"] = {"items": {"properties": {"type": {"enum": events}}}}
+    return {"properties": tables}
+
 
 FILE = "chainunit.schema.json"
 """The name by which examples refer to it."""

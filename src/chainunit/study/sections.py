@@ -16,8 +16,7 @@ from ..drives.motor import Motor
 from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
-from .entry_values import FileNames, numbers
-from .file_section import FileSection
+from .file_section import FileNames, FileSection, numbers
 from .registry import organ_models, registered
 
 

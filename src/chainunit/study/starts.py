@@ -14,13 +14,12 @@ from ..reading.text import number
 from .analysis import Analysis, Findings, Work
 from .catalogue_drive import usual_boost
 from .drive import Drive
-from .event_torques import running_peak, running_words
 from .record import StudyRecord
 from .remark import fault, warning
 from .rig import Rig
 from .sections import SOFTER
 from .start_runs import BACKWARDS, StartNumbers, longest_start, starts_from_all
-from .torques import at_gear
+from .torques import at_gear, running_peak, running_words
 from .verdict import START
 
 LIMIT = "starter.inverter.limit"

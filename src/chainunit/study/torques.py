@@ -1,10 +1,9 @@
-"""The torque on the parts between motor and machine in a run, at the crank: on a torque limiter on the
-motor's shaft, and at the output of the gear."""
+"""The torque on the parts between motor and machine, at the crank: on a torque limiter on the motor's shaft, and at
+the output of the gear; in a run, in the events of a study, and in its normal duty."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,10 +13,16 @@ from ..drives.gearing import geared_acceleration
 from ..drives.induction_steady import steady
 from .arrays import peak
 from .drive import Drive
+from .event import Role
+from .proposal import DutyPeak
 from .readings import crank_torque, load_inertia
+from .verdict import START, STEADY
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from .record import StudyRecord
+
 
 PeakOf = Callable[[Drive, "xr.Dataset"], float]
 """The peak of a torque in a run, at the crank [N m]."""
@@ -76,14 +81,6 @@ def quasi_static_peak(drive: Drive, run: xr.Dataset, peak_of: PeakOf = at_gear, 
     return min(peak(quasi_static_torque(drive, run, before)), most)
 
 
-@dataclass(frozen=True)
-class DutyPeak:
-    """The largest torque of normal duty without the starts, at the crank [N m], and the run in which it is."""
-
-    torque: float
-    run: str
-
-
 def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], peak_of: PeakOf) -> DutyPeak:
     """The largest torque, read by `peak_of`, in the runs of normal duty, each with its name: steady running, events
     that may last, and all feed on either side (`all_feed_on`)."""
@@ -93,3 +90,55 @@ def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], peak_of: Pea
 def all_feed_on(side: str) -> str:
     """The name of the run with all feed on a side, and while it moves there."""
     return f"all_feed_on_the_{side}"
+
+
+def from_event_on(study: StudyRecord, name: str) -> xr.Dataset:
+    """The part of a run from the begin of its event on."""
+    return study.runs[name].sel(time=slice(study.event[name], None))
+
+
+def peaks_in_events(study: StudyRecord, *roles: Role, peak_of: PeakOf = on_coupling) -> dict[str, float]:
+    """Peak torque in each event with one of these `roles`, or in every event without `roles` [N m]."""
+    events = study.config.events
+    return {
+        name: peak_of(study.drive, from_event_on(study, name))
+        for name in study.event
+        if name in study.runs and (not roles or events[name].role in roles)
+    }
+
+
+def gear_peaks(study: StudyRecord) -> dict[str, float]:
+    """Peak torque at the output of the gear in steady running, in the start-up and in each event [N m], by the name
+    of the run. If the supply is switched, in starts and in disturbances, it is that by load and acceleration."""
+    events, rise = study.config.events, study.runs["start_up"].sel(time=slice(None, study.steady_begin))
+    peaks = {
+        STEADY: at_gear(study.drive, study.steady),
+        START: quasi_static_peak(study.drive, rise),
+    }
+    for name in study.event:
+        if name in study.runs:
+            is_switched = events[name].from_rest or events[name].role is Role.DISTURBANCE
+            peak_of = quasi_static_peak if is_switched else at_gear
+            peaks[name] = peak_of(study.drive, from_event_on(study, name))
+    return peaks
+
+
+def running_peak(study: StudyRecord, peak_of: PeakOf = on_coupling) -> DutyPeak:
+    """The largest torque of normal duty without the starts: of steady running, of events that may last, and of the
+    runs from which a drive was chosen."""
+    events = study.config.events
+    lasting = [
+        (name, from_event_on(study, name))
+        for name in study.event
+        if name in study.runs and events[name].role is Role.DUTY and not events[name].from_rest
+    ]
+    peaks = [duty_peak(study.drive, [(STEADY, study.steady), *lasting], peak_of)]
+    if study.proposal is not None and study.proposal.duty is not None:
+        peaks.append(study.proposal.duty)
+    return max(peaks, key=lambda peak: peak.torque)
+
+
+def running_words(study: StudyRecord, run: str) -> str:
+    """The case of normal duty of a run, in words."""
+    title = study.title_of(run)
+    return title if run == STEADY else f"running ({title})"

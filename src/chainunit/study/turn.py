@@ -11,8 +11,7 @@ from ..core.quantities import Value, declaration, quantity
 from ..reading.results import derived, part, result
 from .analysis import Analysis, Findings, Work
 from .arrays import peak
-from .cycle import Cycle, cycle, energy_swing
-from .load_cases import no_feed
+from .cycle import Cycle, cycle, energy_swing, no_feed
 from .record import StudyRecord
 
 POINTS = 3600

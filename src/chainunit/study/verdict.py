@@ -8,22 +8,18 @@ capability that brings another model brings its verdict, too.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Set
+from collections.abc import Collection, Mapping, Set
 from dataclasses import field, replace
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from ..core.descriptions import USUAL_DRIVER
 from ..core.quantities import quantity
 from ..machines.chain_unit import RodName
 from ..reading.results import OWN, derived, part, result
 from ..reading.text import number
-from .pulls import LeastPull
+from .organ_limits import LeastPull, passed_limits, speed_limits
 from .remark import Remark, RemarkCode, fault, warning
 
-ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6
-"""Crank speeds, relative to the lowest natural frequency of the organ, up to which two bars give the rocker
-torque (loaded, with an empty side) and the crank torque to a tenth of the peak of chains; found on the
-packaged machine, see docs/physics.md."""
 RESIDUAL = 1e-3
 """Energy residual, relative to the energy moved, up to which a run counts as right."""
 BARS = "two bars"
@@ -102,13 +98,6 @@ TOPICS: Mapping[str, Topic] = {
 }
 """By kind of fault, its words."""
 _SLACK_AT_REST = fault("model-slack-at-rest", "A web is slack at rest already{where}.")
-_BEYOND = {
-    "slack speed": "Crank speed at or above the speed at which a web goes slack",
-    "crank torque": "Crank speed too high for the crank torque of two bars, which may be off by more than 10 %; the "
-    "limit for the rocker torque is lower",
-    "rocker torque": "Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %",
-}
-"""By limit of the crank speed, the words on speeds beyond it."""
 
 
 @result
@@ -310,47 +299,6 @@ def _where(runs: Set[str]) -> str:
     places += ["the settling under the feed"] if SETTLING in runs else []
     places += ["overloads"] if set(runs) - {START, SETTLING} else []
     return f"in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]} "
-
-
-@result
-class SpeedLimit:
-    """A limit of the crank speed for two bars as a model of the organs."""
-
-    topic: str = part("kind of limit, as of a reason")
-    speed: float = part("crank speed", unit="rad/s", kind="speed", name="limit")
-    grave: bool = False
-
-    def passed(self, speed: Any) -> Any:
-        """Whether each crank speed [rad/s] is beyond the limit, shape of `speed`."""
-        return speed >= self.speed if self.topic == "slack speed" else speed > self.speed
-
-    @derived(name="text")
-    def words(self) -> str:
-        """The begin of a sentence on speeds beyond it."""
-        return _BEYOND[self.topic]
-
-
-def speed_limits(slack_speed: float, mode: float, empty: bool = False) -> tuple[SpeedLimit, ...]:
-    """The limits of the crank speed for two bars: that of slack webs, of the crank torque and of the rocker torque.
-
-    Parameters
-    ----------
-    slack_speed, mode : see `two_bars`
-    empty : whether a side carries no material
-    """
-    return (
-        SpeedLimit("slack speed", slack_speed, grave=True),
-        SpeedLimit("crank torque", CRANK_GOOD * mode, grave=True),
-        SpeedLimit("rocker torque", (ROCKER_GOOD_EMPTY if empty else ROCKER_GOOD) * mode),
-    )
-
-
-def passed_limits(limits: Iterable[SpeedLimit], speed: float) -> list[SpeedLimit]:
-    """The limits that a crank speed [rad/s] passes. Where the crank torque may be wrong, the rocker torque is not
-    named beside it."""
-    passed = [limit for limit in limits if limit.passed(speed)]
-    whole = any(limit.topic == "crank torque" for limit in passed)
-    return [limit for limit in passed if not (whole and limit.topic == "rocker torque")]
 
 
 def two_bars(

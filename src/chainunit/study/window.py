@@ -13,9 +13,18 @@ import numpy as np
 
 from .arrays import peak
 from .drive import Drive
-from .readings import crank_motion, crank_speed, crank_torque, has_turn, only_whole_turns, series
+from .readings import (
+    crank_motion,
+    crank_speed,
+    crank_torque,
+    energy_behind,
+    energy_gap,
+    energy_held,
+    has_turn,
+    only_whole_turns,
+    series,
+)
 from .relay import LIGHT
-from .stored import energy_behind, energy_gap, energy_held
 from .verdict import CREEPS
 
 if TYPE_CHECKING:

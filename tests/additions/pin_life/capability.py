@@ -9,7 +9,7 @@ from pydantic import Field
 from chainunit.core.errors import InputError, near_name, shown
 from chainunit.report.capability import Capability, Contents
 from chainunit.study.analysis import Analysis
-from chainunit.study.file_reading import FileReading
+from chainunit.study.config import FileReading
 from chainunit.study.file_section import FileSection
 from chainunit.study.rules import MACHINE_FMU, Rule
 

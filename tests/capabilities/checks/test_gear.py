@@ -30,7 +30,7 @@ from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.drives.gearing import Transmission
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.study import event_torques
+from chainunit.study import torques
 from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
 
@@ -171,13 +171,13 @@ def test_running_puts_its_torque_of_the_run_on_the_gear_not_that_of_the_curve(mo
     def of_run(drive, run):
         return float(run["torque"].max())
 
-    monkeypatch.setattr(event_torques, "at_gear", of_run)
-    monkeypatch.setattr(event_torques, "quasi_static_peak", lambda *given: 0.4 * of_run(*given))
+    monkeypatch.setattr(torques, "at_gear", of_run)
+    monkeypatch.setattr(torques, "quasi_static_peak", lambda *given: 0.4 * of_run(*given))
     study = SimpleNamespace(
         drive=None, config=SimpleNamespace(events={}), event={}, runs={"start_up": run}, steady_begin=2.5,
         steady=run.sel(time=slice(2.5, None)),
     )  # fmt: skip
-    assert event_torques.gear_peaks(study) == {"steady": 5.0, "start_up": pytest.approx(3.6)}
+    assert torques.gear_peaks(study) == {"steady": 5.0, "start_up": pytest.approx(3.6)}
 
 
 @pytest.mark.second

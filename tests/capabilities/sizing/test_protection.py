@@ -47,15 +47,13 @@ from chainunit.reading.text import number
 from chainunit.report import terminal
 from chainunit.report.cited import cited
 from chainunit.study import config, run
-from chainunit.study.analyses import all_analyses
+from chainunit.study.analyses import GearAnalysis, all_analyses
 from chainunit.study.analysis import Analysis, Work
 from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.coupling import transient_of_starts
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
-from chainunit.study.event_torques import gear_peaks
 from chainunit.study.events import one_sided_event
-from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.judgement import motor_verdict
 from chainunit.study.measures import read_answers, stall
 from chainunit.study.readings import crank_torque, largest_torque, pull_out_torque
@@ -66,7 +64,7 @@ from chainunit.study.run import _with_class_of_all_starts, run_study
 from chainunit.study.sections import Coupling, Run, SoftStart, StarDelta, Starter
 from chainunit.study.start_runs import StartNumbers, from_angle
 from chainunit.study.starts import StartAnalysis, StartFindings
-from chainunit.study.torques import quasi_static_peak
+from chainunit.study.torques import gear_peaks, quasi_static_peak
 from chainunit.study.transients import follow
 from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic

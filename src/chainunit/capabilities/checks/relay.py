@@ -15,7 +15,6 @@ import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
-from ...study.event_torques import from_event_on
 from ...study.record import StudyRecord
 from ...study.relay import (
     CLASSES,
@@ -30,6 +29,7 @@ from ...study.relay import (
     start_seconds,
 )
 from ...study.starts import StartFindings
+from ...study.torques import from_event_on
 from ...study.verdict import STEADY
 from .plan import CheckPlan
 from .row import CheckRule, Checks

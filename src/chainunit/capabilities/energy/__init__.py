@@ -8,8 +8,7 @@ from ...core.errors import InputError, refusal_prefix
 from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
-from ...study.config import Config
-from ...study.file_reading import FileReading
+from ...study.config import Config, FileReading
 from ...study.file_section import FileSection
 from ...study.record import StudyRecord
 from ...study.rules import MOTOR_FMU, Rule

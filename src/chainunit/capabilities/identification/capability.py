@@ -10,7 +10,7 @@ from ...recordings.measurands import MEASURANDS
 from ...recordings.table import recording_rules
 from ...report.capability import Capability
 from ...study.capability import FileReference
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 from ...study.file_section import FileSection
 from ...study.rules import Rule
 from .reading import IdentificationPlan, read_identification

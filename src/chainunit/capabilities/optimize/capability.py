@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ...report.capability import Capability
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 from ...study.file_section import FileSection
 from ...study.organs import finer_models
 from ...study.parts import motor_is_left

@@ -16,9 +16,9 @@ from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.cycle import cycle
 from ...study.drive import Drive
-from ...study.load_cases import OverloadFactors, cycle_alone, overload_factors
 from ...study.organ_limits import two_bar_limits
 from ...study.record import StudyRecord
+from .factors import OverloadFactors, cycle_alone, overload_factors
 
 
 @result

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from ...report.capability import Capability
 from ...study.conditions import given, has_entries, has_entry, is_one_of
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 from ...study.file_section import FileSection
 from ...study.organs import finer_models
 from ...study.rules import MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, Rule, motor_is_chosen

@@ -10,7 +10,7 @@ from pydantic import Field
 from ...core.quantities import Value, declaration, quantity
 from ...reading.lists import TableList
 from ...study.cycle_quantities import CycleBasis
-from ...study.entry_values import Entered, entered, filled_text
+from ...study.file_section import Entered, entered, filled_text
 
 SPEED = "run.crank_speed"
 METHODS = ("grid", "latin_hypercube", "sobol")

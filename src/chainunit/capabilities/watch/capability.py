@@ -10,14 +10,12 @@ from ...core.errors import InputError
 from ...recordings.table import FROM_RECORDING, recording_rules
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
-from ...study.capability import FileReference
+from ...study.capability import Estimates, EstimateUser, FileReference, PartBeside
 from ...study.conditions import given
-from ...study.config import Config
+from ...study.config import Config, FileReading
 from ...study.cycle import Cycle
 from ...study.drive import Drive
-from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.plans import Estimates, EstimateUser, PartBeside
 from ...study.rules import MOTOR_FMU, Rule, has_sides
 from .observer_table import ObserverTable
 from .reading import WatchPlan, read_watch

@@ -12,7 +12,7 @@ from ...reading.results import InUnit, part, result
 from ...reading.text import shown_in
 from ...recordings.fit import FittedValue, fitted_values
 from ...recordings.residuals import ResidualTest
-from ...study.heading import Heading
+from ...study.provenance import Heading
 from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name
 
 ROWS = 1500

@@ -13,8 +13,8 @@ from ...drives.catalogue import CatalogueMotor
 from ...machines.machine import Machine
 from ...study.config import Config
 from ...study.drive import Drive
-from ...study.drive_tables import DriveTables
 from ...study.event import Event
+from ...study.operation import DriveTables
 from ...study.parts import LENGTHS
 from ...study.proposal import DriveProposal
 from ...study.registry import parts_of_line
