@@ -398,7 +398,7 @@ def test_the_verdict_comes_first_everywhere(study, written):
     pushed = [r for r in verdict["model"]["reasons"] if r["topic"] == "pushed"]
     for reason in pushed:
         rod = reason["quantity"].removesuffix("_mean_pull")
-        assert reason["value"]["value"] == study.organ_limits[reason["run"]][rod].mean < 0.0
+        assert reason["value"]["value"] == study.pulls[reason["run"]][rod].mean < 0.0
     lines = said_of(study).splitlines()
     assert lines[:2] == [verdict["model"]["text"], verdict["motor"]["text"]]
     assert (

@@ -13,7 +13,7 @@ from .cited import cited, number, table
 from .lines import filled
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The worst start in a sentence, and a table of all starts."""
     findings = StartFindings.found_in(study)
     if findings is None:

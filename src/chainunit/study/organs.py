@@ -105,7 +105,7 @@ class TwoBars(OrganModel):
             speed,
             resonance,
             slack_speed,
-            study.organ_limits,
+            study.pulls,
             residuals,
             empty={""} if has_empty_side(config.feed) else empty,
             actual=actual,

@@ -325,7 +325,7 @@ class Runner:
         """Record the loads of the pins and the pulls in the rods."""
         drive = self.rig.drive
         if pulls := least_pulls(drive, run, drive.machine.loaded_sides(self.study.config.feed)):
-            self.study.organ_limits[name] = pulls
+            self.study.pulls[name] = pulls
         if loads := pin_loads(self.rig.drive, run):
             self.study.pins[name] = loads
 

@@ -20,7 +20,7 @@ from .factors import OverloadFactors
 PICTURES = Pictures()
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """Factors, limits and figure."""
     x = cited(OrganFindings.of_study(study), "findings.organs")
     yield _factors(study, x)

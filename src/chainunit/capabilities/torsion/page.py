@@ -27,7 +27,7 @@ _JOINTS = {
 }
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """A text on the line, the tables of its numbers, and the figures."""
     analysis = TorsionFindings.of_study(study).analysis
     lead = (
