@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from ..core.quantities import quantity
 from ..reading.results import part, result
 from ..reading.text import number
-from . import verdict
 from .coupling import LESS_TORQUE
 from .event import Role
 from .limits import Check, given_motor, reaches
@@ -16,7 +15,7 @@ from .record import StudyRecord
 from .rig import worst_residual
 from .start_runs import longest_of
 from .starts import StartFindings
-from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
+from .verdict import RESIDUAL, START, STEADY, Holds, Verdict, balance_faults, shown_speed
 from .window import Phase
 
 
@@ -26,11 +25,13 @@ def model_verdict(study: StudyRecord) -> Verdict:
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
     speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
+    if study.drive.machine.model.sides and not study.drive.foreign_machine:
+        verdict: Verdict = config.organs.verdict(study, speed, mean, residuals)
+        return verdict
+    faults = balance_faults(residuals)
     if study.drive.foreign_machine:
-        return verdict.foreign_machine(speed, residuals, actual=mean)
-    if not study.drive.machine.model.sides:
-        return verdict.rigid_links(speed, residuals, actual=mean, driver=study.driver_noun)
-    return config.organs.verdict(study, speed, mean, residuals)
+        return Verdict("energy balance", None, speed, faults, mean)
+    return Verdict("machine", "rigid links", speed, faults, mean, study.driver_noun)
 
 
 def wrong_runs(study: StudyRecord) -> list[str]:
@@ -43,7 +44,7 @@ def wrong_runs(study: StudyRecord) -> list[str]:
 def _residuals(study: StudyRecord) -> dict[str, float]:
     """By run, the largest energy residual over the energy moved; start-up and steady running are one run."""
     return {
-        STEADY if name == verdict.START else name: worst_residual(shares)
+        STEADY if name == START else name: worst_residual(shares)
         for name, shares in study.certificate.items()
     }
 

@@ -22,7 +22,7 @@ from .readings import (
     shaft_power,
     stored_shares,
 )
-from .relay import TRIPS_AT, lasting_current, relay_trip
+from .relay import lasting_current, relay_trip
 from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
 
@@ -104,7 +104,7 @@ def _relay(w: Window) -> float | None:
         current = w.drive.relay_current(w.since, current)
     before = w.steady.rms(w.current)
     lasts = lasting_current(current, before if w.passes and _stall(w) is None else None)
-    return relay_trip(w.since, current, setting, before, lasts, w.relay_class, TRIPS_AT)
+    return relay_trip(w.since, current, setting, before, lasts, w.relay_class)
 
 
 def _stall(w: Window) -> float | None:

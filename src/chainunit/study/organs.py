@@ -72,7 +72,8 @@ class OrganModel(ABC):
     def verdict(
         self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]
     ) -> Verdict:
-        """The verdict on the model; arguments are those of `chainunit.study.verdict.rigid_links`."""
+        """The verdict on the model; judged at this `speed` of the crank, which has the `actual` one in the runs [rad/s], by the
+        energy residual over the energy moved, by run."""
 
     @abstractmethod
     def remark(self, study: StudyRecord) -> None:

@@ -348,35 +348,11 @@ def two_bars(
     return Verdict("organs", BARS, speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
 
 
-def rigid_links(
-    speed: float, residuals: Mapping[str, float], *, actual: float | None = None, driver: str = USUAL_DRIVER
-) -> Verdict:
-    """The verdict on a linkage without organs, whose links are rigid: it holds where the energy balance is kept.
-
-    Parameters
-    ----------
-    speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another [rad/s]
-    residuals : by run, the energy residual over the energy moved
-    driver : the noun of the link that the motor turns
-    """
-    return Verdict("machine", "rigid links", speed, tuple(balance_faults(residuals)), actual, driver)
-
-
-def foreign_machine(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
-    """The verdict on a machine that is a foreign FMU: only on its energy balance.
-
-    Parameters
-    ----------
-    speed, actual, residuals : see `rigid_links`
-    """
-    return Verdict("energy balance", None, speed, tuple(balance_faults(residuals)), actual)
-
-
-def balance_faults(residuals: Mapping[str, float]) -> list[Reason]:
+def balance_faults(residuals: Mapping[str, float]) -> tuple[Reason, ...]:
     """The runs, by their energy residual over the energy moved, whose balance is not kept."""
-    return [
+    return tuple(
         Reason("energy", "energy_residual", share, RESIDUAL, "1", run, grave=run == STEADY)
         for run, share in residuals.items()
         # a balance of NaN is not kept either
         if not share < RESIDUAL
-    ]
+    )

@@ -119,7 +119,7 @@ def stall_heat(
     if before >= TRIPS_AT * setting:
         return None
     lasts = lasting_current(current, after)
-    trip = relay_trip(time, current, setting, before, lasts, relay_class.longest, TRIPS_AT)
+    trip = relay_trip(time, current, setting, before, lasts, relay_class.longest)
     if trip is None:
         return None
     until = time <= trip
