@@ -40,10 +40,10 @@ _EVENTS = frozenset({Phase.EVENT, Phase.LOADED_START})
 _AT_SPEED = frozenset({Phase.STEADY, Phase.EVENT})
 
 
-def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:
-    """Time [s] from which the speed stays below `share` of the `requested` speed until the end of the run;
-    None where it does not, or only in the last tenth of the run."""
-    below = np.abs(np.asarray(speed)) < share * requested
+def stall(time: Any, speed: Any, requested: float) -> float | None:
+    """Time [s] from which the speed stays below a tenth of the `requested` speed until the end of the run; None where
+    it does not, or only in the last tenth of the run."""
+    below = np.abs(np.asarray(speed)) < 0.1 * requested
     if not below[-1]:
         return None
     moving = np.flatnonzero(~below)

@@ -36,10 +36,6 @@ LOAD_CYCLE = "load_cycle.csv"
 """Name of the file with torque and speed of the motor's shaft in the steady turns."""
 
 
-SPEED_MISSED = "The motor does not keep the speed asked for."
-"""The sentence on a study whose crank does not turn at the requested speed."""
-
-
 @dataclass
 class Spread:
     """The assumed quantities of an event, and the peaks over the range of the assumption: from and to, by

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any
 
 from ..core.quantities import quantity, variables
@@ -41,16 +42,8 @@ class MotorRating:
     @classmethod
     def of(cls, motor: CatalogueMotor) -> MotorRating:
         """The rating of that motor."""
-        plate = motor.nameplate
-        return cls(
-            plate.power,
-            plate.speed,
-            plate.torque,
-            plate.rated_current,
-            plate.voltage,
-            plate.frequency,
-            plate.poles,
-        )
+        names = ("power", "speed", "torque", "rated_current", "voltage", "frequency", "poles")
+        return cls(*attrgetter(*names)(motor.nameplate))
 
 
 @result
@@ -138,11 +131,7 @@ def _data(study: StudyRecord) -> StudyData:
         slips=study.config.file.slips,
         driver=study.driver_noun,
         runs=_runs(study),
-        findings=DriveFindings(
-            study.statics.loops,
-            study.statics.rigid_line,
-            speed_control(drive),
-        ),
+        findings=DriveFindings(study.statics.loops, study.statics.rigid_line, speed_control(drive)),
     )
 
 

@@ -142,21 +142,16 @@ def speeds_up(rig: Rig, run: xr.Dataset, before: float = 0.0) -> bool:
 
 
 def until_settled(
-    rig: Rig,
-    simulation: Simulation,
-    stop: float,
-    length: float,
-    most: float = math.inf,
-    late: float = math.inf,
+    rig: Rig, simulation: Simulation, stop: float, length: float, late: float
 ) -> list[xr.Dataset]:
     """Runs of a turning drive, the first to the time `stop` [s], each further one of the `length` [turns], until the
-    whole turns of a run, at most `most`, close, it makes none, or `PATIENCE` has passed; a start that has not ended
-    is awaited up to the time `late` [s]."""
+    whole turns of a run close, it makes none, or `PATIENCE` has passed; a start that has not ended is awaited up to
+    the time `late` [s]."""
     turn, drive = rig.operation.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
     longest = stop + PATIENCE * turn
     while simulation.time < longest:
-        turns = only_whole_turns(drive, runs[-1], most)
+        turns = only_whole_turns(drive, runs[-1])
         if turns is None or is_settled(drive, turns):
             break
         if speeds_up(rig, runs[-1]):

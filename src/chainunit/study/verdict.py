@@ -159,19 +159,6 @@ class Verdict:
         return "false" if any(reason.grave for reason in self.reasons) else "in part"
 
     @property
-    def _judged_speed(self) -> str:
-        return _speed(self.speed)
-
-    @property
-    def _turns(self) -> str:
-        return _speed(self.speed if self.actual is None else shown_speed(self.actual, self.speed))
-
-    @property
-    def _is_at_requested_speed(self) -> bool:
-        """Whether the model is judged at a speed that the crank does not have."""
-        return self._turns != self._judged_speed
-
-    @property
     def _stalls(self) -> bool:
         """Whether the crank hardly turns."""
         return self.actual is not None and abs(self.actual) < CREEPS * self.speed
@@ -210,12 +197,9 @@ class Verdict:
         holds = _HOLDS[self.holds].format(_BARS_IN_PART if self.model == BARS else "")
         if self._stalls and self.holds != "false":
             holds = f"would be {holds} if the {self.driver} turned"
-        line = f"{_SUBJECTS[self.subject].format(self.model)}, {self.driver} at "
-        line += (
-            f"{self._turns}, judged at the required {self._judged_speed}"
-            if self._is_at_requested_speed
-            else self._judged_speed
-        )
+        judged, turns = _speed(self.speed), _speed(shown_speed(self.reached, self.speed))
+        line = f"{_SUBJECTS[self.subject].format(self.model)}, {self.driver} at {turns}"
+        line += "" if turns == judged else f", judged at the required {judged}"
         why, remedies = [], []
         for topic, (short, _, remedy) in self.topics.items():
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
