@@ -126,7 +126,9 @@ def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str
 
 @cache
 def _lists() -> tuple[str, ...]:
-    return tuple(f"{table}.{key}" for table, section in all_sections().items() for key in section.single_keys)
+    return tuple(
+        f"{table}.{key}" for table, section in all_sections().items() for key in section.lists.single_keys
+    )
 
 
 def _table(key: str) -> str:
@@ -154,7 +156,7 @@ def independent(
         # it is not known whether the catalogue has the motor
         tables.add("system")
     for table, section in all_sections().items():
-        for key, decider in section.deciders.items():
+        for key, decider in section.lists.deciders.items():
             if f"{table}.{decider}" in wrong:
                 further = [fault for fault in further if fault.key.split(".")[::3] != [table, key]]
     lower = lower_limits()

@@ -87,6 +87,24 @@ class TableForm:
     """the JSON Schema of which keys go together"""
     displaced: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """by key, the keys of a file with which the value of the example has no meaning"""
+    texts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """by key, also of entries, further conditions of the JSON Schema on its text or list"""
+    required: tuple[str, ...] = ()
+    """keys that the table must have"""
+
+
+@dataclass(frozen=True)
+class TableLists:
+    """The lists of tables in a table, and how far their faults go."""
+
+    entries: Mapping[str, TableList] = field(default_factory=dict)
+    """by key, the lists of tables"""
+    named: TableList | None = None
+    """where the file chooses the names in the table, the declaration of the tables [table.NAME]"""
+    single_keys: tuple[str, ...] = ()
+    """lists and tables whose faults say nothing of the other keys"""
+    deciders: Mapping[str, str] = field(default_factory=dict)
+    """by a key of entries, the key of the table that decides whether it has a meaning"""
 
 
 @dataclass(frozen=True)
@@ -103,39 +121,26 @@ class FileSection:
     """table of the base before which it stands; empty for one behind them"""
     title: str = ""
     """title of the table in a report"""
-    is_used: Callable[[Any], bool] = lambda config: True
-    """whether a study uses the table, by its configuration"""
-    with_findings: bool = False
-    """whether a study uses the table only where the analysis of the same name has findings"""
+    is_used: Callable[[Any], bool] = lambda study: True
+    """whether a study uses the values of the table, by its `chainunit.study.record.StudyRecord`"""
     apart: bool = False
     """whether the result has other things of the same names"""
     form: TableForm = field(default_factory=TableForm)
+    lists: TableLists = field(default_factory=TableLists)
     completed: Callable[[Any, Any], Any] = lambda values, reading: values
     """gets the values and the `FileReading`; gives them with the values that follow from the rest of the file, or
     None where the study does not use the table"""
-    entries: Mapping[str, TableList] = field(default_factory=dict)
-    """by key, the lists of tables in it"""
     follows: Mapping[str, str] = field(default_factory=dict)
     """by key, the source of its value if the file leaves the key out"""
     order: tuple[tuple[str, str, str], ...] = ()
     """triples (low, relation, high) of keys: the value of `high` has to have this relation to that of `low`"""
-    forms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """by key, also of entries, further conditions of the JSON Schema on its text or list"""
-    required: tuple[str, ...] = ()
-    """keys that the table must have"""
     random_events: tuple[str, ...] = ()
     """keys that hold an event whose quantities may be ranges"""
     chooses_motor: bool = False
     """whether a file with the table leaves the choice of the motor to its capability, whose plan is a
     `chainunit.study.proposal.MotorChoice`"""
-    single_keys: tuple[str, ...] = ()
-    """lists and tables in it whose faults say nothing of its other keys"""
-    deciders: Mapping[str, str] = field(default_factory=dict)
-    """by a key of entries, the key of the table that decides whether it has a meaning"""
     places: Mapping[str, str] = field(default_factory=dict)
     """by a key that people look for in the table, where the file has it"""
-    named: TableList | None = None
-    """where the file chooses the names in the table, the declaration of the tables [table.NAME]"""
 
 
 @declaration
@@ -155,7 +160,7 @@ def of_named(named: TableList) -> FileSection:
         NoQuantities,
         optional=True,
         title=named.title,
-        is_used=lambda config: False,
+        is_used=lambda study: False,
         form=TableForm(_open_form, lambda checked: {}),
-        named=named,
+        lists=TableLists(named=named),
     )

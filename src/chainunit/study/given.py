@@ -109,8 +109,7 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():
         values = config.table(name)
-        is_idle = section.with_findings and name not in study.findings
-        if values is None or not section.is_used(config) or is_idle:
+        if values is None or not section.is_used(study):
             continue
         prefix = f"{name}."
         keys = {
@@ -120,7 +119,7 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.file.given else ())
         # the findings have the entries of a list of tables
-        choices = {key: x for key, x in keys.items() if x and key not in section.entries}
+        choices = {key: x for key, x in keys.items() if x and key not in section.lists.entries}
         yield GivenSection(name, section.title, values, choices, unused_names=follows)
         for key in events:
             random = randoms[f"{name}.{key}"]

@@ -125,9 +125,9 @@ def entry_tables() -> dict[str, TableList]:
     names the file chooses, by the name of the table that holds them and `NAME`."""
     table_lists: dict[str, TableList] = {}
     for table, section in all_sections().items():
-        table_lists |= {f"{table}.{key}": entry for key, entry in section.entries.items()}
-        if section.named is not None:
-            table_lists[f"{table}.{NAME}"] = section.named
+        table_lists |= {f"{table}.{key}": entry for key, entry in section.lists.entries.items()}
+        if section.lists.named is not None:
+            table_lists[f"{table}.{NAME}"] = section.lists.named
     return table_lists
 
 
@@ -157,7 +157,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         *(
             KeyTable(name, section.title, tuple(_of_section(name, section)))
             for name, section in all_sections().items()
-            if section.named is None
+            if section.lists.named is None
         ),
         *(KeyTable(name, entry.title, tuple(_of_entry(entry))) for name, entry in entry_tables().items()),
         KeyTable("report", "Report", tuple(_of_report())),

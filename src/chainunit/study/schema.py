@@ -45,7 +45,7 @@ def rules() -> Iterator[Schema]:
         condition = motor_is(name) | ~given("system.motor") if name == "DcMotor" else motor_is(name)
         yield _where(condition, {"properties": {"motor": {"$ref": f"#/definitions/motor.{name}"}}})
     for table, section in all_sections().items():
-        for key in section.required:
+        for key in section.form.required:
             yield _where(given(table), given(f"{table}.{key}").schema())
         if section.form.conditions is not None:
             yield _where(given(table), {"properties": {table: dict(section.form.conditions())}})
@@ -94,7 +94,7 @@ def _further(name: str) -> Mapping[str, Any] | None:
         return {"maxItems": lists[name].most} | least
     table, _, key = name.partition(".")
     sections = all_sections()
-    return _FORMS.get(name) or (sections[table].forms.get(key) if table in sections else None)
+    return _FORMS.get(name) or (sections[table].form.texts.get(key) if table in sections else None)
 
 
 def json_schema() -> dict[str, Any]:

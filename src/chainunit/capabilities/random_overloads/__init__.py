@@ -40,7 +40,7 @@ class RandomOverloads(Capability):
                 )
             },
             title="Overloads at random",
-            is_used=lambda config: config.plans["random_overloads"].runs > 0,
+            is_used=lambda study: study.config.plans["random_overloads"].runs > 0,
             apart=True,
             random_events=("event",),
         )

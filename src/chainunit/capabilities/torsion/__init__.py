@@ -36,7 +36,7 @@ class TorsionCapability(Capability):
                 ),
             },
             title="Torsion of the driveline",
-            with_findings=True,
+            is_used=lambda study: "torsion" in study.findings,
             order=(("slowest", ">", "fastest"), ("bend_low", ">", "bend_high")),
         )
     }

@@ -15,7 +15,7 @@ from ...study.conditions import given
 from ...study.config import Config, FileReading
 from ...study.cycle import Cycle
 from ...study.drive import Drive
-from ...study.file_section import FileSection
+from ...study.file_section import FileSection, TableForm
 from ...study.rules import MOTOR_FMU, Rule, has_sides
 from .observer_table import ObserverTable
 from .reading import WatchPlan, read_watch
@@ -59,14 +59,17 @@ class WatchCapability(Capability):
             optional=True,
             keys=KEYS,
             title="Recording that is watched",
-            is_used=lambda config: False,
+            is_used=lambda study: False,
             apart=True,
-            required=("file",),
+            form=TableForm(texts={"file": {"minLength": 1}}, required=("file",)),
             follows=FROM_RECORDING,
-            forms={"file": {"minLength": 1}},
         ),
         "observer": FileSection(
-            ObserverTable, optional=True, title="Load observer", with_findings=True, apart=True
+            ObserverTable,
+            optional=True,
+            title="Load observer",
+            is_used=lambda study: "observer" in study.findings,
+            apart=True,
         ),
     }
 
