@@ -124,10 +124,14 @@ def test_what_lumps_and_jams_do_over_time():
 @pytest.mark.parametrize("kind", [name for name, of in TYPES.items() if not of.from_rest])
 def test_an_event_is_followed_to_its_end_and_a_turn_more(kind):
     """However long it lasts, and however short the turns that are asked for are."""
-    of, turn = TYPES[kind].of_input("load"), 0.25
+    of, turn = TYPES[kind], 0.25
     longer = {n: 7.0 for n in Layout(of.Parameters).names if n in ("duration", "shift")}
-    event = of.on("left" if of.has_side else "", of.Parameters(turns=1.0, **longer))
-    normal = dict.fromkeys(event.inputs(event.side), 50.0)
+    event = of.on(
+        "left" if of.has_side else "",
+        of.Parameters(turns=1.0, **longer),
+        input_name="load" if of.has_input else "",
+    )
+    normal = dict.fromkeys(event.inputs, 50.0)
     signals = event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.1)).values()
     end = event.time_followed(turn) - turn
     assert end >= (7.0 if longer else 0.0)
@@ -347,7 +351,7 @@ def swell():
 
         def signals(self, normal, at, state):
             """The signal of the mass: it rises and stays."""
-            (name,) = self.inputs(self.side)
+            (name,) = self.inputs
             return {name: Profile(normal[name], ((at, self.p.time, normal[name] + self.p.added),))}
 
     yield Swell

@@ -229,7 +229,7 @@ def loads_beyond(
     unused = {runs.key for runs in randoms if not runs.runs}
     of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
     for where, key, event in hardest:
-        needed = set(event.inputs(event.side))
+        needed = set(event.inputs)
         if not needed <= set(inputs):
             if where not in unused and known_motor and not needed <= {*inputs, *of_motors}:
                 near = "".join(near_name(name, Layout(model.Feed).names) for name in needed)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from typing import Any, ClassVar
 
 from ..core.quantities import Value, declaration, quantity
@@ -14,7 +12,7 @@ from ..drives.contactor import CONTACTOR_EDGE
 from ..machines.chain_unit import SideName, other
 from ..reading.text import number
 from ..system.signals import Profile
-from .event import AnySide, Event, EventType, Role, Signals, Timing, Values, on_side
+from .event import AnySide, Event, Role, Signals, Timing, Values, filled
 
 
 def _duration(description: str, default: float, least: float = 1e-4, usual: float = 1e-3) -> Any:
@@ -39,7 +37,7 @@ class _Pulses(Event):
 
     role = Role.SHOCK
 
-    def _height(self, usual: float) -> float:
+    def _height(self, usual: float) -> Any:
         """The rise of the input over its `usual` value."""
         raise NotImplementedError
 
@@ -48,7 +46,7 @@ class _Pulses(Event):
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The pulses, added to the input of normal running."""
-        (name,), p, changes = self.inputs(self.side), self.p, list[tuple[float, float, float]]()
+        (name,), p, changes = self.inputs, self.p, list[tuple[float, float, float]]()
         usual = normal[name]
         for pulse in self._begins(begin):
             changes += _spell(usual, usual + self._height(usual), pulse, p.rise, p.rise + p.duration).changes
@@ -71,8 +69,8 @@ class Jam(_Pulses):
         duration: Value = _duration("time for which the lump holds", 0.3)
         rise: Value = _rise("the force", 0.02)
 
-    def _height(self, usual: float) -> float:
-        return float(self.p.force)
+    def _height(self, usual: float) -> Any:
+        return self.p.force
 
 
 class Lumps(Jam):
@@ -136,7 +134,7 @@ class Empties(Event):
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The material and the processing force of the side fall to zero."""
-        return {name: Profile(normal[name], ((begin, self.p.shift, 0.0),)) for name in self.inputs(self.side)}
+        return {name: Profile(normal[name], ((begin, self.p.shift, 0.0),)) for name in self.inputs}
 
 
 class OneSidedFeed(Event):
@@ -160,7 +158,7 @@ class OneSidedFeed(Event):
         """The inputs of both sides after the feed has moved."""
         ends, share = {}, self.p.share
         for load in _LOADS:
-            here, there = (on_side(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
+            here, there = (filled(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
             ends[there] = (1.0 - share) * normal[there]
             ends[here] = normal[here] + share * normal[there]
         return ends
@@ -359,16 +357,17 @@ class Overload(_Pulses):
         duration: Value = _duration("time for which it lasts", 0.5)
         rise: Value = _rise("it", 0.005)
 
-    def _height(self, usual: float) -> float:
-        return float(self.p.torque)
+    def _height(self, usual: float) -> Any:
+        return self.p.torque
 
 
 class Surge(_Pulses):
     """An input of the machine, which the key ``input`` names, rises to a multiple for a while."""
 
-    kind, run = "surge", "surge"
-    words, heading = "an input of the machine rises", "surge"
+    kind, run = "surge", "surge_{input}"
+    words, heading = "{input} rises", "surge of {input}"
     has_side, has_input = False, True
+    acts_on = ("{input}",)
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {"factor": (1.5, 4.0)}
 
     @declaration
@@ -379,31 +378,12 @@ class Surge(_Pulses):
         duration: Value = _duration("time for which it lasts", 0.5)
         rise: Value = _rise("it", 0.02)
 
-    @classmethod
-    def of_input(cls, name: str) -> type[Event]:
-        """The event that multiplies the input `name`."""
-        return _surge_of(name)
-
     def fault(self, normal: Values) -> str:
         """Why the event cannot act on the input; empty where it can."""
-        (name,) = self.acts_on
+        name = self.input
         return (
             "" if normal[name] else f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
         )
 
-    def _height(self, usual: float) -> float:
-        return float((self.p.factor - 1.0) * usual)
-
-
-@cache
-def _surge_of(name: str) -> type[Event]:
-    title = re.sub(r"[^a-z0-9]+", "_", name.lower())
-    members = {
-        "acts_on": (name,),
-        "run": f"surge_{title}"[:36],
-        "words": f"{name} rises",
-        "heading": f"surge of {name}",
-        "maker": (_surge_of, (name,)),
-    }
-    event_type: Any = EventType("SurgeOfInput", (Surge,), members)
-    return event_type
+    def _height(self, usual: float) -> Any:
+        return (self.p.factor - 1.0) * usual

@@ -124,7 +124,7 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         for key in events:
             random = randoms[f"{name}.{key}"]
             side = {"side": random.side} if random.side else {}
-            title = f"Overload at random: {random.of.heading}"
+            title = f"Overload at random: {random.heading}"
             yield GivenSection(
                 f"{name}.{key}", title, random.p, {"type": random.of.kind} | side, random.ranges
             )

@@ -96,7 +96,7 @@ class Rig:
         if event.on_line and self.drive.follows:
             return False
         machine = self.graph.components["machine"].connectors
-        return set(event.inputs(event.side)) <= set(self.inputs) and set(event.reads) <= set(machine)
+        return set(event.inputs) <= set(self.inputs) and set(event.reads) <= set(machine)
 
     def gives(self, full: str) -> bool:
         """Whether the drive has an output of that full name."""

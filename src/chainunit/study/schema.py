@@ -63,7 +63,7 @@ def _of_machine(name: str) -> Schema:
     events = [
         kind
         for kind, event_type in TYPES.items()
-        if {*event_type.inputs("left" if event_type.has_side else "")} <= inputs
+        if event_type.has_input or {*event_type.on("left" if event_type.has_side else "").inputs} <= inputs
     ]
     tables: Schema = {table: {"$ref": f"#/definitions/{table}.{name}"} for table in ("machine", "feed")}
     tables["event"] = {"items": {"properties": {"type": {"enum": events}}}}

@@ -78,7 +78,7 @@ def follow(
     state: dict[str, float] = {}
     pieces = []
     if event.reads:
-        before = dict(rig.inputs[name] for name in event.inputs(event.side))
+        before = dict(rig.inputs[name] for name in event.inputs)
         simulation.signals = rig.signals(before)
         pieces.append(simulation.run(begin, rig.step, progress))
         state = {name: float(pieces[0][f"machine.{name}"][-1]) for name in event.reads}
