@@ -596,7 +596,7 @@ def test_each_overload_factor_says_its_use(study, written):
 
 def test_one_number_of_the_reserve_everywhere(study, written):
     """The least (limit - torque)/limit of a run, in %, on the terminal, on the page and in the data."""
-    answers, p = study.answers, study.motor
+    answers, p = study.answers, study.drive.parameters
     result = as_dict(study)
     warm = 1.0 + p.armature.alpha * (answers["steady"].winding_temperature - 293.15)
     for run in answers:

@@ -503,21 +503,19 @@ def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str,
     try:
         return make(parts.machine, parameters)
     except InputError as error:
-        names = error.names if isinstance(error, GeometryError) else ()
-        model = parts.machine
-        spoil = {}
+        model, names, spoil = parts.machine, (), {}
         if isinstance(error, GeometryError):
+            names = error.names
             spoil = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
         # the value that spoils the machine, and not one whose range that value sets
         key = next((f"machine.{name}" for name in (*spoil, *names) if name in parameters), "machine")
-        ranges = f"; with all other values as they are, {', or '.join(spoil.values())}" if spoil else ""
-        line = f"machine: {error}{_taken_over(error, model, parameters)}{ranges}"
+        declared = Layout(model.Parameters).by_name(model.Parameters())
+        taken = (
+            f"{name} = {declared[name]:g}" for name in names if name in declared and name not in parameters
+        )
+        line = f"machine: {error}"
+        if listed := ", ".join(taken):
+            line += f"; not in the file, so at the declared start value: {listed}"
+        if spoil:
+            line += f"; with all other values as they are, {', or '.join(spoil.values())}"
         raise InputError(line, key=key) from error
-
-
-def _taken_over(error: InputError, machine: MachineModel, parameters: Mapping[str, float]) -> str:
-    """Words to follow a refusal: the lengths behind it that neither file nor example give."""
-    names = error.names if isinstance(error, GeometryError) else ()
-    declared = Layout(machine.Parameters).by_name(machine.Parameters())
-    taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in parameters]
-    return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""

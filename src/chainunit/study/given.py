@@ -83,7 +83,7 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
             for name, event in config.events.items()
         ),
         *_tables(study),
-        GivenSection("motor", "Motor", study.motor),
+        GivenSection("motor", "Motor", study.drive.parameters),
     ]
     return [section for section in sections if section.values is not None or section.choices]
 

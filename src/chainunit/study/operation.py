@@ -78,8 +78,3 @@ class DriveTables:
         if self.start == "star-delta":
             return float(self.starter.star_delta.time + self.starter.star_delta.pause)
         return float(self.starter.soft_start.time) if self.start == "soft" else 0.0
-
-    @property
-    def given_gains(self) -> set[str]:
-        """Names of the parameters of the motor that the file sets."""
-        return {name.removeprefix("motor.") for name in self.given if name.startswith("motor.")}

@@ -181,17 +181,10 @@ class StudyRecord:
     @property
     def not_known(self) -> frozenset[str]:
         """Names of the measures of steady running that cannot be read, as the motor is a foreign FMU."""
-        if self.drive.foreign is None:
+        if self.drive.foreign is None or STEADY not in self.answers:
             return frozenset()
-        return frozenset(name for name, part in self.absent.items() if part == "motor")
-
-    @property
-    def absent(self) -> Mapping[str, str]:
-        """The measures of steady running that cannot be read, each with the part (motor or machine) that
-        lacks a variable."""
-        if verdict.STEADY not in self.answers:
-            return {}
-        return not_known(self.window(Phase.STEADY, self.steady))
+        parts = not_known(self.window(Phase.STEADY, self.steady))
+        return frozenset(name for name, part in parts.items() if part == "motor")
 
     @property
     def steady(self) -> xr.Dataset:
@@ -218,11 +211,6 @@ class StudyRecord:
             steady = Window(Phase.STEADY, self.steady, self.drive, sides, requested)
         passes = event is not None and event.passes
         return Window(phase, run, self.drive, sides, requested, begin, steady, trip, self.relay_class, passes)
-
-    @property
-    def motor(self) -> Any:
-        """Parameters of the motor."""
-        return self.drive.parameters
 
 
 class Findings(ABC):

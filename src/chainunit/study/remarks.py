@@ -481,7 +481,11 @@ def _on_runs(study: StudyRecord) -> None:
     for code in dict.fromkeys(code for _, code, *_ in happenings):
         runs = {name: (text, sizes) for name, kind, text, sizes in happenings if kind == code}
         where = (f"{study.title_of(name)}{aside(text)}" for name, (text, _) in runs.items())
-        limit = {"passed": study.drive.motor.current_limit(study.motor)} if code == "current-limit" else {}
+        limit = (
+            {"passed": study.drive.motor.current_limit(study.drive.parameters)}
+            if code == "current-limit"
+            else {}
+        )
         study.say(
             _HAPPENINGS[code],
             *runs,
@@ -498,7 +502,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and is_pushed:
         yield "rod-end-pushed", "", {}
-    largest = study.drive.motor.current_limit(study.motor)
+    largest = study.drive.motor.current_limit(study.drive.parameters)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current-limit", "", {}
     if answers.stall_time is not None:

@@ -161,7 +161,7 @@ def _motor(study: StudyRecord) -> dict[str, Any]:
     titles = {"kind": kind, "title": study.motor_title}
     rating = {} if plate is None else as_data(MotorRating.of(plate))
     # the parameters of a foreign motor are not known
-    return titles | rating | ({} if study.motor is None else entries(study.motor))
+    return titles | rating | ({} if study.drive.parameters is None else entries(study.drive.parameters))
 
 
 def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:

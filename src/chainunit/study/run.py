@@ -148,8 +148,8 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
     study.relay_class = trip_class
     for name in study.overloads:
         if study.answers[name].coupling_trip_time is None:
-            phase = Phase.LOADED_START if study.config.events[name].from_rest else Phase.EVENT
             event = study.config.events[name]
+            phase = Phase.LOADED_START if event.from_rest else Phase.EVENT
             window = study.window(phase, from_event_on(study, name), study.event[name], event=event)
             later = read_measure("thermal_trip_time", window)
             study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
@@ -175,10 +175,14 @@ class Runner:
         """Make every run of the study. With `check` each is compared with the monolithic solution; `coasting`
         writes the FMU of the machine behind an open coupling."""
         self._export_coasting = coasting
-        self._leave_out()
+        for event in self.study.config.events.values():
+            if event not in (*self.events, *self.starts):
+                self.study.say(EVENT_LEFT_OUT, event.name, title=event.title, reason=event.without)
         with self.rig.from_rest() as simulation:
             self._start_up(simulation)
-            self._note_states(simulation)
+            for part in simulation.without_states if self.events else ():
+                title = self.rig.graph.components[part].title
+                self.study.say(STATE_NOT_SAVED, *(event.name for event in self.events), title=title)
             begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
             angle = float(crank_angle(self.rig.drive, self.study.runs["start_up"])[-1])
             progress, transients = 0.0, []
@@ -189,7 +193,9 @@ class Runner:
             for transient in transients:
                 self._assumption(simulation, transient, progress)
         if check:
-            self._check(transients)
+            states = self._compare("the start-up", "start_up", None)
+            for transient in transients:
+                self._compare(transient.event.title, transient.event.name, transient, states)
         for k, event in enumerate(self.starts):
             self._loaded_start(event, self.total - (len(self.starts) - k) * self.stop, check)
 
@@ -198,18 +204,6 @@ class Runner:
             self.progress(what, min(before + time, self.total), self.total)
 
         return progress
-
-    def _leave_out(self) -> None:
-        """Add a remark on each event for which the system has no input."""
-        for event in self.study.config.events.values():
-            if event not in (*self.events, *self.starts):
-                self.study.say(EVENT_LEFT_OUT, event.name, title=event.title, reason=event.without)
-
-    def _note_states(self, simulation: Simulation) -> None:
-        """Add a remark on each FMU that cannot save its state."""
-        for part in simulation.without_states if self.events else ():
-            title = self.rig.graph.components[part].title
-            self.study.say(STATE_NOT_SAVED, *(event.name for event in self.events), title=title)
 
     def _start_up(self, simulation: Simulation) -> None:
         """Make the start-up and steady running, and read their answers.
@@ -278,8 +272,7 @@ class Runner:
             transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
             self._close(simulation, transient, self.stop, Phase.LOADED_START)
         if check:
-            self.progress(f"monolithic reference: {event.title}", self.total, self.total)
-            self._compare(event.name, transient)
+            self._compare(event.title, event.name, transient)
 
     def _close(self, simulation: Simulation, transient: Transient, stop: float, phase: Phase) -> None:
         """Read the answers of a transient. Where the coupling opened, follow it until it passes no torque,
@@ -302,18 +295,17 @@ class Runner:
 
     def _opens_in_start(self, time: float) -> str:
         """The reason why a study ends whose coupling opens in the start-up, at `time` [s]."""
-        coupling = self.study.config.coupling
+        coupling, share = self.study.config.coupling, ""
         assert coupling is not None
         with self.rig.from_rest() as simulation:
             run = simulation.run(time + _AFTER_TRIP, self.rig.step)
         start, trip = on_coupling(self.rig.drive, run), coupling.trip_torque
         lasting = quasi_static_peak(self.rig.drive, run, on_coupling)
-        share = (
-            " for some milliseconds (the electromagnetic transient of the motor; load and acceleration put "
-            f"{number(lasting, 'N.m')} on it)"
-            if lasting <= trip
-            else ""
-        )
+        if lasting <= trip:
+            share = (
+                " for some milliseconds (the electromagnetic transient of the motor; load and acceleration put "
+                f"{number(lasting, 'N.m')} on it)"
+            )
         return (
             f"the torque limiter opens in the start-up, at t = {time:.3g} s: it is set to {number(trip, 'N.m')}, "
             f"and this start puts up to {number(start, 'N.m')} on it{share}; coupling.trip_torque must be above "
@@ -360,17 +352,11 @@ class Runner:
             {name: (min(x), max(x)) for name, x in peaks.items() if None not in x},
         )
 
-    def _check(self, transients: list[Transient]) -> None:
-        """Compare every run from the start-up on with the monolithic solution."""
-        self.progress("monolithic reference of the start-up", self.total, self.total)
-        states = self._compare("start_up", None)
-        for transient in transients:
-            self.progress(f"monolithic reference: {transient.event.title}", self.total, self.total)
-            self._compare(transient.event.name, transient, states)
-
     def _compare(
-        self, name: str, transient: Transient | None, states: dict[str, float] | None = None
+        self, title: str, name: str, transient: Transient | None, states: dict[str, float] | None = None
     ) -> dict[str, float]:
+        """Compare a run with the monolithic solution; the states at its end."""
+        self.progress(f"monolithic reference: {title}", self.total, self.total)
         differences, end = compare(self.rig, self.study.runs[name], transient, states)
         self.study.certificate[name] |= differences
         return end

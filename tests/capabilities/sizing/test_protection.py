@@ -978,7 +978,7 @@ def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
     """Asked for 30 rad/s, the DC motor turns the crank at an eighth of it: the voltage leaves no more torque."""
     text = "event = []\n[run]\ncrank_speed = 30\nstep = 0.002\nsettle_turns = 3\n"
     study = run_study(config.parse(text), tmp_path)
-    result, p = study.answers["steady"], study.motor
+    result, p = study.answers["steady"], study.drive.parameters
     assert result.speed_mean < 5.0 and result.torque_reserve == 0.0
     verdict = motor_verdict(study)
     assert verdict.holds == "false" and "least reserve of torque 0 %" in verdict.text
