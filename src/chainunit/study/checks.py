@@ -143,9 +143,7 @@ def _key(fault: InputError) -> str:
     return "catalogue" if fault.placed else fault.key
 
 
-def independent(
-    further: Collection[InputError], faults: Collection[InputError], parts: Parts
-) -> list[InputError]:
+def independent(further: Collection[InputError], faults: Collection[InputError]) -> list[InputError]:
     """The refusals of values that do not fit together, without refusals that depend on a refused value. The
     remaining ones concern other tables, or two limits that are both right."""
     wrong = set(map(_key, faults))
@@ -155,17 +153,21 @@ def independent(
     if "catalogue" in wrong:
         # it is not known whether the catalogue has the motor
         tables.add("system")
-    for table, section in all_sections().items():
-        for key, decider in section.lists.deciders.items():
-            if f"{table}.{decider}" in wrong:
-                further = [fault for fault in further if fault.key.split(".")[::3] != [table, key]]
+    undecided = {
+        (table, key)
+        for table, section in all_sections().items()
+        for key, decider in section.lists.deciders.items()
+        if f"{table}.{decider}" in wrong
+    }
     lower = lower_limits()
-    return [
-        fault
-        for fault in further
-        if fault.key not in wrong
-        and (_table(fault.key) not in tables or (fault.key in lower and lower[fault.key] not in wrong))
-    ]
+
+    def stands(key: str) -> bool:
+        """Whether the refusal of a key depends on no refused value."""
+        if key in wrong or tuple(key.split(".")[::3]) in undecided:
+            return False
+        return _table(key) not in tables or (key in lower and lower[key] not in wrong)
+
+    return [fault for fault in further if stands(fault.key)]
 
 
 @cache

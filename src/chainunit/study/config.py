@@ -295,7 +295,7 @@ def _of_tables(data: Mapping[str, Any], source: str) -> Config:
     try:
         _of_values(without(data, faults), parts, source)
     except InputError as error:
-        faults += independent(error.faults, faults, parts)
+        faults += independent(error.faults, faults)
     raise InputError.joined(faults)
 
 

@@ -221,26 +221,21 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
     moments = [f"{joint}.moment" for joint in joints.values() if f"{joint}.moment" in outputs]
     groups = [", ".join(group.links) for group in description.structure.groups]
 
-    def sizes(q: Any) -> Any:
-        """All quantities of which the largest value counts, in the order of `names`."""
-        state, part_outputs = way.state(q)
-        bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
-        margins = [np.broadcast_to(np.abs(margin), q.shape) for margin in state.m.margins()]
-        forces = [
-            np.hypot(part_outputs[f"{joint}.fx"], part_outputs[f"{joint}.fy"]) for joint in joints.values()
-        ]
-        return np.array(
-            [np.abs(bias), inertia, -inertia, *(-margin for margin in margins), *forces,
-             *(np.abs(part_outputs[name]) for name in moments), *(part_outputs[name] for name in moving),
-             *(-part_outputs[name] for name in moving)]
-        )  # fmt: skip
+    def columns(q: Any) -> dict[str, Any]:
+        """By name, all quantities of which the largest value counts; with a minus those of which the least counts."""
+        state, x = way.state(q)
+        named = {"torque": np.abs(state.bias), "inertia": state.J, "-inertia": -state.J}
+        margins = zip(groups, state.m.margins(), strict=True)
+        named |= {f"-margin {name}": -np.abs(margin) for name, margin in margins}
+        named |= {
+            f"force {name}": np.hypot(x[f"{joint}.fx"], x[f"{joint}.fy"]) for name, joint in joints.items()
+        }
+        named |= {name: np.abs(x[name]) for name in moments}
+        named |= {name: x[name] for name in moving} | {f"-{name}": -x[name] for name in moving}
+        return {name: np.broadcast_to(column, q.shape) for name, column in named.items()}
 
-    names = [
-        "torque", "inertia", "-inertia", *(f"-margin {name}" for name in groups),
-        *(f"force {name}" for name in joints), *moments, *moving, *(f"-{name}" for name in moving),
-    ]  # fmt: skip
-    turns = machine.model.turns
-    places, values = largest(sizes, q, around=turns)
+    turns, names = machine.model.turns, [*columns(q[:1])]
+    places, values = largest(lambda q: np.array([*columns(q).values()]), q, around=turns)
     peak_places = {name: _folded(float(place), turns) for name, place in zip(names, places, strict=True)}
     top = dict(zip(names, map(float, values), strict=True))
 
@@ -296,15 +291,10 @@ def _means(
     variables, over the way of the driver from the begin to the end of its `span`."""
 
     def squares(q: Any) -> Any:
-        state, part_outputs = way.state(q)
+        state, outputs = way.state(q)
         bias = np.broadcast_to(state.bias, q.shape)
-        return np.array(
-            [
-                bias,
-                bias**2,
-                *(part_outputs[f"{joint}.fx"] ** 2 + part_outputs[f"{joint}.fy"] ** 2 for joint in joints),
-            ]
-        )
+        forces = (outputs[f"{joint}.fx"] ** 2 + outputs[f"{joint}.fy"] ** 2 for joint in joints)
+        return np.array([bias, bias**2, *forces])
 
     (mean, *mean_squares), (size, *_) = means(squares, *span)
     torque_rms, *forces_rms = map(math.sqrt, mean_squares)
@@ -318,19 +308,19 @@ def _motions(
     """The motion of each sliding joint besides the driver and of each link that swings, each with its name and with
     the places of the driver at which it turns back."""
     structure, turns = description.structure, way.machine.model.turns
-    parts = [
-        (name, Stroke, f"{description.variable('joint', name)}.s", f"{description.variable('joint', name)}.v")
+    sliding = [
+        (name, Stroke, "s", "v", description.variable("joint", name))
         for name, joint in structure.joints.items()
         if joint.kind == PRISMATIC and name != structure.driver.joint
-    ] + [
-        (
-            name,
-            Swing,
-            f"{description.variable('link', name)}.angle",
-            f"{description.variable('link', name)}.w",
-        )
+    ]
+    swinging = [
+        (name, Swing, "angle", "w", description.variable("link", name))
         for name in structure.links
         if description.link_turns[name][0] == 0.0 or not turns
+    ]
+    parts = [
+        (name, kind, f"{variable}.{place}", f"{variable}.{rate}")
+        for name, kind, place, rate, variable in (*sliding, *swinging)
     ]
     _, outputs = way.state(q)
     parts = [part for part in parts if np.ptp(outputs[part[2]]) > STANDS]

@@ -406,16 +406,16 @@ def _on_star(study: StudyRecord) -> None:
         return
     findings, times = StartFindings.found_in(study), run["time"].values
     starts = () if findings is None else findings.starts
-    speeds = [(first, 0.0), *((s.star_speed, s.angle) for s in starts if s.star_speed is not None)]
     after = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.switched_until]
     delta = float(max([*after, *(start.current for start in starts)], default=0.0))
-    if held := [angle for speed, angle in speeds[1:] if speed < _STANDING]:
+    by_angle = {start.angle: start.star_speed for start in starts if start.star_speed is not None}
+    if held := [angle for angle, share in by_angle.items() if share < _STANDING]:
         angles = ", ".join(number(angle, "rad") for angle in held)
         where = f"from {len(held)} of {len(starts)} angles ({angles})"
-        least = min((speed for speed, _ in speeds[1:] if speed >= _STANDING), default=None)
+        least = min((share for angle, share in by_angle.items() if angle not in held), default=None)
         study.say(_STANDS_IN_STAR, START, where=where, share=least, delta=delta)
         return
-    share, angle = min(speeds)
+    share, angle = min([(first, 0.0), *((share, angle) for angle, share in by_angle.items())])
     if times[-1] <= drive.switched_until or share >= _LITTLE_STAR:
         return
     if share < FULL_STAR:
