@@ -23,10 +23,10 @@ from chainunit.machines.linkages.file import read_linkage
 from chainunit.reading.results import as_data
 from chainunit.study import config
 from chainunit.study.choice import drive_of
+from chainunit.study.coupling import rams
 from chainunit.study.cycle import cycle
 from chainunit.study.inverter import inverter_need, need_of
 from chainunit.study.limits import Check
-from chainunit.study.ram_force import rams
 from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
