@@ -503,9 +503,9 @@ def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str,
     try:
         return make(parts.machine, parameters)
     except InputError as error:
-        model, names, spoil = parts.machine, (), {}
+        model, spoil = parts.machine, dict[str, str]()
+        names = error.names if isinstance(error, GeometryError) else ()
         if isinstance(error, GeometryError):
-            names = error.names
             spoil = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
         # the value that spoils the machine, and not one whose range that value sets
         key = next((f"machine.{name}" for name in (*spoil, *names) if name in parameters), "machine")

@@ -24,7 +24,7 @@ def model_verdict(study: StudyRecord) -> Verdict:
     config, answers = study.config, study.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
-    speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
+    speed, residuals = max(config.run.crank_speed, mean), _residuals(study.certificate)
     if study.drive.machine.model.sides and not study.drive.foreign_machine:
         verdict: Verdict = config.organs.verdict(study, speed, mean, residuals)
         return verdict
@@ -38,15 +38,12 @@ def wrong_runs(study: StudyRecord) -> list[str]:
     """The runs whose energy balance is not kept, so that their numbers count as wrong; start-up and steady running
     are one run."""
     # a balance of NaN is not kept either
-    return [name for name, residual in _residuals(study).items() if not residual < RESIDUAL]
+    return [name for name, residual in _residuals(study.certificate).items() if not residual < RESIDUAL]
 
 
-def _residuals(study: StudyRecord) -> dict[str, float]:
+def _residuals(certificate: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     """By run, the largest energy residual over the energy moved; start-up and steady running are one run."""
-    return {
-        STEADY if name == START else name: worst_residual(shares)
-        for name, shares in study.certificate.items()
-    }
+    return {STEADY if name == START else name: worst_residual(shares) for name, shares in certificate.items()}
 
 
 def motor_limits(study: StudyRecord) -> dict[str, Check]:

@@ -301,9 +301,10 @@ def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = Non
             base, *inner = typing.get_args(base)
             limits += inner
         lengths = [limit.max_length for extra in limits for limit in getattr(extra, "metadata", ())]
-        sort, left_out = _sort(base), f'"{value}"' if value else ""
-        if sort in ("switch", "table"):
-            left_out = {True: "true", False: "false"}.get(value, "") if sort == "switch" else ""
+        sort = _sort(base)
+        left_out = f'"{value}"' if value and sort not in ("switch", "table") else ""
+        if sort == "switch" and value is not None:
+            left_out = "true" if value else "false"
         yield Key(
             name,
             str(field.description),
@@ -319,8 +320,8 @@ def _sort(annotation: Any) -> Sort:
     """The sort of a key whose field has this annotation."""
     if isinstance(annotation, types.UnionType):
         return "texts"
-    kinds: dict[Any, Sort] = {Any: "value", bool: "switch", list: "list", dict: "table"}
-    return kinds.get(typing.get_origin(annotation) or annotation, "text")
+    sorts: dict[Any, Sort] = {Any: "value", bool: "switch", list: "list", dict: "table"}
+    return sorts.get(typing.get_origin(annotation) or annotation, "text")
 
 
 def _choices(annotation: Any) -> tuple[str, ...]:
