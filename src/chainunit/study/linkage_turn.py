@@ -308,19 +308,19 @@ def _motions(
     """The motion of each sliding joint besides the driver and of each link that swings, each with its name and with
     the places of the driver at which it turns back."""
     structure, turns = description.structure, way.machine.model.turns
-    sliding = [
+    moving: list[tuple[str, type[Stroke | Swing], str, str, str]] = [
         (name, Stroke, "s", "v", description.variable("joint", name))
         for name, joint in structure.joints.items()
         if joint.kind == PRISMATIC and name != structure.driver.joint
     ]
-    swinging = [
+    moving += [
         (name, Swing, "angle", "w", description.variable("link", name))
         for name in structure.links
         if description.link_turns[name][0] == 0.0 or not turns
     ]
     parts = [
         (name, kind, f"{variable}.{place}", f"{variable}.{rate}")
-        for name, kind, place, rate, variable in (*sliding, *swinging)
+        for name, kind, place, rate, variable in moving
     ]
     _, outputs = way.state(q)
     parts = [part for part in parts if np.ptp(outputs[part[2]]) > STANDS]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.quantities import Layout, Value, Variable, declaration, quantity
-from .arrays import peak
+from .arrays import Dataset, peak
 from .drive import AbsentError, Drive
 from .limits import reaches
 from .readings import (
@@ -25,9 +25,6 @@ from .readings import (
 from .relay import lasting_current, relay_trip
 from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 STARTED = 0.95
 """Share of the speed at which a start ends, see `time_to_start`."""
@@ -117,7 +114,7 @@ def _slack_time(w: Window) -> float | None:
     if "machine.left.slack_share" not in w.run:
         return None
 
-    def some_slack(drive: Drive, run: xr.Dataset) -> Any:
+    def some_slack(drive: Drive, run: Dataset) -> Any:
         shares = [run[f"machine.{side}.slack_share"].values for side in w.sides]
         return (np.max(shares, axis=0) > 0.0).astype(float) if shares else np.zeros(run.sizes["time"])
 

@@ -16,10 +16,9 @@ from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import RODS, SIDES, RodName, SideLoads
 from ..machines.machine import Machine
 from ..reading.results import derived, part, result
+from .arrays import Dataset
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from .drive import Drive
 
 
@@ -125,7 +124,7 @@ class LeastPull:
     mean: float
 
 
-def least_pulls(drive: Drive, run: xr.Dataset, sides: tuple[str, ...]) -> dict[RodName, LeastPull]:
+def least_pulls(drive: Drive, run: Dataset, sides: tuple[str, ...]) -> dict[RodName, LeastPull]:
     """The least pulls in webs and walls of the `sides`; empty where there is none, and where the organs of the run
     are not two bars."""
     machine = drive.simulated_machine

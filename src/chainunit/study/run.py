@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..core.errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
@@ -20,6 +19,7 @@ from ..work.progress import Progress, TaskProgress, quiet
 from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
+from .arrays import Dataset
 from .bearings import pin_loads
 from .choice import choose_for, with_parts_beside
 from .config import Config
@@ -40,9 +40,6 @@ from .statics import statics
 from .torques import from_event_on, on_coupling, quasi_static_peak
 from .transients import Transient, coast, compare, follow, lead_times, release
 from .window import Phase, Trip
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _AFTER_TRIP = 1.0
 """Time for which a start in which the coupling opens is followed without it [s]: the first swings are the largest."""
@@ -245,7 +242,7 @@ class Runner:
                 "coupling.trip_torque must be above that"
             )
 
-    def _relay(self, run: xr.Dataset) -> None:
+    def _relay(self, run: Dataset) -> None:
         """Record the trip class of the relay that the start-up needs; that of a proposed drive holds from
         every crank angle."""
         study, drive = self.study, self.rig.drive
@@ -313,7 +310,7 @@ class Runner:
             "compares the ways"
         )
 
-    def _pins_and_pulls(self, name: str, run: xr.Dataset) -> None:
+    def _pins_and_pulls(self, name: str, run: Dataset) -> None:
         """Record the loads of the pins and the pulls in the rods."""
         drive = self.rig.drive
         if pulls := least_pulls(drive, run, drive.machine.loaded_sides(self.study.config.feed)):
@@ -321,7 +318,7 @@ class Runner:
         if loads := pin_loads(self.rig.drive, run):
             self.study.pins[name] = loads
 
-    def _certify(self, name: str, run: xr.Dataset, lead: xr.Dataset | None = None) -> None:
+    def _certify(self, name: str, run: Dataset, lead: Dataset | None = None) -> None:
         self.study.certificate[name] = self.rig.residuals(run, lead)
         self.study.runs[name] = run
 

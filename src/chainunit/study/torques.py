@@ -11,7 +11,7 @@ import numpy as np
 from ..core.engines import numpy_
 from ..drives.gearing import geared_acceleration
 from ..drives.induction_steady import steady
-from .arrays import peak
+from .arrays import Dataset, peak
 from .drive import Drive
 from .event import Role
 from .proposal import DutyPeak
@@ -19,29 +19,27 @@ from .readings import crank_torque, load_inertia
 from .verdict import START, STEADY
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from .record import StudyRecord
 
 
-PeakOf = Callable[[Drive, "xr.Dataset"], float]
+PeakOf = Callable[[Drive, Dataset], float]
 """The peak of a torque in a run, at the crank [N m]."""
 
 
-def on_coupling(drive: Drive, run: xr.Dataset) -> float:
+def on_coupling(drive: Drive, run: Dataset) -> float:
     """Peak torque in a run on a coupling that sits on the motor shaft behind rotor and added inertia, at the crank
     [N m]: the torque of the motor less the one that accelerates the inertia on its side."""
     return peak(run[drive.motor_torque].values) * drive.ratio
 
 
-def gear_torque(drive: Drive, run: xr.Dataset) -> Any:
+def gear_torque(drive: Drive, run: Dataset) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where the
     driveline is there, else at the crank."""
     behind_gear = bool(drive.line) and drive.driven_machine.ratio == 1.0
     return run[drive.motor_torque].values * drive.ratio if behind_gear else crank_torque(drive, run)
 
 
-def at_gear(drive: Drive, run: xr.Dataset) -> float:
+def at_gear(drive: Drive, run: Dataset) -> float:
     """Peak torque in a run at the output of the gear [N m], see `gear_torque`."""
     return peak(gear_torque(drive, run))
 
@@ -50,7 +48,7 @@ CURVE = ("motor.v", "motor.supply.frequency", "machine.tau_bias", "machine.J")
 """The outputs of a run, beside the speed, that `quasi_static_torque` follows from."""
 
 
-def quasi_static_torque(drive: Drive, run: xr.Dataset, before: float = 0.0) -> Any:
+def quasi_static_torque(drive: Drive, run: Dataset, before: float = 0.0) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,), by load and acceleration: the motor gives the
     torque of its curve at the present speed, voltage and frequency, and accelerates rotor and machine as one body.
     With the inertia `before` [kg m2 at the motor's shaft] it is that on a part which accelerates this inertia, too.
@@ -72,7 +70,7 @@ def quasi_static_torque(drive: Drive, run: xr.Dataset, before: float = 0.0) -> A
     return ratio * (load + (inertia + before / (1.0 + drive.gear_loss)) * a)
 
 
-def quasi_static_peak(drive: Drive, run: xr.Dataset, peak_of: PeakOf = at_gear, before: float = 0.0) -> float:
+def quasi_static_peak(drive: Drive, run: Dataset, peak_of: PeakOf = at_gear, before: float = 0.0) -> float:
     """Peak torque of a part in a run by load and acceleration, at the crank [N m], see `quasi_static_torque`; at
     most what `peak_of` reads from the run, whose motor may speed up faster than its field follows the curve."""
     most = peak_of(drive, run)
@@ -81,7 +79,7 @@ def quasi_static_peak(drive: Drive, run: xr.Dataset, peak_of: PeakOf = at_gear, 
     return min(peak(quasi_static_torque(drive, run, before)), most)
 
 
-def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], peak_of: PeakOf) -> DutyPeak:
+def duty_peak(drive: Drive, runs: Iterable[tuple[str, Dataset]], peak_of: PeakOf) -> DutyPeak:
     """The largest torque, read by `peak_of`, in the runs of normal duty, each with its name: steady running, events
     that may last, and all feed on either side (`all_feed_on`)."""
     return max((DutyPeak(peak_of(drive, run), name) for name, run in runs), key=lambda peak: peak.torque)
@@ -92,7 +90,7 @@ def all_feed_on(side: str) -> str:
     return f"all_feed_on_the_{side}"
 
 
-def from_event_on(study: StudyRecord, name: str) -> xr.Dataset:
+def from_event_on(study: StudyRecord, name: str) -> Dataset:
     """The part of a run from the begin of its event on."""
     return study.runs[name].sel(time=slice(study.event[name], None))
 

@@ -75,9 +75,6 @@ class TurnFindings(Findings):
         curves = (self.loaded.angle, self.loaded.crank_torque, self.free.crank_torque, self.inertia)
         return TurnCourse(*(x[::EVERY] for x in curves))
 
-    def remark(self, study: StudyRecord) -> None:
-        """No remarks: the numbers are enough."""
-
 
 class TurnAnalysis(Analysis):
     """The turn of every machine; for organs that are chains, with two bars in their place."""

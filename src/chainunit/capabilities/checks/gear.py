@@ -237,6 +237,5 @@ def motor_shaft(study: StudyRecord, plan: CheckPlan, checks: Checks) -> ShaftLoa
         belt = "a belt or wheel on it is not known; add pulley_diameter and tension_factor"
         checks.lack(what, "no pin of the machine turns with the shaft" if direct else belt)
         return None
-    tables = {"motor_shaft": table}
-    checks.check(rule, "motor", "checks.motor_shaft", load, table.overhung_load, tables=tables, pin=bearing)
+    checks.check(rule, "motor", "checks.motor_shaft", load, table.overhung_load, pin=bearing)
     return load

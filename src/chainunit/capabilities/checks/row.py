@@ -118,6 +118,8 @@ class Checks:
 
     rows: list[CheckRow] = field(default_factory=list)
     missing: list[NotChecked] = field(default_factory=list)
+    tables: Mapping[str, Any] = field(default_factory=dict)
+    """the tables of the study file, of which some rules have numbers"""
 
     def lack(self, what: str, why: str, table: str = "") -> None:
         """Add something that is not checked."""
@@ -131,11 +133,10 @@ class Checks:
         numbers: Any,
         limit: float | None,
         why: str = "",
-        tables: Mapping[str, Any] | None = None,
         **slots: str,
     ) -> None:
         """Add the row of a part, see `CheckRule.row`; without a value or a limit, the reason `why` it has none."""
         if why and not limit:
             self.lack(f"{part}, {rule.title.format(**slots)}", why)
         else:
-            self.rows.append(rule.row(part, path, numbers, limit or 0.0, tables or {}, **slots))
+            self.rows.append(rule.row(part, path, numbers, limit or 0.0, self.tables, **slots))

@@ -137,9 +137,6 @@ class OrganFindings(Findings):
             for side, factors in self.factors.items()
         }
 
-    def remark(self, study: StudyRecord) -> None:
-        """No remarks: the numbers are enough."""
-
 
 class OrganAnalysis(Analysis):
     """The organs of a chain unit with the feed of normal running."""

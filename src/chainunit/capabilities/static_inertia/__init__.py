@@ -31,9 +31,6 @@ class StaticInertiaFindings(Findings):
     machine: float = quantity("N.m", "RMS torque over a turn at constant speed")
     static: float = quantity("N.m", "the same with the inertia as one number")
 
-    def remark(self, study: StudyRecord) -> None:
-        """No remark: the line of `StaticInertiaCapability.answer` says it."""
-
 
 class StaticInertiaAnalysis(Analysis):
     """Both torques, if the study chooses the motor of a machine whose inertia belongs to its angle."""
