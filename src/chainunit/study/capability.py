@@ -54,11 +54,12 @@ class EstimateUser(ABC):
 
 @dataclass(frozen=True)
 class FileReference:
-    """The name of a file in a table of a study file: its full `key`, and the `table` in which it stands by `name`."""
+    """The name of a file in a study file: its full `key`, and the `table` or list in which it stands by `name` or
+    number."""
 
     key: str
-    table: dict[str, Any]
-    name: str
+    table: Any
+    name: str | int
     is_recording: bool = True
     """whether it is a recording, which has to be there"""
 

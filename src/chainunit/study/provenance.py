@@ -21,8 +21,7 @@ from ..core.files import digest, write_file
 from ..reading.results import part, result
 from .config import Config, FileContents
 from .parts import beside
-from .registry import registered
-from .study_file import toml_text
+from .study_file import named_files, toml_text
 
 FILE, COPY = "provenance.json", "study_copy.toml"
 """Names of the provenance of a result and of the copy of its study file, in the folder of the result."""
@@ -83,14 +82,8 @@ def _digests_of(files: Iterable[tuple[str, Path]]) -> Iterator[tuple[str, str]]:
 
 def _digests(file: FileContents) -> Iterator[tuple[str, str]]:
     """The digests of all files that the study names: linkage, catalogues, motors and machines, recordings."""
-    catalogue = file.tables.get("catalogue", [])
-    names = [catalogue] if isinstance(catalogue, str) else list(catalogue)
-    for table, key in (("system", "motor"), ("system", "machine"), ("machine", "linkage")):
-        name = str(file.tables.get(table, {}).get(key, ""))
-        names += [name] if name.lower().endswith((".toml", ".fmu")) else []
-    of_parts = (part_file for part in registered() for part_file in part.files(file.tables))
-    names += [str(part_file.table.get(part_file.name, "")) for part_file in of_parts]
-    return _digests_of((name, beside(name, file.source)) for name in dict.fromkeys(filter(None, names)))
+    names = dict.fromkeys(str(named.table[named.name]) for named in named_files(file.tables))
+    return _digests_of((name, beside(name, file.source)) for name in names)
 
 
 @cache
