@@ -104,6 +104,24 @@ def names_read(rig: Rig, events: Iterable[Event]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
+class _Wait:
+    """The wait of a point for steady running, by times since rest [s]: the `time` to which it has run, the length of
+    its next run, the `piece`, usually that of the turns that are asked for, and the end of the patience."""
+
+    def __init__(self, time: float, usual: float) -> None:
+        self.time, self.piece, self._usual = time, usual, usual
+        self._longest = time + PATIENCE * usual
+
+    def goes_on(self, rig: Rig, run: Dataset) -> bool:
+        """Whether the point is run on after the last `run`, in which it did not settle."""
+        if speeds_up(rig, run, self.time):
+            self._longest = self.time + self.piece + max(PATIENCE * self._usual, 2.0 * self.time)
+        self.time += self.piece
+        # the rise of the speed is read from a turn
+        self.piece = self._usual if has_turn(rig.drive, run) else 2.0 * self.piece
+        return self.time < self._longest - 0.5 * self._usual
+
+
 class BlockRuns:
     """The compiled system of a rig, and runs on it.
 
@@ -330,29 +348,23 @@ class BlockRuns:
         start = self._started(points)
         states, faults = start.states, [_fault(start, k) for k in range(len(points))]
         last: dict[int, Dataset] = {}
-        waiting = [k for k, fault in enumerate(faults) if fault is None]
-        usual = [(point.rig.operation.run.turns + 0.1) * point.rig.operation.turn for point in points]
-        pieces, times = [*usual], [start.end(k) for k in range(len(points))]
-        longest = [time + PATIENCE * piece for time, piece in zip(times, usual, strict=True)]
-        while waiting:
-            some, stops = [points[k] for k in waiting], [pieces[k] for k in waiting]
-            runs = self._run(some, states[:, waiting], 0.0, stops)
+        waits = {
+            k: _Wait(start.end(k), (point.rig.operation.run.turns + 0.1) * point.rig.operation.turn)
+            for k, point in enumerate(points)
+            if faults[k] is None
+        }
+        while waits:
+            waiting = list(waits)
+            stops = [waits[k].piece for k in waiting]
+            runs = self._run([points[k] for k in waiting], states[:, waiting], 0.0, stops)
             states[:, waiting] = runs.states
-            left = []
             for place, k in enumerate(waiting):
-                faults[k], last[k], rig = _fault(runs, place), self._series(runs, place), points[k].rig
+                faults[k], last[k] = _fault(runs, place), self._series(runs, place)
                 if faults[k] is not None or _settles(points[k], last[k]):
-                    continue
-                if speeds_up(rig, last[k], times[k]):
-                    longest[k] = times[k] + pieces[k] + max(PATIENCE * usual[k], 2.0 * times[k])
-                times[k] += pieces[k]
-                # the rise of the speed is read from a turn
-                pieces[k] = usual[k] if has_turn(rig.drive, last[k]) else 2.0 * pieces[k]
-                if times[k] < longest[k] - 0.5 * usual[k]:
-                    left.append(k)
-                else:
+                    del waits[k]
+                elif not waits[k].goes_on(points[k].rig, last[k]):
                     faults[k] = RunFault(Cause.UNSETTLED)
-            waiting = left
+                    del waits[k]
         return states, faults, last
 
     def _waits(self, points: Sequence[RunPoint], states: Any, steady: Sequence[Dataset]) -> list[float]:

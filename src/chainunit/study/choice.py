@@ -33,12 +33,10 @@ class Choice:
     proposal: DriveProposal | None = None
 
 
-def choose(
-    config: Config, folder: Path, progress: TaskProgress = quiet, backend: Backend | None = None
-) -> Choice:
+def choose(config: Config, folder: Path, progress: TaskProgress = quiet) -> Choice:
     """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
     turn = cycle(config.machine, config.run.crank_speed, config.feed)
-    return choose_for(turn, config, folder, progress, backend)
+    return choose_for(turn, config, folder, progress)
 
 
 def drive_of(config: Config) -> Drive:

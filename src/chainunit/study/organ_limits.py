@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -138,13 +139,8 @@ def least_pulls(drive: Drive, run: Dataset, sides: tuple[str, ...]) -> dict[RodN
     pulls = machine.organ_pulls(psi, w, a, left, right)
     least: dict[RodName, LeastPull] = {}
     for rod in RODS:
-        ends = {
-            (side, pin): np.min(pull)
-            for side in SIDES
-            if side in sides
-            for pin, pull in pulls[side][rod].items()
-        }
-        weakest = min(ends, key=lambda place: float(ends[place]))
-        means = [np.min(sum(pulls[side][rod].values())) / 2.0 for side in SIDES if side in sides]
-        least[rod] = LeastPull(float(ends[weakest]), weakest[1], float(min(means)))
+        ends = [pulls[side][rod] for side in SIDES if side in sides]
+        by_pin = ((float(np.min(pull)), pin) for pin_pulls in ends for pin, pull in pin_pulls.items())
+        mean = min(float(np.min(sum(pin_pulls.values()))) / 2.0 for pin_pulls in ends)
+        least[rod] = LeastPull(*min(by_pin, key=itemgetter(0)), mean)
     return least

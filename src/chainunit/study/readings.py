@@ -162,6 +162,7 @@ def largest_torque(drive: Drive, run: Dataset, T: float) -> Any:
         x = run[f"motor.{name}"].values
         if name == "w":
             x = np.where(braking, -np.abs(x), np.abs(x))
+        # instants that are alike to this resolution are computed once
         unit = resolution * max(peak(x), 1e-9)
         columns.append(np.round(x / unit) * unit)
     instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)

@@ -95,11 +95,11 @@ def from_event_on(study: StudyRecord, name: str) -> Dataset:
     return study.runs[name].sel(time=slice(study.event[name], None))
 
 
-def peaks_in_events(study: StudyRecord, *roles: Role, peak_of: PeakOf = on_coupling) -> dict[str, float]:
-    """Peak torque in each event with one of these `roles`, or in every event without `roles` [N m]."""
+def peaks_in_events(study: StudyRecord, *roles: Role) -> dict[str, float]:
+    """Peak torque on a coupling in each event with one of these `roles`, or in every event without `roles` [N m]."""
     events = study.config.events
     return {
-        name: peak_of(study.drive, from_event_on(study, name))
+        name: on_coupling(study.drive, from_event_on(study, name))
         for name in study.event
         if name in study.runs and (not roles or events[name].role in roles)
     }
