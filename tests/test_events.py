@@ -390,6 +390,7 @@ def test_events_and_parameters_are_pickled():
         [{"type": "surge", "input": "press_force"}, {"type": "surge", "input": "left.force"}]
     )
     assert list(events) == ["surge_press_force", "surge_left_force"]
+    assert {type(event) for event in events.values()} == {TYPES["surge"]}
     for event in events.values():
         again = pickle.loads(pickle.dumps(event))
         assert again == event and type(again) is type(event) and again.title == event.title
@@ -398,4 +399,6 @@ def test_events_and_parameters_are_pickled():
     for instance in (machine.p, model.Feed(press_force=3.0), model.Inputs(phi=1.0)):
         assert pickle.loads(pickle.dumps(instance)) == instance
     drawn = read_random_event({"type": "surge", "input": "press_force"}, "monte_carlo.event")
+    assert drawn.heading == "surge of press_force" and drawn.title == "press_force rises"
+    assert read_random_event({}, "monte_carlo.event").heading == "jam left or right"
     assert drawn.ranges == {"factor": (1.5, 4.0)} and drawn.identity()["input"] == "press_force"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import importlib.util
+import inspect
 import re
 import xml.etree.ElementTree as ET
 from collections import Counter
@@ -17,6 +19,8 @@ from scipy.sparse.csgraph import connected_components
 
 from chainunit.core.errors import RunError
 from chainunit.core.register import entries
+from chainunit.report.analyses import analysis_sections
+from chainunit.study.file_section import FileSection, TableForm, TableLists
 
 pytestmark = pytest.mark.second
 
@@ -114,6 +118,14 @@ def test_no_modules_import_each_other_in_a_circle():
     count, part = connected_components(csr_matrix(matrix), connection="strong")
     circles = [set(np.array(names)[part == k]) for k in range(count) if np.sum(part == k) > 1]
     assert not circles
+
+
+def test_a_table_of_a_study_file_is_declared_in_parts_and_a_section_is_made_of_the_study():
+    """No declaration of a table knows everything of it, and no section of a report reads the data of a result."""
+    sizes = {part: len(dataclasses.fields(part)) for part in (FileSection, TableForm, TableLists)}
+    assert max(sizes.values()) <= 16, sizes
+    for name, contents in analysis_sections().items():
+        assert list(inspect.signature(contents.blocks).parameters) == ["study"], name
 
 
 def test_no_two_classes_share_a_name():
