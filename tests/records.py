@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chainunit.study.load_cases import turns_by_load
+from chainunit.study.cycle import turns_by_load
 from chainunit.study.record import StudyRecord
 from chainunit.study.statics import statics
 

@@ -124,10 +124,14 @@ def test_what_lumps_and_jams_do_over_time():
 @pytest.mark.parametrize("kind", [name for name, of in TYPES.items() if not of.from_rest])
 def test_an_event_is_followed_to_its_end_and_a_turn_more(kind):
     """However long it lasts, and however short the turns that are asked for are."""
-    of, turn = TYPES[kind].of_input("load"), 0.25
+    of, turn = TYPES[kind], 0.25
     longer = {n: 7.0 for n in Layout(of.Parameters).names if n in ("duration", "shift")}
-    event = of.on("left" if of.has_side else "", of.Parameters(turns=1.0, **longer))
-    normal = dict.fromkeys(event.inputs(event.side), 50.0)
+    event = of.on(
+        "left" if of.has_side else "",
+        of.Parameters(turns=1.0, **longer),
+        input_name="load" if of.has_input else "",
+    )
+    normal = dict.fromkeys(event.inputs, 50.0)
     signals = event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.1)).values()
     end = event.time_followed(turn) - turn
     assert end >= (7.0 if longer else 0.0)
@@ -347,7 +351,7 @@ def swell():
 
         def signals(self, normal, at, state):
             """The signal of the mass: it rises and stays."""
-            (name,) = self.inputs(self.side)
+            (name,) = self.inputs
             return {name: Profile(normal[name], ((at, self.p.time, normal[name] + self.p.added),))}
 
     yield Swell
@@ -386,6 +390,7 @@ def test_events_and_parameters_are_pickled():
         [{"type": "surge", "input": "press_force"}, {"type": "surge", "input": "left.force"}]
     )
     assert list(events) == ["surge_press_force", "surge_left_force"]
+    assert {type(event) for event in events.values()} == {TYPES["surge"]}
     for event in events.values():
         again = pickle.loads(pickle.dumps(event))
         assert again == event and type(again) is type(event) and again.title == event.title
@@ -394,4 +399,6 @@ def test_events_and_parameters_are_pickled():
     for instance in (machine.p, model.Feed(press_force=3.0), model.Inputs(phi=1.0)):
         assert pickle.loads(pickle.dumps(instance)) == instance
     drawn = read_random_event({"type": "surge", "input": "press_force"}, "monte_carlo.event")
+    assert drawn.heading == "surge of press_force" and drawn.title == "press_force rises"
+    assert read_random_event({}, "monte_carlo.event").heading == "jam left or right"
     assert drawn.ranges == {"factor": (1.5, 4.0)} and drawn.identity()["input"] == "press_force"

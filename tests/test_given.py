@@ -27,9 +27,8 @@ from chainunit.study import remarks
 from chainunit.study.catalogue_drive import with_inertia
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
-from chainunit.study.given import given_sections
+from chainunit.study.given import given_sections, origin_of
 from chainunit.study.measures import Answers
-from chainunit.study.origins import origin_of
 from chainunit.study.package import remarks_on_export
 from chainunit.study.parts import example
 from chainunit.study.remarks import conclude, lengths_of_example

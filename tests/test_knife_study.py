@@ -34,11 +34,10 @@ from chainunit.study.drive import Drive
 from chainunit.study.limits import given_motor
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
-from chainunit.study.readings import only_whole_turns
+from chainunit.study.readings import cutting_power, only_whole_turns
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_up import start_up
-from chainunit.study.stored import cutting_power
 from chainunit.study.turn import TurnAnalysis
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import importlib.util
+import inspect
 import re
 import xml.etree.ElementTree as ET
 from collections import Counter
@@ -17,6 +19,8 @@ from scipy.sparse.csgraph import connected_components
 
 from chainunit.core.errors import RunError
 from chainunit.core.register import entries
+from chainunit.report.analyses import analysis_sections
+from chainunit.study.file_section import FileSection, TableForm, TableLists
 
 pytestmark = pytest.mark.second
 
@@ -115,6 +119,14 @@ def test_no_modules_import_each_other_in_a_circle():
     assert not circles
 
 
+def test_a_table_of_a_study_file_is_declared_in_parts_and_a_section_is_made_of_the_study():
+    """No declaration of a table knows everything of it, and no section of a report reads the data of a result."""
+    sizes = {part: len(dataclasses.fields(part)) for part in (FileSection, TableForm, TableLists)}
+    assert max(sizes.values()) <= 16, sizes
+    for name, contents in analysis_sections().items():
+        assert list(inspect.signature(contents.blocks).parameters) == ["study"], name
+
+
 def test_no_two_classes_share_a_name():
     """No two classes share a name, apart from a model's own parameters, inputs, states and outputs."""
     places: dict[str, list[str]] = {}
@@ -131,8 +143,7 @@ DOORS = {
     # the reader
     "study.study_file": {"changed_tables"},
     # capabilities have their hooks and plans in the folder's own module, or in `capability`
-    "study.capability": {"faults"},
-    "study.plans": {"take_estimates"},
+    "study.capability": {"faults", "take_estimates"},
     # the run of a study, from Python and as a task
     "study.provenance": {"provenance", "writers"},
     "study.choice": {"choose", "choose_for", "drive_of"},
@@ -163,7 +174,7 @@ def test_few_functions_take_the_whole_configuration():
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):
             if isinstance(node, ast.FunctionDef) and any(map(_is_whole, _arguments(node))):
                 found.setdefault(module, set()).add(node.name)
-    hooks = DOORS["study.capability"] | DOORS["study.plans"]
+    hooks = DOORS["study.capability"] | DOORS["study.capability"]
     own = {name for name in found if re.fullmatch(r"capabilities\.\w+(\.capability)?", name)}
     assert all(found[name] <= hooks for name in own), {name: found[name] for name in own}
     assert {name: taken for name, taken in found.items() if name not in own} == DOORS

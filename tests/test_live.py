@@ -453,11 +453,11 @@ def test_formulas_are_the_signals_of_their_events():
 
     seen = 0
     for kind, of in TYPES.items():
-        of = of.of_input("left.processing_force") if of.has_input else of
-        event = of.on("left" if of.has_side else "")
+        input_name = "left.processing_force" if of.has_input else ""
+        event = of.on("left" if of.has_side else "", input_name=input_name)
         p = {name: rng.uniform(0.2, 0.8) for name in varied_names(event)}
         event = replace(event, p=replace(event.p, **p))
-        inputs = event.inputs(event.side)
+        inputs = event.inputs
         normal = {name: rng.uniform(1.0, 2.0) for name in (*inputs, *inputs_of_both(inputs))}
         state = {name: rng.uniform(-1.0, 1.0) for name in event.reads}
         at = 1.25

@@ -51,7 +51,7 @@ def test_a_study_names_it(registered, tmp_path):
     choice = config.parse(STUDY)
     study = run.run_study(choice, tmp_path)
     assert study.failure is None and study.drive.motor is ServoMotor
-    steady, p = study.answers["steady"], study.motor
+    steady, p = study.answers["steady"], study.drive.parameters
     assert p.coil.R == 1.5 and p.control.ki == pytest.approx(4.0 * p.control.kp)
     assert steady.speed_mean == pytest.approx(choice.run.crank_speed, rel=1e-6)
     # torque of the shaft: the current's, less that of the rotor

@@ -43,10 +43,10 @@ from chainunit.report.packing import unpacked
 from chainunit.study import config, judgement
 from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check
+from chainunit.study.organ_limits import CRANK_GOOD, ROCKER_GOOD_EMPTY
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
-from chainunit.study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 
 pytestmark = pytest.mark.second
 
@@ -596,7 +596,7 @@ def test_each_overload_factor_says_its_use(study, written):
 
 def test_one_number_of_the_reserve_everywhere(study, written):
     """The least (limit - torque)/limit of a run, in %, on the terminal, on the page and in the data."""
-    answers, p = study.answers, study.motor
+    answers, p = study.answers, study.drive.parameters
     result = as_dict(study)
     warm = 1.0 + p.armature.alpha * (answers["steady"].winding_temperature - 293.15)
     for run in answers:

@@ -11,17 +11,24 @@ import pytest
 from records import record_of
 
 from chainunit.reading.results import as_data
+from chainunit.study.analyses import GearAnalysis
 from chainunit.study.analysis import Work
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
-from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.measures import read_answers, read_measure
-from chainunit.study.readings import breakdown_speed, crank_speed, only_whole_turns, shaft_power
+from chainunit.study.readings import (
+    breakdown_speed,
+    crank_speed,
+    energy_behind,
+    energy_gap,
+    energy_held,
+    only_whole_turns,
+    shaft_power,
+)
 from chainunit.study.remarks import _on_steady_running, _stall_speed, _why_missed
 from chainunit.study.rig import Rig
 from chainunit.study.start_up import StartUp, speeds_up, start_up
-from chainunit.study.stored import energy_behind, energy_gap, energy_held
 from chainunit.study.window import CLOSED, DRIFT, STORED, Phase, Window, drift, end_gap, is_settled
 
 # the packaged mill at twice its lengths with 300 kg a side; the flywheel has 200 times the inertia of the rotor

@@ -87,7 +87,7 @@ def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_
     heavier = f"{SHORT}crank = {{ I = {crank.I + J4} }}"
     gains = {
         n: v
-        for n, v in study.drive.motor.parameter_layout.by_name(study.motor).items()
+        for n, v in study.drive.motor.parameter_layout.by_name(study.drive.parameters).items()
         if ".k" in n and "control" in n
     }
     motor = "".join(

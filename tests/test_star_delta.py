@@ -64,7 +64,7 @@ def exported(tmp_path_factory):
 
 def test_the_contactor_opens_and_closes():
     event = TYPES["interruption"].on(p=TYPES["interruption"].Parameters(duration=0.1))
-    assert event.name == "interruption" and event.inputs("") == ("contactor",)
+    assert event.name == "interruption" and event.inputs == ("contactor",)
     signal = event.signals({"contactor": 1.0}, 2.0, {})["contactor"]
     edge = CONTACTOR_EDGE
     times = np.array([0.0, 2.0, 2.0 + edge, 2.1, 2.1 + edge, 3.0])

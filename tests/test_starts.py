@@ -23,10 +23,10 @@ from chainunit.machines.linkages.file import read_linkage
 from chainunit.reading.results import as_data
 from chainunit.study import config
 from chainunit.study.choice import drive_of
+from chainunit.study.coupling import rams
 from chainunit.study.cycle import cycle
 from chainunit.study.inverter import inverter_need, need_of
 from chainunit.study.limits import Check
-from chainunit.study.ram_force import rams
 from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -140,9 +140,9 @@ def test_a_start_with_the_limit_of_an_inverter_of_the_rated_current(tmp_path):
         f"{text}[gear]\nratio = 29\n[run]\ncrank_speed = '50 rev/min'\nramp = '1 s'\n{PLAIN}"
     )
     drive = drive_of(given)
-    rig, study = Rig(given.operation, drive, None), SimpleNamespace(config=given)
+    rig = Rig(given.operation, drive, None)
     starts = starts_from_all(rig, 4.0)
-    limited, limit = _with_own_limit(study, rig, starts, 4.0)
+    limited, limit = _with_own_limit(given.drive, rig, starts, 4.0)
     assert limit == 1.5 * drive.rated_current < starts[0].current
     assert max(start.current for start in limited) < 1.2 * limit
     assert limited[0].start_time > starts[0].start_time

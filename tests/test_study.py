@@ -19,6 +19,7 @@ from reports import write
 
 from chainunit import EMPTY, ChainUnitMachine, SideLoads
 from chainunit.capabilities.sides.analysis import factors_for, sides_over_speed
+from chainunit.capabilities.sides.factors import alone, overload_factors
 from chainunit.core.files import LIST, FileList
 from chainunit.machines.chain_unit import Feed
 from chainunit.reading.result_entries import ResultEntries
@@ -26,7 +27,6 @@ from chainunit.reading.results import as_data
 from chainunit.report import series
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
-from chainunit.study.load_cases import alone, overload_factors
 from chainunit.study.readings import only_whole_turns, turns_made
 
 RUN = """

@@ -22,7 +22,7 @@ from chainunit.machines.linkages.file import description_of, linkage_from
 from chainunit.machines.machine import Machine
 from chainunit.reading.tables import toml
 from chainunit.report.live.linkage import of_linkage
-from chainunit.study.linkage_result import linkage_data
+from chainunit.study.linkage_turn import linkage_data
 from chainunit.study.linkage_turn import linkage_findings
 
 FIVE_BAR = """

@@ -10,17 +10,19 @@ import pytest
 
 from chainunit.capabilities.chains.judgement import chains
 from chainunit.reading.results import as_data
-from chainunit.study.pulls import LeastPull
+from chainunit.study.organ_limits import CRANK_GOOD, ROCKER_GOOD, ROCKER_GOOD_EMPTY, LeastPull
 from chainunit.study.remark import Remark
-from chainunit.study.verdict import (
-    CRANK_GOOD,
-    RESIDUAL,
-    ROCKER_GOOD,
-    ROCKER_GOOD_EMPTY,
-    foreign_machine,
-    rigid_links,
-    two_bars,
-)
+from chainunit.study.verdict import RESIDUAL, Verdict, balance_faults, two_bars
+
+
+def rigid_links(speed, residuals, actual=None):
+    """The verdict on a linkage without organs."""
+    return Verdict("machine", "rigid links", speed, balance_faults(residuals), actual)
+
+
+def foreign_machine(speed, residuals):
+    """The verdict on a machine that is an FMU."""
+    return Verdict("energy balance", None, speed, balance_faults(residuals))
 
 
 def least(web, wall, at=("B", "A1")):

@@ -18,7 +18,7 @@ from chainunit.core.engines import MATH
 from chainunit.machines.api import EMPTY, ChainUnitMachine
 from chainunit.machines.chain_unit import Feed
 from chainunit.machines.crank_rocker import half_width_range
-from chainunit.study.load_cases import overload_factors
+from chainunit.study.cycle import overload_factors
 
 from .table import PICK
 

@@ -16,7 +16,7 @@ from ..drives.motor import Motor
 from ..reading.lists import Entry, leaves
 from ..reading.tables import instance
 from ..study.conditions import given
-from ..study.entry_values import filled_text
+from ..study.file_section import filled_text
 from ..study.organs import finer_models
 from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen
 from .measurands import COLUMNS as READABLE

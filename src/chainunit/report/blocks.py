@@ -132,7 +132,7 @@ class GivenValue:
     description: str
     value: Content
     origin: str = ""
-    """see `chainunit.study.origins.origin_of`; empty where it is not known"""
+    """see `chainunit.study.given.origin_of`; empty where it is not known"""
     place: str = ""
     """file and line that give it; empty where no file does"""
 

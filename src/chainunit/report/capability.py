@@ -11,7 +11,7 @@ from ..study.config import Config
 from ..study.record import StudyRecord
 from ..study.registry import capabilities as registered
 from ..work.progress import TaskProgress
-from .blocks import Block, Source
+from .blocks import Block
 from .lines import Line
 from .reported_result import ReportedResult
 from .supplement import Supplement
@@ -23,7 +23,7 @@ class Contents:
     place."""
 
     heading: str
-    blocks: Callable[[Source, StudyRecord], Iterator[Block]]
+    blocks: Callable[[StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
     analysis: str = ""
     """name of its analysis, if the section has another name"""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import finite
 from ..reading.results import GIVEN, Estimate, InUnit, ResultPart, UnitOf, part_unit, parts
-from ..study.heading import Heading
+from ..study.provenance import Heading
 from . import blocks as b
 from .lines import Aside, Line, Name, Number, Words, capital, filled, line
 

@@ -13,8 +13,7 @@ from ..machines.machine import Machine
 from ..mechanism.machine import MachineState
 from ..reading.results import as_data
 from ..reading.tables import UnusualValue
-from ..study.linkage_result import LinkageData, linkage_data
-from ..study.linkage_turn import LinkageFindings, Stroke, Swing, linkage_findings
+from ..study.linkage_turn import LinkageData, LinkageFindings, Stroke, Swing, linkage_data, linkage_findings
 from . import blocks as b
 from . import figure as fig
 from . import linkage, linkage_loads, linkage_rest

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..machines.equilibria import INDIFFERENT, SADDLE, STABLE, STOP, UNSTABLE, Equilibrium
-from ..study.linkage_result import LinkageAtRest
-from ..study.linkage_turn import LinkageFindings
+from ..study.linkage_turn import LinkageAtRest, LinkageFindings
 from . import blocks as b
 from . import figure as fig
 from .cited import as_name, number, quantity_rows, table

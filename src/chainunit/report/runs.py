@@ -20,7 +20,7 @@ from .lines import Line, Number, capital, filled, join, line, spoken
 from .terminal import plain_line
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """Tables of the answers of every run, the forces in the bearings and the speed loop."""
     if study.answers:
         whole = table_of_runs(study)

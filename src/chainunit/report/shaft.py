@@ -25,7 +25,7 @@ _BESIDE = 3
 """Number of runs beside each other in the figure; with more of them the labels are illegible on the page."""
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the driveline."""
     if not shaft_findings(study).answers:
         return

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..core.descriptions import of_driver
-from ..study.event_torques import running_words
 from ..study.record import StudyRecord
 from ..study.starts import StartFindings, transient_words
+from ..study.torques import running_words
 from . import blocks as b
 from .cited import cited, number, table
 from .lines import filled
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The worst start in a sentence, and a table of all starts."""
     findings = StartFindings.found_in(study)
     if findings is None:

@@ -15,9 +15,8 @@ from ..core.quantities import finite, variables
 from ..reading.results import InUnit
 from ..reading.text import shown_in
 from ..study.event_table import random_runs
-from ..study.given import GivenSection, description, given_sections
-from ..study.heading import Heading
-from ..study.origins import origin_of, place_of
+from ..study.given import GivenSection, description, given_sections, origin_of, place_of
+from ..study.provenance import Heading
 from ..study.record import StudyRecord
 from ..study.result import speed_control
 from ..study.transients import DIFFERENCE
@@ -43,10 +42,9 @@ _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """The report on a study; `result` has its numbers, as `chainunit.study.result.as_dict` gives them."""
-    s = b.Source(result)
     with shown_in(study.config.units):
         sections = [
-            b.Section(name, contents.heading, tuple(contents.blocks(s, study)), beside=name == QUESTION)
+            b.Section(name, contents.heading, tuple(contents.blocks(study)), beside=name == QUESTION)
             for name, contents in _sections().items()
             if name not in analysis_sections() or (contents.analysis or name) in study.findings
         ]
@@ -54,12 +52,13 @@ def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
         sections = [
             section for section in sections if section.blocks or section.name not in analysis_sections()
         ]
+        given = b.Section("given", "Given values", tuple(_given(b.Source(result), study)))
         return b.Report(
             study.config.title,
             study.kind,
             result,
             (),
-            tuple(sections),
+            (*sections, given),
             source=source_line(cited(Heading.of(study.config.title, study.config.file))),
             failure=_failure(study),
             units=study.config.units,
@@ -107,7 +106,7 @@ _GIVEN_DRIVE = (
 )
 
 
-def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def _question(study: StudyRecord) -> Iterator[b.Block]:
     # a linkage has its title in place of a noun
     noun = f"this {study.noun}" if study.noun[:1].islower() else f'the machine "{study.noun}"'
     if study.proposal is None:
@@ -199,7 +198,7 @@ def _contents(s: b.Source, study: StudyRecord, section: GivenSection) -> Iterato
         yield key, description(f"{section.name}.{key}".removeprefix(".")), content
 
 
-def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def _live(study: StudyRecord) -> Iterator[b.Block]:
     """The live machine of the study; none of a machine whose equations are not known."""
     if study.drive.foreign_machine:
         return
@@ -213,7 +212,7 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 # -- the basis of the results
 
 
-def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def _basis(study: StudyRecord) -> Iterator[b.Block]:
     yield from basis(study)
     yield software(study)
     hint = (
@@ -294,17 +293,16 @@ def _version(name: str) -> str:
 def _sections() -> Mapping[str, Contents]:
     """By name, all sections that a report may have."""
     return {
-        "answer": Contents("The answer", lambda s, study: answer.blocks(study)),
+        "answer": Contents("The answer", answer.blocks),
         QUESTION: Contents("The question", _question),
         "live": Contents("Try it", _live),
         **{name: contents for name, contents in analysis_sections().items() if contents.before == "runs"},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
         **analysis_sections(),
-        "plots": Contents("Plots", lambda s, study: figures.PICTURES.figures(study), figures.PICTURES.files),
-        "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),
+        "plots": Contents("Plots", lambda study: figures.PICTURES.figures(study), figures.PICTURES.files),
+        "motion": Contents("The machine in motion", lambda study: iter(_motion(study))),
         "basis": Contents("Basis of the results", _basis),
-        "given": Contents("Given values", _given),
     }
 
 

@@ -14,7 +14,7 @@ from ..models import MODELS
 from ..study.choice import check_motor
 from ..study.config import Config
 from ..study.event_table import random_runs
-from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
+from ..study.record import LOAD_CYCLE, StudyRecord
 from ..study.result import StudyData, as_dict
 from ..study.run import run_study
 from ..work.progress import TaskProgress
@@ -76,7 +76,7 @@ def _kept(record: StudyRecord, folder: Path) -> Iterator[Path]:
 
 
 def _shortfall(record: StudyRecord) -> str | None:
-    return record.insufficient or (None if record.reaches else SPEED_MISSED)
+    return record.insufficient or (None if record.reaches else "The motor does not keep the speed asked for.")
 
 
 TASK: Task[Config, StudyRecord] = Task(

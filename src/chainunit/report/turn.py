@@ -35,7 +35,7 @@ def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
     return place[order], y[last][order]
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
     turn = TurnFindings.of_study(study)
     bars = f", of {substitute}" if (substitute := study.drive.machine.in_place) else ""

@@ -1,10 +1,16 @@
-"""Numbers of arrays, over time or over a turn."""
+"""The time series of a run, and numbers of arrays, over time or over a turn."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from xarray import Dataset as Dataset
+else:
+    # xarray, which takes long to import, is needed where a run is made
+    Dataset = Any
 
 
 def peak(x: Any) -> float:

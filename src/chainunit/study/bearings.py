@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from .arrays import Dataset
 from .drive import Drive
 from .readings import machine_series
 from .window import mean
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 EXPONENT = {"ball": 3.0, "roller": 10.0 / 3.0}
 """Exponent p of the rating life of ISO 281, by the kind of bearing."""
 
 
-def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None]]:
+def pin_loads(drive: Drive, run: Dataset) -> dict[str, dict[str, float | None]]:
     """Peak, RMS and, by kind of rolling bearing, equivalent load (mean of ISO 281 over the angle that the pin turns)
     of the reaction of every pin and guide [N]; a guide, which does not turn, has no equivalent load. Empty for a
     machine that is a foreign FMU."""
@@ -50,7 +47,7 @@ def driver_bearing(drive: Drive) -> str:
     return titles.get(bearing, "")
 
 
-def pin_force(drive: Drive, run: xr.Dataset, title: str) -> Any:
+def pin_force(drive: Drive, run: Dataset, title: str) -> Any:
     """Size of the reaction of a pin or guide of that `title` in a run [N], shape (time,)."""
     output = drive.simulated_machine.model.pins[title]
     return np.hypot(run[f"machine.{output}.fx"].values, run[f"machine.{output}.fy"].values)

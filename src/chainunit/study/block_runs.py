@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,15 +22,13 @@ from ..core.errors import InterruptedRunError, RunError
 from ..system import monolithic
 from ..system.compiled_simulation import LONGEST, CompiledSimulation, CompiledSystem, is_evaluated
 from ..system.signals import at_time
+from .arrays import Dataset
 from .event import Event, angle_of_begin
 from .readings import crank_angle, crank_speed, has_turn
 from .rig import Rig
 from .start_up import PATIENCE, speeds_up
 from .transients import follow, longest_lead
 from .window import is_settled, mean, time_at, whole_turns
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 BLOCK = 64
 """Number of runs that are side by side in memory."""
@@ -88,10 +86,10 @@ class EventRun:
     rows. A run from rest has the rows from its event on, and the last turns before it, `steady`; others have all rows
     from the steady state on."""
 
-    series: xr.Dataset | None = None
+    series: Dataset | None = None
     ended: bool = False
     fault: RunFault | None = None
-    steady: xr.Dataset | None = None
+    steady: Dataset | None = None
 
 
 def names_read(rig: Rig, events: Iterable[Event]) -> list[str]:
@@ -104,6 +102,24 @@ def names_read(rig: Rig, events: Iterable[Event]) -> list[str]:
             members = terminal.members
             names += [f"{name}.{members[x]}" for x in ("phi", "w", "tau") if x in members]
     return list(dict.fromkeys(names))
+
+
+class _Wait:
+    """The wait of a point for steady running, by times since rest [s]: the `time` to which it has run, the length of
+    its next run, the `piece`, usually that of the turns that are asked for, and the end of the patience."""
+
+    def __init__(self, time: float, usual: float) -> None:
+        self.time, self.piece, self._usual = time, usual, usual
+        self._longest = time + PATIENCE * usual
+
+    def goes_on(self, rig: Rig, run: Dataset) -> bool:
+        """Whether the point is run on after the last `run`, in which it did not settle."""
+        if speeds_up(rig, run, self.time):
+            self._longest = self.time + self.piece + max(PATIENCE * self._usual, 2.0 * self.time)
+        self.time += self.piece
+        # the rise of the speed is read from a turn
+        self.piece = self._usual if has_turn(rig.drive, run) else 2.0 * self.piece
+        return self.time < self._longest - 0.5 * self._usual
 
 
 class BlockRuns:
@@ -296,7 +312,7 @@ class BlockRuns:
             ended = runs.end(k) < stop - 0.5 * self.rig.step
             yield EventRun(self._series(runs, k, before), ended, _fault(runs, k))
 
-    def _series(self, runs: Runs, k: int, before: Runs | None = None) -> xr.Dataset:
+    def _series(self, runs: Runs, k: int, before: Runs | None = None) -> Dataset:
         """A run over its time, with the rows of the one `before`."""
         import xarray as xr
 
@@ -326,40 +342,32 @@ class BlockRuns:
         step = max(stops) / _ROWS_OF_START
         return self._run(points, np.array(rest, float).T, 0.0, stops, signals, step=step)
 
-    def _steadied(
-        self, points: Sequence[RunPoint]
-    ) -> tuple[Any, list[RunFault | None], dict[int, xr.Dataset]]:
+    def _steadied(self, points: Sequence[RunPoint]) -> tuple[Any, list[RunFault | None], dict[int, Dataset]]:
         """The states in steady running, shape (states, points), the faults of the points, and the run of the last
         turns of each point by its place."""
         start = self._started(points)
         states, faults = start.states, [_fault(start, k) for k in range(len(points))]
-        last: dict[int, xr.Dataset] = {}
-        waiting = [k for k, fault in enumerate(faults) if fault is None]
-        usual = [(point.rig.operation.run.turns + 0.1) * point.rig.operation.turn for point in points]
-        pieces, times = [*usual], [start.end(k) for k in range(len(points))]
-        longest = [time + PATIENCE * piece for time, piece in zip(times, usual, strict=True)]
-        while waiting:
-            some, stops = [points[k] for k in waiting], [pieces[k] for k in waiting]
-            runs = self._run(some, states[:, waiting], 0.0, stops)
+        last: dict[int, Dataset] = {}
+        waits = {
+            k: _Wait(start.end(k), (point.rig.operation.run.turns + 0.1) * point.rig.operation.turn)
+            for k, point in enumerate(points)
+            if faults[k] is None
+        }
+        while waits:
+            waiting = list(waits)
+            stops = [waits[k].piece for k in waiting]
+            runs = self._run([points[k] for k in waiting], states[:, waiting], 0.0, stops)
             states[:, waiting] = runs.states
-            left = []
             for place, k in enumerate(waiting):
-                faults[k], last[k], rig = _fault(runs, place), self._series(runs, place), points[k].rig
+                faults[k], last[k] = _fault(runs, place), self._series(runs, place)
                 if faults[k] is not None or _settles(points[k], last[k]):
-                    continue
-                if speeds_up(rig, last[k], times[k]):
-                    longest[k] = times[k] + pieces[k] + max(PATIENCE * usual[k], 2.0 * times[k])
-                times[k] += pieces[k]
-                # the rise of the speed is read from a turn
-                pieces[k] = usual[k] if has_turn(rig.drive, last[k]) else 2.0 * pieces[k]
-                if times[k] < longest[k] - 0.5 * usual[k]:
-                    left.append(k)
-                else:
+                    del waits[k]
+                elif not waits[k].goes_on(points[k].rig, last[k]):
                     faults[k] = RunFault(Cause.UNSETTLED)
-            waiting = left
+                    del waits[k]
         return states, faults, last
 
-    def _waits(self, points: Sequence[RunPoint], states: Any, steady: Sequence[xr.Dataset]) -> list[float]:
+    def _waits(self, points: Sequence[RunPoint], states: Any, steady: Sequence[Dataset]) -> list[float]:
         """Time to the event of each point [s]: the points are followed from these `states`, at the ends of their
         `steady` runs, until their cranks pass the angles of their events."""
         targets, longest, ends = [], [], []
@@ -385,12 +393,12 @@ def _fault(runs: Runs, k: int) -> RunFault | None:
     return RunFault(Cause.LEFT_BOUNDS, runs.end(k)) if runs.failed[k] else None
 
 
-def _turns(point: RunPoint, run: xr.Dataset) -> xr.Dataset:
+def _turns(point: RunPoint, run: Dataset) -> Dataset:
     """The whole turns of a point in steady running."""
     return whole_turns(point.rig.drive, run, point.rig.operation.run.turns)
 
 
-def _settles(point: RunPoint, run: xr.Dataset) -> bool:
+def _settles(point: RunPoint, run: Dataset) -> bool:
     """Whether a point is in steady running; a crank that makes no whole turn is not: it may creep up to a load, and
     turn on once it is past it."""
     drive = point.rig.drive

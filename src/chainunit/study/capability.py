@@ -9,6 +9,7 @@ drive, and analyses with their findings. Its section of the report and its comma
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -19,18 +20,46 @@ from .file_section import FileSection
 if TYPE_CHECKING:
     from ..machines.machine import Machine
     from .analysis import Analysis
-    from .config import Config
-    from .file_reading import FileReading
+    from .config import Config, FileReading
+    from .cycle import Cycle
+    from .drive import Drive
     from .rules import Rule
+
+
+class PartBeside(ABC):
+    """A part of the system beside the line."""
+
+    @abstractmethod
+    def beside(self, drive: Drive, feed: Any, turn: Cycle) -> Drive:
+        """The drive with the part; the machine has this `feed` and `turn` in normal running."""
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Estimated numbers of a study: their `values` by full name, the `covariance` of their errors in this order,
+    shape (numbers, numbers), and the name of the `file` that holds both, beside the study file."""
+
+    values: Mapping[str, float]
+    covariance: Any
+    file: str
+
+
+class EstimateUser(ABC):
+    """A use of numbers that are estimated."""
+
+    @abstractmethod
+    def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
+        """Write into the `tables` of the study file with the estimated numbers what follows from their errors."""
 
 
 @dataclass(frozen=True)
 class FileReference:
-    """The name of a file in a table of a study file: its full `key`, and the `table` in which it stands by `name`."""
+    """The name of a file in a study file: its full `key`, and the `table` or list in which it stands by `name` or
+    number."""
 
     key: str
-    table: dict[str, Any]
-    name: str
+    table: Any
+    name: str | int
     is_recording: bool = True
     """whether it is a recording, which has to be there"""
 

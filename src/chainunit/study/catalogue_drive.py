@@ -18,7 +18,7 @@ from ..drives.nameplate import Nameplate
 from ..machines.machine import Machine
 from .cycle import Cycle
 from .drive import Drive
-from .drive_tables import DriveTables
+from .operation import DriveTables
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""

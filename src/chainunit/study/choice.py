@@ -13,12 +13,12 @@ from ..core.files import scratch
 from ..drives.catalogue import check_own
 from ..fmu.backends import Backend
 from ..work.progress import TaskProgress, quiet
+from .capability import PartBeside
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
-from .drive_tables import DriveTables
 from .motor_sources import MotorSource
-from .plans import PartBeside
+from .operation import DriveTables
 from .proposal import DriveProposal, motor_choice
 from .registry import parts_of_line
 
@@ -33,12 +33,10 @@ class Choice:
     proposal: DriveProposal | None = None
 
 
-def choose(
-    config: Config, folder: Path, progress: TaskProgress = quiet, backend: Backend | None = None
-) -> Choice:
+def choose(config: Config, folder: Path, progress: TaskProgress = quiet) -> Choice:
     """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
     turn = cycle(config.machine, config.run.crank_speed, config.feed)
-    return choose_for(turn, config, folder, progress, backend)
+    return choose_for(turn, config, folder, progress)
 
 
 def drive_of(config: Config) -> Drive:

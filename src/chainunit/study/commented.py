@@ -15,12 +15,13 @@ from .schema import FILE
 
 _OF_OTHERS = ("motor_names.", "machine_names.", "motor_parameters")
 """Prefixes of keys for foreign FMUs, which an example does not have."""
+_MACHINE = "ChamberForces"
 _COLUMN = 34
 """The column at which comments begin, if the line is not longer."""
 
 
-def commented(text: str, machine: str = "ChamberForces") -> str:
-    """The study file `text` of that machine, with a comment from the declarations on each line that has none.
+def commented(text: str) -> str:
+    """The study file `text` of a chain unit, with a comment from the declarations on each line that has none.
     The keys that it leaves out follow as comments at the end of each table, the tables that it leaves out at
     the end of the file."""
     lines = text.splitlines()
@@ -30,20 +31,20 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
     below: dict[int, list[str]] = {}
     for table, group in groupby(settings, key=lambda statement: statement.table):
         table_statements = [*group]
-        keys = {f"{table}.{key.name}".lstrip("."): key for key in _keys(table, machine, types)}
+        keys = {f"{table}.{key.name}".lstrip("."): key for key in _keys(table, types)}
         for statement in table_statements:
             _comment(lines, statement, keys)
         below[table_statements[-1].last] = [_line(key) for name, key in keys.items() if name not in names]
     result = [f"#:schema {FILE}"]
     for number, line in enumerate(lines, 1):
         result += [line, *below.get(number, [])]
-    for absent in _absent({statement.table.split(".")[0] for statement in settings}, machine):
+    for absent in _absent({statement.table.split(".")[0] for statement in settings}):
         title = f"{absent.title}: {absent.of}" if absent.of else absent.title
         result += ["", f"{f'# {absent.bracketed}':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
     return "\n".join(result) + "\n"
 
 
-def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
+def _keys(table: str, types: list[str]) -> Iterator[Key]:
     """The keys of a table of the file; of an event, those of its type."""
     name, _, number = table.partition(".")
     begins = {
@@ -51,19 +52,19 @@ def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
         for table_name in entry_tables()
     }
     name = next((table_name for table_name, begin in begins.items() if table.startswith(begin)), name)
-    model = types[int(number) - 1] if name == "event" else machine
+    model = types[int(number) - 1] if name == "event" else _MACHINE
     for key_table in key_tables():
         if key_table.name == name and key_table.of in ("", model):
             yield from (key for key in key_table.keys if not key.name.startswith(_OF_OTHERS))
 
 
-def _absent(present: set[str], machine: str) -> Iterable[KeyTable]:
+def _absent(present: set[str]) -> Iterable[KeyTable]:
     return (
         key_table
         for key_table in key_tables()
         if key_table.name
         and key_table.name.removesuffix(f".{NAME}") not in {*present, "event"}
-        and key_table.of in ("", machine, *MOTORS)
+        and key_table.of in ("", _MACHINE, *MOTORS)
     )
 
 

@@ -33,16 +33,22 @@ from ..reading.tables import (
 )
 from ..reading.text import DEFAULT_UNITS, Units, chosen_units
 from ..reading.toml_lines import lines_of
-from .checks import check_order
-from .drive_tables import DriveTables
+from .checks import (
+    check_order,
+    check_values,
+    endless,
+    independent,
+    loads_beyond,
+    missing_recordings,
+    plate_of,
+    without,
+)
 from .event import Event
 from .event_table import read_events
-from .file_reading import FileReading
 from .file_section import FileSection
-from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
-from .operation import OperatingConditions
+from .operation import DriveTables, OperatingConditions
 from .parts import (
     Parts,
     beside,
@@ -55,7 +61,6 @@ from .parts import (
 )
 from .proposal import DriveRequest, motor_choice
 from .registry import organ_models, registered
-from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
     Run,
@@ -112,6 +117,26 @@ class FileContents:
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""
         return any(name.startswith(f"{section}.") for name in self.given)
+
+
+@dataclasses.dataclass(frozen=True)
+class FileReading:
+    """A study file each of whose values is allowed, on the way to its `Config`."""
+
+    data: Mapping[str, Any]
+    """tables and keys as the file has them"""
+    form: Any
+    """its checked form, completed by the example"""
+    parts: Parts
+    values: Mapping[str, Any]
+    """by table, its declared quantities, completed by their start values"""
+    given: Mapping[str, Mapping[str, float]]
+    """by table, the quantities that file and example give"""
+    machine: Machine | None
+    """None for a machine that was refused"""
+    events: Mapping[str, Event]
+    source: str
+    """name of the file; paths in it are relative to it"""
 
 
 @briefly_shown
@@ -273,7 +298,7 @@ def _of_tables(data: Mapping[str, Any], source: str) -> Config:
     try:
         _of_values(without(data, faults), parts, source)
     except InputError as error:
-        faults += independent(error.faults, faults, parts)
+        faults += independent(error.faults, faults)
     raise InputError.joined(faults)
 
 
@@ -481,21 +506,19 @@ def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str,
     try:
         return make(parts.machine, parameters)
     except InputError as error:
+        model, spoil = parts.machine, dict[str, str]()
         names = error.names if isinstance(error, GeometryError) else ()
-        model = parts.machine
-        spoil = {}
         if isinstance(error, GeometryError):
             spoil = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
         # the value that spoils the machine, and not one whose range that value sets
         key = next((f"machine.{name}" for name in (*spoil, *names) if name in parameters), "machine")
-        ranges = f"; with all other values as they are, {', or '.join(spoil.values())}" if spoil else ""
-        line = f"machine: {error}{_taken_over(error, model, parameters)}{ranges}"
+        declared = Layout(model.Parameters).by_name(model.Parameters())
+        taken = (
+            f"{name} = {declared[name]:g}" for name in names if name in declared and name not in parameters
+        )
+        line = f"machine: {error}"
+        if listed := ", ".join(taken):
+            line += f"; not in the file, so at the declared start value: {listed}"
+        if spoil:
+            line += f"; with all other values as they are, {', or '.join(spoil.values())}"
         raise InputError(line, key=key) from error
-
-
-def _taken_over(error: InputError, machine: MachineModel, parameters: Mapping[str, float]) -> str:
-    """Words to follow a refusal: the lengths behind it that neither file nor example give."""
-    names = error.names if isinstance(error, GeometryError) else ()
-    declared = Layout(machine.Parameters).by_name(machine.Parameters())
-    taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in parameters]
-    return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""

@@ -1,4 +1,5 @@
-"""One crank turn at constant speed: the torque that the machine needs, by inverse dynamics."""
+"""Crank turns at constant speed: the torque that the machine needs, by inverse dynamics, in each of its load
+cases."""
 
 from __future__ import annotations
 
@@ -8,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..core.quantities import Layout
+from ..machines.api import EMPTY
+from ..machines.chain_unit import Feed, SideLoads, SideName
 from ..machines.machine import Machine
 
 
@@ -56,3 +60,43 @@ def needed_inertia(swing: float, speed: float, fluctuation: float, there: float 
     = dE/(fluctuation w^2).
     """
     return max(0.0, swing / (fluctuation * speed * speed) - there)
+
+
+def all_on_one(side: SideName, feed: Feed) -> Feed:
+    """The feed with which the organ of `side` has the load of both organs."""
+    left, right = feed.left, feed.right
+    whole = SideLoads(
+        material_mass=left.material_mass + right.material_mass,
+        processing_force=left.processing_force + right.processing_force,
+    )
+    return Feed(left=whole, right=EMPTY) if side == "left" else Feed(left=EMPTY, right=whole)
+
+
+def without(side: SideName, feed: Feed) -> Feed:
+    """The feed with the organ of that side empty."""
+    return Feed(left=feed.left, right=EMPTY) if side == "right" else Feed(left=EMPTY, right=feed.right)
+
+
+def one_sided_feeds(feed: Feed) -> dict[str, Feed]:
+    """The feed of both sides and the one-sided feeds, by the name of the case."""
+    return {
+        "both sides": feed,
+        "right side empty": without("right", feed),
+        "left side empty": without("left", feed),
+        "all feed on the left": all_on_one("left", feed),
+        "all feed on the right": all_on_one("right", feed),
+    }
+
+
+def no_feed(feed: Any) -> Any:
+    """A feed of the same kind without material; a quantity that cannot be zero has its start value."""
+    layout = Layout(type(feed))
+    return layout.instance([0.0 if v.quantity.admits(0.0) else v.quantity.start for v in layout.variables])
+
+
+def turns_by_load(machine: Machine, crank_speed: float, feed: Any) -> dict[str, Cycle]:
+    """The turns of a machine at that speed of its crank [rad/s], by load case: normal running with this `feed`, and
+    the one-sided cases, or that without feed."""
+    sided = bool(machine.model.sides)
+    feeds = one_sided_feeds(feed) if sided else {"normal running": feed, "without feed": no_feed(feed)}
+    return {name: cycle(machine, crank_speed, load) for name, load in feeds.items()}

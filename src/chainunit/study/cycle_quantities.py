@@ -17,7 +17,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +27,7 @@ from ..core.errors import InputError, near_name, shown
 from ..core.model import Model
 from ..core.quantities import Value, declaration, quantity
 from ..machines.machine import Machine
-
-if TYPE_CHECKING:
-    import xarray as xr
+from .arrays import Dataset
 
 ANGLES = 720
 """Number of crank angles at which a quantity is computed."""
@@ -171,7 +169,7 @@ def evaluate(
     basis: CycleBasis | None = None,
     angles: int = ANGLES,
     **options: Any,
-) -> xr.Dataset:
+) -> Dataset:
     """Quantities of a turn for one machine, or for arrays of machines.
 
     Parameters

@@ -9,8 +9,8 @@ inputs its system does not have.
 
 from __future__ import annotations
 
-import copyreg
 import math
+import re
 from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -42,21 +42,10 @@ class Role(StrEnum):
     """the event passes by itself: a coupling should stay shut in it"""
 
 
+LONGEST_USUAL = 36
+"""Letters of the usual name of a run."""
 TYPES: dict[str, type[Event]] = {}
 """The types of events, by the names that a study file uses."""
-
-
-class EventType(type):
-    """The type of all types of events."""
-
-
-def _reduced(event_type: Any) -> str | tuple[Any, tuple[Any, ...]]:
-    """A type of event as pickle stores it: by its name, or by the call that makes it."""
-    maker = vars(event_type).get("maker")
-    return event_type.__qualname__ if maker is None else maker
-
-
-copyreg.pickle(EventType, _reduced)
 
 
 @declaration
@@ -74,11 +63,12 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Event(metaclass=EventType):
+class Event:
     """An event with its quantities `p`, which is followed by the run `name`; `side` is empty for an event
     without a side.
 
-    In the texts of a type ``{side}`` stands for that side and ``{other}`` for the opposite side.
+    In the texts of a type ``{side}`` stands for that side, ``{other}`` for the opposite side, and ``{input}`` for the
+    input that the study file names.
     """
 
     kind: ClassVar[str] = ""
@@ -103,12 +93,14 @@ class Event(metaclass=EventType):
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """range of each quantity that random overloads draw, if the study file gives none: from, to"""
     has_input: ClassVar[bool] = False
-    """whether the study file names the input that the event changes, see `of_input`"""
+    """whether the study file names the input that the event changes"""
     Parameters: ClassVar[type] = Timing
 
     name: str
     side: AnySide
     p: Any
+    input: str = ""
+    """the input that the study file names"""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -116,19 +108,20 @@ class Event(metaclass=EventType):
             TYPES[cls.kind] = cls
 
     @classmethod
-    def on(cls, side: AnySide = "", p: Any = None, name: str = "") -> Event:
+    def on(cls, side: AnySide = "", p: Any = None, name: str = "", input_name: str = "") -> Event:
         """The event on that side, with the quantities `p` or, without them, the default quantities."""
-        return cls(name or on_side(cls.run, side), side, cls.Parameters() if p is None else p)
+        p = cls.Parameters() if p is None else p
+        return cls(name or cls.usual_name(side, input_name), side, p, input_name)
 
     @classmethod
-    def of_input(cls, name: str) -> type[Event]:
-        """The type of event for an input of the machine or the motor, by its name."""
-        return cls
+    def usual_name(cls, side: AnySide, input_name: str = "") -> str:
+        """The name of the run, if the study file gives none."""
+        return filled(cls.run, side, re.sub(r"[^a-z0-9]+", "_", input_name.lower()))[:LONGEST_USUAL]
 
-    @classmethod
-    def inputs(cls, side: AnySide) -> tuple[str, ...]:
-        """The inputs that the event changes on that side."""
-        return tuple(on_side(name, side) for name in cls.acts_on)
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The inputs that the event changes."""
+        return tuple(filled(name, self.side, self.input) for name in self.acts_on)
 
     def fault(self, normal: Values) -> str:
         """The reason, in words, why the event changes nothing with these `normal` values; empty where it does."""
@@ -138,18 +131,18 @@ class Event(metaclass=EventType):
     def _mark(self) -> str:
         """The name of the run, where side and type alone do not distinguish the event from others; else
         empty."""
-        usual = on_side(self.run, self.side)
+        usual = self.usual_name(self.side, self.input)
         return "" if self.name == usual else self.name.removeprefix(f"{usual}_").replace("_", " ")
 
     @property
     def title(self) -> str:
         """The event as a clause of a sentence."""
-        return on_side(self.words, self.side) + (f" ({self._mark})" if self._mark else "")
+        return filled(self.words, self.side, self.input) + (f" ({self._mark})" if self._mark else "")
 
     @property
     def short(self) -> str:
         """The event as the heading of a narrow column."""
-        return " ".join(filter(None, (on_side(self.heading, self.side), self._mark)))
+        return " ".join(filter(None, (filled(self.heading, self.side, self.input), self._mark)))
 
     @property
     def loaded_side(self) -> AnySide:
@@ -164,7 +157,7 @@ class Event(metaclass=EventType):
     @property
     def without(self) -> str:
         """The reason, in words, why a system without the inputs of the event leaves the event out."""
-        return f"the system has no {' or '.join(self.inputs(self.side))}"
+        return f"the system has no {' or '.join(self.inputs)}"
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """Values of the inputs that the event changes, from its `begin` [s] on.
@@ -209,9 +202,9 @@ def angle_of_begin(event: Event, angle: float) -> float:
     return float(angle + ahead + (2.0 * math.pi if ahead < 0.25 * math.pi else 0.0))
 
 
-def on_side(text: str, side: AnySide) -> str:
-    """The text with this side and the opposite side in place of ``{side}`` and ``{other}``."""
-    return text.format(side=side, other=other(side)) if side else text
+def filled(text: str, side: AnySide, input_name: str = "") -> str:
+    """The text with this side, the opposite side and this input in place of ``{side}``, ``{other}``, ``{input}``."""
+    return text.format(side=side, other=other(side) if side else "", input=input_name)
 
 
 def in_groups(events: Mapping[str, Event], names: Collection[str]) -> list[list[str]]:

@@ -29,7 +29,7 @@ from ..machines.chain_unit import SIDES
 from ..mechanism.models import MachineModel
 from ..reading.lists import Entry, read_entries
 from ..reading.tables import given_values, instance, read_table, schema
-from .event import TYPES, AnySide, Event, on_side
+from .event import TYPES, AnySide, Event, filled
 from .events import Jam
 
 if TYPE_CHECKING:
@@ -64,18 +64,19 @@ def read_events(tables: Sequence[Any], machine: MachineModel | None = None) -> d
     def read(entry: Entry, number: int) -> None:
         event_type = _type(entry)
         entry.title += f" ({event_type.kind})"
-        event_type, side = _with_input(event_type, entry), _side(event_type, entry)
+        input_name, side = _input(event_type, entry), _side(event_type, entry)
         if "side" not in entry.given and event_type.has_side:
             if machine is None or machine.sides:
                 entry.fault("side", 'must be given, "left" or "right"')
             else:
                 line = f"{entry.title}: the {machine.name} has no sides; {inputs_of(machine)}"
                 entry.add([InputError(line, entry.place)])
-        usual = event_type.on(side).name if side or not event_type.has_side else event_type.kind
+        usual = event_type.kind
+        if side or not event_type.has_side:
+            usual = event_type.usual_name(side, input_name)
         name = _name(entry, usual, events)
-        events[name] = event_type.on(
-            side, _parameters(event_type, entry.given, f"event.{name}.", f"{entry.place}."), name
-        )
+        p = _parameters(event_type, entry.given, f"event.{name}.", f"{entry.place}.")
+        events[name] = event_type.on(side, p, name, input_name)
 
     read_entries(enumerate(tables, 1), "event", faults, read, "event")
     faults.refuse()
@@ -91,13 +92,21 @@ class RandomEvent:
     side: AnySide
     p: Any
     ranges: Mapping[str, tuple[float, float]]
+    input: str = ""
 
     @property
     def title(self) -> str:
         """The event as a clause of a sentence."""
         if self.side or not self.of.has_side:
-            return on_side(self.of.words, self.side)
+            return filled(self.of.words, self.side, self.input)
         return self.of.words.format(side="left or the right", other="right or the left")
+
+    @property
+    def heading(self) -> str:
+        """The event in two or three words."""
+        if self.side or not self.of.has_side:
+            return filled(self.of.heading, self.side, self.input)
+        return self.of.heading.format(side="left or right", other="right or left")
 
     def draw(self, random: np.random.Generator) -> dict[str, float]:
         """Values of the drawn quantities, uniformly distributed over their ranges."""
@@ -105,7 +114,7 @@ class RandomEvent:
 
     def event(self, side: AnySide, values: Mapping[str, float]) -> Event:
         """The event on that side, with these `values` of the drawn quantities."""
-        return self.of.on(side, replace(self.p, **values))
+        return self.of.on(side, replace(self.p, **values), input_name=self.input)
 
     def hardest(self) -> list[Event]:
         """The event on each possible side, with every drawn quantity at the upper end of its range."""
@@ -115,7 +124,7 @@ class RandomEvent:
     def identity(self) -> dict[str, Any]:
         """All values on which a drawn event depends."""
         fixed = Layout(type(self.p)).by_name(self.p)
-        input_entry = {"input": self.of.acts_on[0]} if self.of.has_input else {}
+        input_entry = {"input": self.input} if self.input else {}
         return {
             "type": self.of.kind,
             **input_entry,
@@ -172,7 +181,8 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
         see `read_events`.
     """
     entry = Entry(where, {"type": Jam.kind, **table})
-    event_type = _with_input(_type(entry), entry)
+    event_type = _type(entry)
+    input_name = _input(event_type, entry)
     if event_type.from_rest:
         entry.wrong("type", event_type.kind, "must be an event in steady running")
         entry.refuse()
@@ -190,7 +200,7 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
         fixed = {name: value for name, value in table.items() if name not in drawn}
         p = _parameters(event_type, fixed, f"{where}.")
     entry.refuse()
-    return RandomEvent(event_type, side, p, ordered)
+    return RandomEvent(event_type, side, p, ordered, input_name)
 
 
 def _range(entry: Entry, variable: Variable) -> tuple[float, float]:
@@ -213,18 +223,18 @@ def _type(entry: Entry) -> type[Event]:
     return event_type
 
 
-def _with_input(event_type: type[Event], entry: Entry) -> type[Event]:
-    """The type for the input that the table names."""
+def _input(event_type: type[Event], entry: Entry) -> str:
+    """The input that the table names; empty, with a fault, for a wrong one."""
     name = entry.given.get("input")
     if event_type.has_input and isinstance(name, str) and name:
-        return event_type.of_input(name)
+        return name
     if event_type.has_input and name is None:
         entry.fault("input", "must be given, the name of an input, as [feed] has it")
     elif event_type.has_input:
         entry.wrong("input", name, "must be the name of an input, as [feed] has it")
     elif name is not None:
         entry.fault("input", "this event has none; leave it out")
-    return event_type
+    return ""
 
 
 def _side(event_type: type[Event], entry: Entry) -> AnySide:

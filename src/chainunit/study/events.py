@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from typing import Any, ClassVar
 
 from ..core.quantities import Value, declaration, quantity
@@ -14,24 +12,52 @@ from ..drives.contactor import CONTACTOR_EDGE
 from ..machines.chain_unit import SideName, other
 from ..reading.text import number
 from ..system.signals import Profile
-from .event import AnySide, Event, EventType, Role, Signals, Timing, Values, on_side
+from .event import AnySide, Event, Role, Signals, Timing, Values, filled
 
 
-def _pulses(normal: float, height: float, begins: list[float], rise: float, hold: float) -> Profile:
-    changes = [
-        change
-        for begin in begins
-        for change in ((begin, rise, normal + height), (begin + rise + hold, rise, normal))
-    ]
-    return Profile(normal, tuple(changes))
+def _duration(description: str, default: float, least: float = 1e-4, usual: float = 1e-3) -> Any:
+    """The declaration of the time for which an event lasts [s]; `usual` is the least usual one."""
+    return quantity("s", description, default=default, min=least, max=1e4, usual=(usual, 60.0))
 
 
-class Jam(Event):
+def _rise(what: str, default: float) -> Any:
+    """The declaration of the time in which an input rises and falls [s]."""
+    return quantity(
+        "s", f"time in which {what} rises and falls", default=default, min=1e-4, max=1e4, usual=(1e-4, 60.0)
+    )
+
+
+def _spell(usual: float, other_value: float, begin: float, edge: float, duration: float) -> Profile:
+    """An input that has another value for a while, with both changes in the time `edge` [s]."""
+    return Profile(usual, ((begin, edge, other_value), (begin + duration, edge, usual)))
+
+
+class _Pulses(Event):
+    """An event in which an input rises for a while, once or several times."""
+
+    role = Role.SHOCK
+
+    def _height(self, usual: float) -> Any:
+        """The rise of the input over its `usual` value."""
+        raise NotImplementedError
+
+    def _begins(self, begin: float) -> list[float]:
+        return [begin]
+
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
+        """The pulses, added to the input of normal running."""
+        (name,), p, changes = self.inputs, self.p, list[tuple[float, float, float]]()
+        usual = normal[name]
+        for pulse in self._begins(begin):
+            changes += _spell(usual, usual + self._height(usual), pulse, p.rise, p.rise + p.duration).changes
+        return {name: Profile(usual, tuple(changes))}
+
+
+class Jam(_Pulses):
     """A lump jams an organ."""
 
     kind, run = "jam", "jam_{side}"
     words, heading = "a lump jams the {side} side", "jam {side}"
-    role = Role.SHOCK
     acts_on = ("{side}.processing_force",)
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (1000.0, 3000.0)}
 
@@ -40,25 +66,11 @@ class Jam(Event):
         """Quantities of a lump."""
 
         force: Value = quantity("N", "processing force of the lump", default=2000.0, min=0.0)
-        duration: Value = quantity(
-            "s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4, usual=(1e-3, 60.0)
-        )
-        rise: Value = quantity(
-            "s",
-            "time in which the force rises and falls",
-            default=0.02,
-            min=1e-4,
-            max=1e4,
-            usual=(1e-4, 60.0),
-        )
+        duration: Value = _duration("time for which the lump holds", 0.3)
+        rise: Value = _rise("the force", 0.02)
 
-    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
-        """The force on the web, added to that of normal running."""
-        (name,), p = self.inputs(self.side), self.p
-        return {name: _pulses(normal[name], p.force, self._begins(begin), p.rise, p.duration)}
-
-    def _begins(self, begin: float) -> list[float]:
-        return [begin]
+    def _height(self, usual: float) -> Any:
+        return self.p.force
 
 
 class Lumps(Jam):
@@ -72,16 +84,11 @@ class Lumps(Jam):
         """Quantities of the lumps, which are all alike."""
 
         number: Value = quantity("1", "number of lumps", default=4, min=1, max=1000, type="Integer")
-        pause: Value = quantity(
-            "s", "time between two lumps", default=0.4, min=1e-3, max=1e4, usual=(1e-3, 60.0)
-        )
-
-    @property
-    def _period(self) -> Any:
-        return 2.0 * self.p.rise + self.p.duration + self.p.pause
+        pause: Value = _duration("time between two lumps", 0.4, least=1e-3)
 
     def _begins(self, begin: float) -> list[float]:
-        return [begin + k * self._period for k in range(int(self.p.number))]
+        period = 2.0 * self.p.rise + self.p.duration + self.p.pause
+        return [begin + k * period for k in range(int(self.p.number))]
 
 
 _LOADS = ("material_mass", "processing_force")
@@ -91,14 +98,7 @@ _LOADS = ("material_mass", "processing_force")
 class FeedShift:
     """How fast material moves."""
 
-    shift: Value = quantity(
-        "s",
-        "time in which material leaves or changes sides",
-        default=0.3,
-        min=1e-4,
-        max=1e4,
-        usual=(1e-3, 60.0),
-    )
+    shift: Value = _duration("time in which material leaves or changes sides", 0.3)
 
 
 @declaration
@@ -134,7 +134,7 @@ class Empties(Event):
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The material and the processing force of the side fall to zero."""
-        return {name: Profile(normal[name], ((begin, self.p.shift, 0.0),)) for name in self.inputs(self.side)}
+        return {name: Profile(normal[name], ((begin, self.p.shift, 0.0),)) for name in self.inputs}
 
 
 class OneSidedFeed(Event):
@@ -158,7 +158,7 @@ class OneSidedFeed(Event):
         """The inputs of both sides after the feed has moved."""
         ends, share = {}, self.p.share
         for load in _LOADS:
-            here, there = (on_side(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
+            here, there = (filled(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
             ends[there] = (1.0 - share) * normal[there]
             ends[here] = normal[here] + share * normal[there]
         return ends
@@ -272,9 +272,7 @@ class Dip(Event):
         depth: Value = quantity(
             "1", "share of the voltage that the dip takes away", default=0.5, min=0.0, max=1.0
         )
-        duration: Value = quantity(
-            "s", "time for which the voltage is down", default=0.3, min=1e-3, max=1e4, usual=(1e-3, 60.0)
-        )
+        duration: Value = _duration("time for which the voltage is down", 0.3, least=1e-3)
 
     @property
     def without(self) -> str:
@@ -283,10 +281,8 @@ class Dip(Event):
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The voltage falls and comes back within a millisecond."""
-        edge = 1e-3
-        whole = normal["voltage"]
-        low = (begin, edge, (1.0 - self.p.depth) * whole)
-        return {"voltage": Profile(whole, (low, (begin + self.p.duration, edge, whole)))}
+        whole, p = normal["voltage"], self.p
+        return {"voltage": _spell(whole, (1.0 - p.depth) * whole, begin, 1e-3, p.duration)}
 
 
 class Interruption(Event):
@@ -301,13 +297,11 @@ class Interruption(Event):
     class Parameters(Timing):
         """Quantities of the interruption."""
 
-        duration: Value = quantity(
-            "s",
+        duration: Value = _duration(
             "time for which the contactor is open; at its end it closes on the field of the motor",
-            default=0.1,
-            min=CONTACTOR_EDGE,
-            max=1e4,
-            usual=(5e-3, 60.0),
+            0.1,
+            CONTACTOR_EDGE,
+            5e-3,
         )
 
     @property
@@ -318,9 +312,7 @@ class Interruption(Event):
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The contactor opens and closes."""
-        usual = normal["contactor"]
-        changes = ((begin, CONTACTOR_EDGE, 0.0), (begin + self.p.duration, CONTACTOR_EDGE, usual))
-        return {"contactor": Profile(usual, changes)}
+        return {"contactor": _spell(normal["contactor"], 0.0, begin, CONTACTOR_EDGE, self.p.duration)}
 
 
 class HardCut(Event):
@@ -343,17 +335,15 @@ class HardCut(Event):
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The resistance of the hard stack in place of the usual resistance; it changes within 10 ms."""
-        edge, usual = 1e-2, normal["cut_force"]
-        changes = ((begin, edge, self.p.force), (begin + self.p.duration, edge, usual))
-        return {"cut_force": Profile(usual, changes)}
+        return {"cut_force": _spell(normal["cut_force"], self.p.force, begin, 1e-2, self.p.duration)}
 
 
-class Overload(Event):
+class Overload(_Pulses):
     """The material brakes the machine more than usual."""
 
     kind, run = "overload", "overload"
     words, heading = "the load of the machine rises", "overload"
-    role, has_side = Role.SHOCK, False
+    has_side = False
     acts_on = ("load",)
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {"torque": (500.0, 2000.0)}
 
@@ -364,25 +354,20 @@ class Overload(Event):
         torque: Value = quantity(
             "N.m", "torque of the material beside that of normal running", default=500.0, min=0.0
         )
-        duration: Value = quantity(
-            "s", "time for which it lasts", default=0.5, min=1e-4, max=1e4, usual=(1e-3, 60.0)
-        )
-        rise: Value = quantity(
-            "s", "time in which it rises and falls", default=0.005, min=1e-4, max=1e4, usual=(1e-4, 60.0)
-        )
+        duration: Value = _duration("time for which it lasts", 0.5)
+        rise: Value = _rise("it", 0.005)
 
-    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
-        """The torque of the material, added to that of normal running."""
-        p = self.p
-        return {"load": _pulses(normal["load"], p.torque, [begin], p.rise, p.duration)}
+    def _height(self, usual: float) -> Any:
+        return self.p.torque
 
 
-class Surge(Event):
+class Surge(_Pulses):
     """An input of the machine, which the key ``input`` names, rises to a multiple for a while."""
 
-    kind, run = "surge", "surge"
-    words, heading = "an input of the machine rises", "surge"
-    role, has_side, has_input = Role.SHOCK, False, True
+    kind, run = "surge", "surge_{input}"
+    words, heading = "{input} rises", "surge of {input}"
+    has_side, has_input = False, True
+    acts_on = ("{input}",)
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {"factor": (1.5, 4.0)}
 
     @declaration
@@ -390,40 +375,15 @@ class Surge(Event):
         """Quantities of the surge."""
 
         factor: Value = quantity("1", "input over that of normal running", default=2.0, min=0.0, max=1e4)
-        duration: Value = quantity(
-            "s", "time for which it lasts", default=0.5, min=1e-4, max=1e4, usual=(1e-3, 60.0)
-        )
-        rise: Value = quantity(
-            "s", "time in which it rises and falls", default=0.02, min=1e-4, max=1e4, usual=(1e-4, 60.0)
-        )
-
-    @classmethod
-    def of_input(cls, name: str) -> type[Event]:
-        """The event that multiplies the input `name`."""
-        return _surge_of(name)
+        duration: Value = _duration("time for which it lasts", 0.5)
+        rise: Value = _rise("it", 0.02)
 
     def fault(self, normal: Values) -> str:
         """Why the event cannot act on the input; empty where it can."""
-        (name,) = self.acts_on
+        name = self.input
         return (
             "" if normal[name] else f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
         )
 
-    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
-        """The multiple of the input in place of that of normal running."""
-        p, (name,) = self.p, self.acts_on
-        return {name: _pulses(normal[name], (p.factor - 1.0) * normal[name], [begin], p.rise, p.duration)}
-
-
-@cache
-def _surge_of(name: str) -> type[Event]:
-    title = re.sub(r"[^a-z0-9]+", "_", name.lower())
-    members = {
-        "acts_on": (name,),
-        "run": f"surge_{title}"[:36],
-        "words": f"{name} rises",
-        "heading": f"surge of {name}",
-        "maker": (_surge_of, (name,)),
-    }
-    event_type: Any = EventType("SurgeOfInput", (Surge,), members)
-    return event_type
+    def _height(self, usual: float) -> Any:
+        return (self.p.factor - 1.0) * usual

@@ -1,16 +1,20 @@
-"""The given values of a study, by the sections of a study file: only values that the study uses."""
+"""The given values of a study, by the sections of a study file: only values that the study uses, each with its
+origin."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ..core.quantities import variables
 from ..reading.results import as_data
 from ..reading.text import entry
+from .catalogue_drive import BOOST, SLIP
 from .config import FileContents
 from .event_table import random_runs
+from .parts import LENGTHS
 from .record import StudyRecord
 from .rules import all_rules
 from .sections import SystemTable, all_choices, all_sections
@@ -79,7 +83,7 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
             for name, event in config.events.items()
         ),
         *_tables(study),
-        GivenSection("motor", "Motor", study.motor),
+        GivenSection("motor", "Motor", study.drive.parameters),
     ]
     return [section for section in sections if section.values is not None or section.choices]
 
@@ -105,8 +109,7 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():
         values = config.table(name)
-        is_idle = section.with_findings and name not in study.findings
-        if values is None or not section.is_used(config) or is_idle:
+        if values is None or not section.is_used(study):
             continue
         prefix = f"{name}."
         keys = {
@@ -116,12 +119,12 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.file.given else ())
         # the findings have the entries of a list of tables
-        choices = {key: x for key, x in keys.items() if x and key not in section.entries}
+        choices = {key: x for key, x in keys.items() if x and key not in section.lists.entries}
         yield GivenSection(name, section.title, values, choices, unused_names=follows)
         for key in events:
             random = randoms[f"{name}.{key}"]
             side = {"side": random.side} if random.side else {}
-            title = f"Overload at random: {random.of.heading}"
+            title = f"Overload at random: {random.heading}"
             yield GivenSection(
                 f"{name}.{key}", title, random.p, {"type": random.of.kind} | side, random.ranges
             )
@@ -140,3 +143,82 @@ def description(name: str) -> str:
         return str(section.keys[key][1].description)
     others = variables(section.form.instead) if section is not None and section.form.instead else ()
     return next((v.description for v in others if v.name == key), "")
+
+
+_CHOSEN = ("gear.efficiency", BOOST, SLIP)
+"""Values that follow from a proposed drive where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
+
+
+def origin_of(study: StudyRecord, name: str) -> str:
+    """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "linkage" (the
+    file of the machine), "example", "tuned", "catalogue" (by the motor that the file names), the name of a proposal,
+    or "declared"."""
+    config, (section, _, parameter) = study.config, name.partition(".")
+    if name in _CHOSEN and study.proposal is not None and _of(config.file, name) == "declared":
+        return study.proposal.name
+    if name == SLIP and config.drive.start == "inverter" and _of(config.file, name) == "declared":
+        return "catalogue"
+    if section == "motor" and (tuning := study.drive.tuning) and parameter in tuning.parameters:
+        return "file" if name in config.file.given else "tuned"
+    if section == "machine" and parameter in LENGTHS and config.file.gives("ratios"):
+        return "file"
+    if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.file.of_example:
+        return "example"
+    if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
+        name_in_file = _name_in_file(study, parameter)
+        if not name_in_file:
+            return "catalogue" if study.proposal is None else study.proposal.name
+        name = name_in_file
+    return _of(config.file, name)
+
+
+def place_of(study: StudyRecord, name: str) -> str:
+    """The file and the line that give the value of a quantity ("jaw.toml, line 23"); empty where no file does."""
+    file, origin = study.config.file, origin_of(study, name)
+    if origin == "file" and (line := file.lines.get(name)):
+        return f"{Path(file.source).name}, line {line}"
+    return f"{file.linkage}, line {_linkage_line(file, name)}" if origin == "linkage" else ""
+
+
+def _of(file: FileContents, name: str) -> str:
+    """The origin of a value that only a file or the example can give."""
+    if name in file.given:
+        return "file"
+    if _linkage_line(file, name):
+        return "linkage"
+    return "example" if name in file.of_example else "declared"
+
+
+def _linkage_line(file: FileContents, name: str) -> int:
+    """The line of the linkage file that gives the value of a quantity; 0 where it does not."""
+    table, _, key = name.partition(".")
+    # a link whose name has another meaning, too, has its kind in the name of its quantities
+    links = (f"links.{key}", f"links.{key.replace('_link.', '.', 1)}")
+    keys = {"feed": (f"inputs.{key}",), "machine": (_GRAVITY.get(key, key), f"parameters.{key}", *links)}
+    return next(
+        (file.linkage_lines[line_key] for line_key in keys.get(table, ()) if line_key in file.linkage_lines),
+        0,
+    )
+
+
+_GRAVITY = {"g": "gravity"}
+
+
+def _name_in_file(study: StudyRecord, parameter: str) -> str:
+    """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
+    config, proposal = study.config, study.proposal
+    if proposal is not None and parameter in proposal.keys:
+        return proposal.keys[parameter]
+    if parameter == "ratio":
+        return "gear.ratio" if _of(config.file, "gear.ratio") != "declared" else ""
+    group = parameter.partition(".")[0]
+    if parameter == "inverter.on":
+        return "start"
+    if parameter == "inverter.slip" and config.drive.start == "inverter" and SLIP not in config.file.given:
+        return ""
+    if parameter == "switching.preferred" and config.drive.start == "star-delta":
+        return "starter.star_delta.preferred"
+    if group in ("soft_start", "inverter"):
+        return f"starter.{parameter}"
+    is_own = parameter in ("phi_start", "w_start", "ambient.T") or group in ("solver", "switching")
+    return f"motor.{parameter}" if is_own else ""

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from ..core.quantities import quantity
 from ..reading.results import part, result
 from ..reading.text import number
-from . import verdict
 from .coupling import LESS_TORQUE
 from .event import Role
 from .limits import Check, given_motor, reaches
@@ -16,7 +15,7 @@ from .record import StudyRecord
 from .rig import worst_residual
 from .start_runs import longest_of
 from .starts import StartFindings
-from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
+from .verdict import RESIDUAL, START, STEADY, Holds, Verdict, balance_faults, shown_speed
 from .window import Phase
 
 
@@ -25,27 +24,26 @@ def model_verdict(study: StudyRecord) -> Verdict:
     config, answers = study.config, study.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
-    speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
+    speed, residuals = max(config.run.crank_speed, mean), _residuals(study.certificate)
+    if study.drive.machine.model.sides and not study.drive.foreign_machine:
+        verdict: Verdict = config.organs.verdict(study, speed, mean, residuals)
+        return verdict
+    faults = balance_faults(residuals)
     if study.drive.foreign_machine:
-        return verdict.foreign_machine(speed, residuals, actual=mean)
-    if not study.drive.machine.model.sides:
-        return verdict.rigid_links(speed, residuals, actual=mean, driver=study.driver_noun)
-    return config.organs.verdict(study, speed, mean, residuals)
+        return Verdict("energy balance", None, speed, faults, mean)
+    return Verdict("machine", "rigid links", speed, faults, mean, study.driver_noun)
 
 
 def wrong_runs(study: StudyRecord) -> list[str]:
     """The runs whose energy balance is not kept, so that their numbers count as wrong; start-up and steady running
     are one run."""
     # a balance of NaN is not kept either
-    return [name for name, residual in _residuals(study).items() if not residual < RESIDUAL]
+    return [name for name, residual in _residuals(study.certificate).items() if not residual < RESIDUAL]
 
 
-def _residuals(study: StudyRecord) -> dict[str, float]:
+def _residuals(certificate: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     """By run, the largest energy residual over the energy moved; start-up and steady running are one run."""
-    return {
-        STEADY if name == verdict.START else name: worst_residual(shares)
-        for name, shares in study.certificate.items()
-    }
+    return {STEADY if name == START else name: worst_residual(shares) for name, shares in certificate.items()}
 
 
 def motor_limits(study: StudyRecord) -> dict[str, Check]:
@@ -108,9 +106,9 @@ def lasts(study: StudyRecord) -> bool:
     return study.window(Phase.STEADY, study.steady).lasts
 
 
-def _no_judgement(study: StudyRecord, speed: str) -> str:
-    """Words on a motor that is not told as one that keeps the speed, though the mean `speed` is near: it does not
-    start from another angle, or its turns are not steady; empty where neither is so."""
+def _not_judged(study: StudyRecord, speed: str) -> str:
+    """Why a motor is not said to keep its speed though the mean `speed` is near: it does not start from another
+    angle, or its turns are not steady; empty where neither is so."""
     findings, driver = StartFindings.found_in(study), study.driver_noun
     if findings is not None and findings.stuck:
         where = " and ".join(number(start.angle, "rad") for start in findings.stuck)
@@ -146,76 +144,71 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
     does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
     another limit is exceeded, or no motor was found that suffices. The least reserve is given with its
     run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
-    steady, requested = study.answers.get(STEADY), study.config.run.crank_speed
+    steady = study.answers.get(STEADY)
     if steady is None:
         return None
-    keeps_speed, wrong = reaches(steady.speed_mean, requested), wrong_runs(study)
+    wrong = wrong_runs(study)
     left_out = [name for name in study.answers if name in wrong]
     reserves = {
-        name: a.torque_reserve
-        for name, a in study.answers.items()
-        if name not in left_out and a.torque_reserve is not None
+        name: answers.torque_reserve
+        for name, answers in study.answers.items()
+        if name not in left_out and answers.torque_reserve is not None
     }
     run = min(reserves, key=lambda name: float(reserves[name]), default=None)
     reserve = None if run is None else reserves[run]
-    speed = number(shown_speed(steady.speed_mean, requested), "rad/s", "speed", beside=False)
-    requested_text = number(requested, "rad/s", "speed", full=False, beside=False)
-    unjudged = _no_judgement(study, speed) if keeps_speed else ""
-    if unjudged:
-        text, keeps_speed = unjudged, False
-    elif keeps_speed:
-        text = f"The motor keeps the {study.driver_noun} at {speed}"
-        if speed != number(requested, "rad/s", "speed", beside=False):
-            share = number(steady.speed_mean / requested - 1.0, "1", "percent")
-            text += f", {'+' if steady.speed_mean > requested else ''}{share} of {requested_text}"
-    elif steady.speed_mean > requested:
-        text = (
-            f"The motor does NOT keep the speed: the {study.driver_noun} turns at {speed}, faster than the "
-            f"required {requested_text}"
-        )
-    else:
-        text = f"The motor does NOT reach the speed: {speed} in place of {requested_text}"
-    if study.insufficient:
-        assert study.proposal is not None
-        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the {study.proposal.name}"
     limits = {} if STEADY in left_out else motor_limits(study)
-    excesses = [
-        name for name, check in limits.items() if check.utilisation is None or check.utilisation > 1.0
-    ]
+    used = {name: check.utilisation for name, check in limits.items()}
+    excesses = [name for name, share in used.items() if share is None or share > 1.0]
+    stalls, (keeps_speed, text) = slowed(study), _on_speed(study, steady.speed_mean)
+    if study.proposal is not None and study.insufficient:
+        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the {study.proposal.name}"
     if excesses:
         link = ", but" if keeps_speed and not study.insufficient else ";"
         text += f"{link} {', '.join(_EXCESSES[name] for name in excesses)}"
-    if run is None:
-        text += "; its reserve of torque is not known"
-    elif reserve is not None and reserve >= 0.0:
-        text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.title_of(run)})"
-        if study.plate is not None and reserve < LESS_TORQUE:
-            weaker = number(LESS_TORQUE, "1", "percent")
-            text += f", less than the {weaker} by which IEC 60034-1 permits it to be weaker"
-    else:
-        bare = ", without the recommended torque limiter" if run in study.currents_until_trip else ""
-        text += f"; {no_reserve(run, reserves[run])} ({study.title_of(run)}{bare})"
-    if stalls := slowed(study):
-        dips = ", ".join(
-            f"{study.title_of(name)}: by {number(dip, '1', 'percent')}" for name, dip in stalls.items()
-        )
-        text += f"; its speed dips as in a stall ({dips})"
+    text += f"; {_on_reserve(study, run, reserve)}"
+    if stalls:
+        dips = (f"{study.title_of(name)}: by {number(dip, '1', 'percent')}" for name, dip in stalls.items())
+        text += f"; its speed dips as in a stall ({', '.join(dips)})"
     if left_out:
-        names = ", ".join(study.title_of(name) for name in left_out)
+        names = ", ".join(map(study.title_of, left_out))
         text += f"; runs whose energy balance is not kept are left out ({names})"
-    ample = AMPLE if study.plate is None else LESS_TORQUE
-    enough = (
-        reserve is not None and reserve >= ample and not stalls and not study.insufficient and not excesses
-    )
-    burns = not keeps_speed or "temperature" in excesses
-    holds: Holds = "false" if burns else "true" if enough else "in part"
-    return MotorVerdict(
-        holds,
-        f"{text}.",
-        steady.speed_mean,
-        requested,
-        reserve,
-        run,
-        left_out,
-        {name: check.utilisation for name, check in limits.items()},
-    )
+    is_ample = reserve is not None and reserve >= (AMPLE if study.plate is None else LESS_TORQUE)
+    holds: Holds = "true" if is_ample and not (stalls or study.insufficient or excesses) else "in part"
+    if not keeps_speed or "temperature" in excesses:
+        holds = "false"
+    asked = study.config.run.crank_speed
+    return MotorVerdict(holds, f"{text}.", steady.speed_mean, asked, reserve, run, left_out, used)
+
+
+def _on_speed(study: StudyRecord, mean: float) -> tuple[bool, str]:
+    """Whether the motor keeps the speed asked for, by the `mean` speed of steady running [rad/s], and the begin of
+    the sentence on it."""
+    asked, driver = study.config.run.crank_speed, study.driver_noun
+    speed = number(shown_speed(mean, asked), "rad/s", "speed", beside=False)
+    asked_words = number(asked, "rad/s", "speed", full=False, beside=False)
+    if not reaches(mean, asked) and mean > asked:
+        faster = f"the {driver} turns at {speed}, faster than the required {asked_words}"
+        return False, f"The motor does NOT keep the speed: {faster}"
+    if not reaches(mean, asked):
+        return False, f"The motor does NOT reach the speed: {speed} in place of {asked_words}"
+    if reason := _not_judged(study, speed):
+        return False, reason
+    text = f"The motor keeps the {driver} at {speed}"
+    if speed != number(asked, "rad/s", "speed", beside=False):
+        share = number(mean / asked - 1.0, "1", "percent")
+        text += f", {'+' if mean > asked else ''}{share} of {asked_words}"
+    return True, text
+
+
+def _on_reserve(study: StudyRecord, run: str | None, reserve: float | None) -> str:
+    """The clause on the least `reserve` of torque and its run."""
+    if run is None or reserve is None:
+        return "its reserve of torque is not known"
+    if not reserve >= 0.0:
+        bare = ", without the recommended torque limiter" if run in study.currents_until_trip else ""
+        return f"{no_reserve(run, reserve)} ({study.title_of(run)}{bare})"
+    text = f"least reserve of torque {number(reserve, '1', 'percent')} ({study.title_of(run)})"
+    if study.plate is not None and reserve < LESS_TORQUE:
+        weaker = number(LESS_TORQUE, "1", "percent")
+        text += f", less than the {weaker} by which IEC 60034-1 permits it to be weaker"
+    return text

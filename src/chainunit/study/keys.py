@@ -12,8 +12,6 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from pydantic.fields import FieldInfo
-
 from ..core.quantities import Layout, Variable, variables, written
 from ..core.units import shortest_text
 from ..drives.catalogue import KINDS as CATALOGUES
@@ -46,6 +44,9 @@ _VALUE = "a number, or a text with a unit"
 _TEXTS = "a text, or a list of texts"
 
 
+Sort = typing.Literal["number", "text", "texts", "switch", "list", "table", "value"]
+
+
 @dataclass(frozen=True)
 class Key:
     """A key of a file; `name` is its full name within its table (``crank.m``)."""
@@ -56,7 +57,7 @@ class Key:
     """the quantity of the key; None for a word, a switch or a list"""
     words: tuple[str, ...] = ()
     """the allowed values, as a file writes them; empty where any text is allowed"""
-    sort: typing.Literal["number", "text", "texts", "switch", "list", "table", "value"] = "number"
+    sort: Sort = "number"
     """a value is a number or a text with a unit, of a quantity that another key names"""
     left_out: str = ""
     """the value of a key that a file leaves out, as a file would write it; empty where there is none"""
@@ -124,9 +125,9 @@ def entry_tables() -> dict[str, TableList]:
     names the file chooses, by the name of the table that holds them and `NAME`."""
     table_lists: dict[str, TableList] = {}
     for table, section in all_sections().items():
-        table_lists |= {f"{table}.{key}": entry for key, entry in section.entries.items()}
-        if section.named is not None:
-            table_lists[f"{table}.{NAME}"] = section.named
+        table_lists |= {f"{table}.{key}": entry for key, entry in section.lists.entries.items()}
+        if section.lists.named is not None:
+            table_lists[f"{table}.{NAME}"] = section.lists.named
     return table_lists
 
 
@@ -156,7 +157,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         *(
             KeyTable(name, section.title, tuple(_of_section(name, section)))
             for name, section in all_sections().items()
-            if section.named is None
+            if section.lists.named is None
         ),
         *(KeyTable(name, entry.title, tuple(_of_entry(entry))) for name, entry in entry_tables().items()),
         KeyTable("report", "Report", tuple(_of_report())),
@@ -294,40 +295,40 @@ def _of_entry(entry: TableList) -> Iterator[Key]:
 def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = None) -> Iterator[Key]:
     """Keys that are no quantities, from their pydantic fields, with these `values` or their defaults."""
     for name, (annotation, field) in fields.items():
-        yield _of_field(name, annotation, field, field.default if values is None else values.get(name))
+        value = field.default if values is None else values.get(name)
+        base, limits = annotation, list[Any]()
+        while typing.get_origin(base) is typing.Annotated:
+            base, *inner = typing.get_args(base)
+            limits += inner
+        lengths = [limit.max_length for extra in limits for limit in getattr(extra, "metadata", ())]
+        sort = _sort(base)
+        left_out = f'"{value}"' if value and sort not in ("switch", "table") else ""
+        if sort == "switch" and value is not None:
+            left_out = "true" if value else "false"
+        yield Key(
+            name,
+            str(field.description),
+            words=_choices(base),
+            sort=sort,
+            left_out=left_out,
+            items=next((extra for extra in limits if isinstance(extra, Variable)), None),
+            most=max(lengths, default=0),
+        )
 
 
-def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
-    base, more = annotation, list[Any]()
-    while typing.get_origin(base) is typing.Annotated:
-        base, *inner = typing.get_args(base)
-        more += inner
-    items = next((extra for extra in more if isinstance(extra, Variable)), None)
-    lengths = [limit.max_length for extra in more for limit in getattr(extra, "metadata", ())]
-    choices: tuple[str, ...] = ()
-    sort: typing.Literal["text", "texts", "switch", "list", "table", "value"] = "text"
-    if base is Any:
-        sort = "value"
-    elif isinstance(base, types.UnionType):
-        sort = "texts"
-    elif typing.get_origin(base) is typing.Literal:
-        choices = tuple(f'"{word}"' for word in typing.get_args(base))
-    elif base is bool:
-        choices, sort = ("true", "false"), "switch"
-    elif typing.get_origin(base) in (list, dict):
-        sort = "list" if typing.get_origin(base) is list else "table"
-    shown = (
-        {True: "true", False: "false"}.get(value, "") if sort == "switch" else f'"{value}"' if value else ""
-    )
-    return Key(
-        name,
-        str(field.description),
-        words=choices,
-        sort=sort,
-        left_out=shown if sort != "table" else "",
-        items=items,
-        most=max(lengths, default=0),
-    )
+def _sort(annotation: Any) -> Sort:
+    """The sort of a key whose field has this annotation."""
+    if isinstance(annotation, types.UnionType):
+        return "texts"
+    sorts: dict[Any, Sort] = {Any: "value", bool: "switch", list: "list", dict: "table"}
+    return sorts.get(typing.get_origin(annotation) or annotation, "text")
+
+
+def _choices(annotation: Any) -> tuple[str, ...]:
+    """The values to choose from of a field with this annotation, as a file writes them."""
+    if typing.get_origin(annotation) is typing.Literal:
+        return tuple(f'"{word}"' for word in typing.get_args(annotation))
+    return ("true", "false") if annotation is bool else ()
 
 
 def _first_sentence(cls: type) -> str:

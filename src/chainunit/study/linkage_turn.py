@@ -1,26 +1,29 @@
-"""A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions. A
-driver that swings goes there and back.
+"""A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions;
+and these findings as data, the content of linkage.json. A driver that swings goes there and back.
 
 Extremes and means are taken over the whole way, not at the `PLACES` of the curves alone."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from .. import __version__
 from ..core.brief import briefly_shown
 from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
-from ..machines.equilibria import Equilibria
+from ..machines.equilibria import Equilibria, Equilibrium, Holding
+from ..machines.linkages.loads import loads_by_speed
 from ..machines.linkages.model import LinkageDescription
 from ..machines.machine import Machine
 from ..mechanism.assur import DYADS, PRISMATIC
 from ..mechanism.sampled_quantities import largest, means, roots
-from ..reading.tables import option_value
+from ..reading.results import InUnit, part, result
+from ..reading.tables import UnusualValue, option_value, slips_of
 
 PLACES = 361
 USUAL_SPEEDS = {"rad/s": "60 rpm", "m/s": "0.1 m/s"}
@@ -229,26 +232,21 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
     sought = [*moments, *(f"{name}.tau" for _, name in drivers)]
     groups = [", ".join(group.links) for group in description.structure.groups]
 
-    def sizes(q: Any) -> Any:
-        """All quantities of which the largest value counts, in the order of `names`."""
-        state, part_outputs = way.state(q)
-        bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
-        margins = [np.broadcast_to(np.abs(margin), q.shape) for margin in state.m.margins()]
-        forces = [
-            np.hypot(part_outputs[f"{joint}.fx"], part_outputs[f"{joint}.fy"]) for joint in joints.values()
-        ]
-        return np.array(
-            [np.abs(bias), inertia, -inertia, *(-margin for margin in margins), *forces,
-             *(np.abs(part_outputs[name]) for name in sought), *(part_outputs[name] for name in moving),
-             *(-part_outputs[name] for name in moving)]
-        )  # fmt: skip
+    def columns(q: Any) -> dict[str, Any]:
+        """By name, all quantities of which the largest value counts; with a minus those of which the least counts."""
+        state, x = way.state(q)
+        named = {"torque": np.abs(state.bias), "inertia": state.J, "-inertia": -state.J}
+        margins = zip(groups, state.m.margins(), strict=True)
+        named |= {f"-margin {name}": -np.abs(margin) for name, margin in margins}
+        named |= {
+            f"force {name}": np.hypot(x[f"{joint}.fx"], x[f"{joint}.fy"]) for name, joint in joints.items()
+        }
+        named |= {name: np.abs(x[name]) for name in sought}
+        named |= {name: x[name] for name in moving} | {f"-{name}": -x[name] for name in moving}
+        return {name: np.broadcast_to(column, q.shape) for name, column in named.items()}
 
-    names = [
-        "torque", "inertia", "-inertia", *(f"-margin {name}" for name in groups),
-        *(f"force {name}" for name in joints), *sought, *moving, *(f"-{name}" for name in moving),
-    ]  # fmt: skip
-    turns = machine.model.turns
-    places, values = largest(sizes, q, around=turns)
+    turns, names = machine.model.turns, [*columns(q[:1])]
+    places, values = largest(lambda q: np.array([*columns(q).values()]), q, around=turns)
     peak_places = {name: _folded(float(place), turns) for name, place in zip(names, places, strict=True)}
     top = dict(zip(names, map(float, values), strict=True))
 
@@ -311,15 +309,10 @@ def _means(
     variables, over the way of the driver from the begin to the end of its `span`."""
 
     def squares(q: Any) -> Any:
-        state, part_outputs = way.state(q)
+        state, outputs = way.state(q)
         bias = np.broadcast_to(state.bias, q.shape)
-        return np.array(
-            [
-                bias,
-                bias**2,
-                *(part_outputs[f"{joint}.fx"] ** 2 + part_outputs[f"{joint}.fy"] ** 2 for joint in joints),
-            ]
-        )
+        forces = (outputs[f"{joint}.fx"] ** 2 + outputs[f"{joint}.fy"] ** 2 for joint in joints)
+        return np.array([bias, bias**2, *forces])
 
     (mean, *mean_squares), (size, *_) = means(squares, *span)
     torque_rms, *forces_rms = map(math.sqrt, mean_squares)
@@ -333,19 +326,19 @@ def _motions(
     """The motion of each sliding joint besides the driver and of each link that swings, each with its name and with
     the places of the driver at which it turns back."""
     structure, turns = description.structure, way.machine.model.turns
-    parts = [
-        (name, Stroke, f"{description.variable('joint', name)}.s", f"{description.variable('joint', name)}.v")
+    moving: list[tuple[str, type[Stroke | Swing], str, str, str]] = [
+        (name, Stroke, "s", "v", description.variable("joint", name))
         for name, joint in structure.joints.items()
         if joint.kind == PRISMATIC and name != structure.driver.joint
-    ] + [
-        (
-            name,
-            Swing,
-            f"{description.variable('link', name)}.angle",
-            f"{description.variable('link', name)}.w",
-        )
+    ]
+    moving += [
+        (name, Swing, "angle", "w", description.variable("link", name))
         for name in structure.links
         if description.link_turns[name][0] == 0.0 or not turns
+    ]
+    parts = [
+        (name, kind, f"{variable}.{place}", f"{variable}.{rate}")
+        for name, kind, place, rate, variable in moving
     ]
     _, outputs = way.state(q)
     parts = [part for part in parts if np.ptp(outputs[part[2]]) > STANDS]
@@ -379,3 +372,139 @@ def _folded(q: float, turns: bool) -> float:
 def _plain(place: float) -> float:
     """A place [m] or an angle [rad]; 0 where it is rounding."""
     return 0.0 if abs(place) < _ROUNDING else float(place)
+
+
+@result
+class WayForces:
+    """Effort at the driver and reactions, in one direction of the driver."""
+
+    turn: LinkageTurn = part("effort and inertia at the driver")
+    joints: Mapping[str, JointTurn] = part("reactions, by joint")
+
+
+@result
+class WayBack:
+    """The way back of a driver that swings."""
+
+    forces: WayForces = part(inline=True)
+    over_the_way: Mapping[str, InUnit] = part("effort and inertia at each place of the driver")
+
+
+@result
+class LinkageAtRest:
+    """A linkage at rest."""
+
+    equilibria: tuple[Equilibrium, ...] = part("the equilibria in rising order")
+    summary: Holding = part("the effort that holds the driver")
+    indifferent: bool = part(
+        "whether the machine stays wherever it is, as no load has an effort at the driver"
+    )
+    repeats: bool = part("whether the loads of a driver that turns are the same again after a turn")
+    without_potential: Sequence[str] = part("loads without a potential of their own")
+    by_speed: Sequence[str] = part("loads that depend on the speed")
+    over_the_way: Mapping[str, InUnit] = part(
+        "holding effort, friction and potential at each place of the driver"
+    )
+
+
+@result
+class LinkageData:
+    """A linkage over the way of its driver, and at rest."""
+
+    chainunit: str = part("version of chainunit")
+    source: str = part("the linkage file")
+    title: str = part("title of the linkage")
+    sentence: str = part("its groups in one line", name="groups_in_words")
+    degrees_of_freedom: int = part("its degrees of freedom")
+    speed: InUnit = part("speed of the driver")
+    forces: WayForces = part(inline=True)
+    groups: Mapping[str, GroupTurn] = part("margins, by group")
+    strokes: Mapping[str, Stroke] = part("motion of each sliding joint")
+    swings: Mapping[str, Swing] = part("motion of each link that swings")
+    dead_centres: Mapping[str, InUnit] = part("places of the driver at which a joint or link turns back")
+    angles: Mapping[str, InUnit] = part("least and largest angle of each link")
+    points: Mapping[str, Mapping[str, InUnit]] = part("least and largest x and y of each point")
+    over_the_way: Mapping[str, InUnit] = part("effort and inertia at each place of the driver")
+    rest: LinkageAtRest = part("the linkage at rest")
+    back: WayBack | None = part("the way back of a driver that swings", optional=True)
+    drivers: Mapping[str, Mapping[str, InUnit]] | None = part(
+        "largest effort and mean power of each driver besides the first one", optional=True
+    )
+    drawn: list[str] = part("sentences on a linkage from a drawing of another program")
+    slips: list[str] = part("values of the file without a unit that are of an unusual size, in words")
+    notes: list[str] = part("values of the file of an unusual size, in words")
+
+
+def linkage_data(
+    f: LinkageFindings, source: str, unusual: Iterable[UnusualValue], remarks: Iterable[str] = ()
+) -> LinkageData:
+    """The findings on a linkage of the file `source`, which has these values of an unusual size, as data; with
+    `remarks` on a drawing."""
+    description, unit = f.description, f.machine.model.driver_port.unit
+
+    def limits(variable: str, limit_unit: str) -> InUnit:
+        return InUnit(f.limits[variable], limit_unit)
+
+    return LinkageData(
+        __version__,
+        source,
+        f.machine.model.description,
+        f.sentence,
+        1 + len(description.further.free),
+        InUnit(f.speed, unit("rad/s")),
+        WayForces(f.turn, f.joints),
+        f.groups,
+        f.strokes,
+        f.swings,
+        {name: InUnit(places, unit("rad")) for name, places in f.dead_centres.items()},
+        {
+            link: limits(f"{description.variable('link', link)}.angle", "rad")
+            for link in description.structure.links
+        },
+        {
+            f"{link}.{point}": {
+                axis: limits(f"{description.variable('link', link)}.{point}.{axis}", "m")
+                for axis in ("x", "y")
+            }
+            for link, entry in description.structure.links.items()
+            for point in entry.points
+        },
+        {"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
+        _at_rest(f),
+        WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
+        {
+            name: {
+                "peak": InUnit(turn.peak, "N" if turn.linear else "N.m"),
+                "power_mean": InUnit(turn.power_mean, "W"),
+            }
+            for name, turn in f.drivers.items()
+        }
+        or None,
+        [*remarks],
+        [str(value) for value in slips_of(tuple(unusual))],
+        [value.sentence for value in unusual if value.with_unit],
+    )
+
+
+def _over_the_way(f: LinkageFindings) -> dict[str, InUnit]:
+    unit = f.machine.model.driver_port.unit
+    return {name: InUnit(f.outputs[name], unit(rotary)) for name, rotary in (("tau", "N.m"), ("J", "kg.m2"))}
+
+
+def _at_rest(f: LinkageFindings) -> LinkageAtRest:
+    equilibria, unit = f.rest, f.machine.model.driver_port.unit
+    rest = equilibria.rest
+    columns: dict[str, Any] = {
+        "driver": InUnit(rest.q, unit("rad")),
+        "holding": InUnit(rest.holding, unit("N.m")),
+        "friction": InUnit(rest.friction, unit("N.m")),
+    }
+    return LinkageAtRest(
+        equilibria.places,
+        equilibria.summary,
+        equilibria.indifferent,
+        equilibria.repeats,
+        [name.removeprefix("loads.") for name in equilibria.driven],
+        loads_by_speed(f.description.data["loads"]),
+        columns if rest.potential is None else columns | {"potential": InUnit(rest.potential, "J")},
+    )

@@ -5,22 +5,26 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.quantities import Layout, Value, Variable, declaration, quantity
-from .arrays import peak
+from .arrays import Dataset, peak
 from .drive import AbsentError, Drive
 from .limits import reaches
-from .readings import crank_speed, crank_torque, largest_torque, shaft_power
-from .relay import TRIPS_AT, lasting_current, relay_trip
-from .stored import energy_gap, energy_held, stored_shares
+from .readings import (
+    crank_speed,
+    crank_torque,
+    energy_gap,
+    energy_held,
+    largest_torque,
+    shaft_power,
+    stored_shares,
+)
+from .relay import lasting_current, relay_trip
 from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 STARTED = 0.95
 """Share of the speed at which a start ends, see `time_to_start`."""
@@ -33,10 +37,10 @@ _EVENTS = frozenset({Phase.EVENT, Phase.LOADED_START})
 _AT_SPEED = frozenset({Phase.STEADY, Phase.EVENT})
 
 
-def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:
-    """Time [s] from which the speed stays below `share` of the `requested` speed until the end of the run;
-    None where it does not, or only in the last tenth of the run."""
-    below = np.abs(np.asarray(speed)) < share * requested
+def stall(time: Any, speed: Any, requested: float) -> float | None:
+    """Time [s] from which the speed stays below a tenth of the `requested` speed until the end of the run; None where
+    it does not, or only in the last tenth of the run."""
+    below = np.abs(np.asarray(speed)) < 0.1 * requested
     if not below[-1]:
         return None
     moving = np.flatnonzero(~below)
@@ -97,7 +101,7 @@ def _relay(w: Window) -> float | None:
         current = w.drive.relay_current(w.since, current)
     before = w.steady.rms(w.current)
     lasts = lasting_current(current, before if w.passes and _stall(w) is None else None)
-    return relay_trip(w.since, current, setting, before, lasts, w.relay_class, TRIPS_AT)
+    return relay_trip(w.since, current, setting, before, lasts, w.relay_class)
 
 
 def _stall(w: Window) -> float | None:
@@ -110,7 +114,7 @@ def _slack_time(w: Window) -> float | None:
     if "machine.left.slack_share" not in w.run:
         return None
 
-    def some_slack(drive: Drive, run: xr.Dataset) -> Any:
+    def some_slack(drive: Drive, run: Dataset) -> Any:
         shares = [run[f"machine.{side}.slack_share"].values for side in w.sides]
         return (np.max(shares, axis=0) > 0.0).astype(float) if shares else np.zeros(run.sizes["time"])
 

@@ -20,8 +20,8 @@ from ..system import FmuComponent, foreign_component
 from .catalogue_drive import as_used, catalogue_drive, with_inertia
 from .cycle import Cycle
 from .drive import Drive
-from .drive_tables import DriveTables
 from .foreign_machine import declared_parameters
+from .operation import DriveTables
 from .registry import registered
 
 
@@ -77,7 +77,8 @@ class OwnMotor(MotorSource):
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """The gains of the control are tuned to the inertia; gains that the file gives stay as they are."""
         inertia = drive.rotor_inertia + float(np.mean(turn.inertia_at(drive.ratio)))
-        parameters, tuning = drive.motor.tune(drive.parameters, inertia, tables.given_gains)
+        own_gains = {name.removeprefix("motor.") for name in tables.given if name.startswith("motor.")}
+        parameters, tuning = drive.motor.tune(drive.parameters, inertia, own_gains)
         return replace(drive, parameters=parameters, tuning=tuning), tables
 
 

@@ -1,12 +1,15 @@
-"""The operation of a machine in a study: its speed, its loads, and the times of its run."""
+"""The operation of a machine in a study: its speed, its loads and the times of its run; and the tables of its
+drive."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Set
+from dataclasses import dataclass, field
 from typing import Any
 
-from .sections import Coupling, Run
+from ..drives.gearing import Transmission
+from .sections import Coupling, FlywheelTable, Run, Starter
 
 
 @dataclass(frozen=True)
@@ -49,3 +52,29 @@ class OperatingConditions:
     def stop(self) -> float:
         """End of the run of start-up and steady running [s], if the motor settles at once."""
         return float(self.steady_begin + (self.run.turns + 0.1) * self.turn)
+
+
+@dataclass(frozen=True)
+class DriveTables:
+    """The tables and keys of a study file that state the drive beside its motor."""
+
+    feed_forward: bool
+    gear: Transmission
+    start: str
+    """one of `chainunit.study.sections.STARTS`"""
+    starter: Starter
+    flywheel: FlywheelTable | None
+    given: Set[str] = field(compare=False)
+    """names of all values that the file sets, such as "gear.ratio\""""
+
+    @property
+    def added_inertia(self) -> float:
+        """Inertia of the flywheel on the motor's shaft [kg m2]; 0 without one."""
+        return 0.0 if self.flywheel is None else float(self.flywheel.J)
+
+    @property
+    def starter_time(self) -> float:
+        """Time after which a starter gives the motor the whole voltage [s]; 0 without one."""
+        if self.start == "star-delta":
+            return float(self.starter.star_delta.time + self.starter.star_delta.pause)
+        return float(self.starter.soft_start.time) if self.start == "soft" else 0.0

@@ -72,7 +72,8 @@ class OrganModel(ABC):
     def verdict(
         self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]
     ) -> Verdict:
-        """The verdict on the model; arguments are those of `chainunit.study.verdict.rigid_links`."""
+        """The verdict on the model; judged at a `speed` of the crank, which has the `actual` one in the runs
+        [rad/s]; `residuals` are by run, over the energy moved."""
 
     @abstractmethod
     def remark(self, study: StudyRecord) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..core.errors import InputError, RunError, printable
 from ..core.files import scratch
@@ -29,10 +28,10 @@ from .config import Config
 from .cycle import cycle
 from .drive import Drive
 from .operation import OperatingConditions
-from .organ_limits import limits_of_organs
+from .organ_limits import limits_of_organs, passed_limits
 from .registry import parts_of_line
 from .remarks import lengths_of_example
-from .verdict import on_limit, passed_limits
+from .verdict import on_limit
 
 
 def study_system(drive: Drive, operation: OperatingConditions) -> System:
@@ -162,17 +161,12 @@ def remarks_on_export(config: Config) -> list[str]:
     lengths = lengths_of_example(config.file.given, bool(config.machine.model.sides))
     sentences = [left_out(config.operation, config.given_events), lengths.text if lengths else ""]
     if config.file.tables.get("organ") != "chain":
-        sentences += beyond_two_bars(config.machine, config.feed, config.run.crank_speed)
+        speed = config.run.crank_speed
+        turns = number(speed, "rad/s", "speed", beside=False)
+        end = f'This study turns at {turns}. For chains give the study organ = "chain".'
+        passed = passed_limits(limits_of_organs(config.machine, config.feed, ("N.m",)), speed)
+        sentences += [f"{on_limit(limit.topic, limit.speed)} {end}" for limit in passed]
     return list(filter(None, sentences))
-
-
-def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
-    """A line for each limit of two bars an organ that a crank speed [rad/s] passes, see `study.verdict`."""
-    limits = limits_of_organs(machine, feed, ("N.m",))
-    passed = passed_limits(limits, speed)
-    turns = number(speed, "rad/s", "speed", beside=False)
-    end = f'This study turns at {turns}. For chains give the study organ = "chain".'
-    return [f"{on_limit(limit.topic, limit.speed)} {end}" for limit in passed]
 
 
 def _is_of(model: Model, drive: Drive) -> bool:

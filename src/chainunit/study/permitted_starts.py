@@ -8,22 +8,20 @@ by FI/(1 - ML/MH), and running takes a share of the heat that the surface gives 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
 from ..drives.nameplate import Nameplate
 from ..reading.results import result
+from .arrays import Dataset
 from .drive import Drive
 from .readings import load_inertia
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 def standard_inertia(
-    drive: Drive, plate: Nameplate, steady: xr.Dataset, start: str
+    drive: Drive, plate: Nameplate, steady: Dataset, start: str
 ) -> tuple[float, float] | None:
     """The inertia at the motor's shaft beside its rotor [kg m2], and the one that IEC 60034-12 demands of a motor of
     design N at 50 Hz to bring up to speed: 0.04 P^0.9 p^2.5, with P in kW and p pairs of poles. None for another
@@ -75,8 +73,8 @@ def permitted_starts(data: StartingData, most: float = math.inf) -> PermittedSta
 def starting_data(
     drive: Drive,
     plate: Nameplate,
-    start: xr.Dataset,
-    steady: xr.Dataset,
+    start: Dataset,
+    steady: Dataset,
     *,
     per_hour: float,
     bare: float,

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..drives.catalogue import CatalogueMotor
 from .drive import Drive
-from .drive_tables import DriveTables
-from .torques import DutyPeak
+from .operation import DriveTables
 
 if TYPE_CHECKING:
     from ..fmu.backends import Backend
@@ -61,6 +60,14 @@ class MotorChoice(ABC):
 def motor_choice(plans: Mapping[str, Any]) -> MotorChoice | None:
     """The choice among the `plans` of a study; None for a file that gives its motor."""
     return next((plan for plan in plans.values() if isinstance(plan, MotorChoice)), None)
+
+
+@dataclass(frozen=True)
+class DutyPeak:
+    """The largest torque of normal duty without the starts, at the crank [N m], and the run in which it is."""
+
+    torque: float
+    run: str
 
 
 @dataclass(frozen=True)

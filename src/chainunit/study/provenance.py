@@ -1,4 +1,5 @@
-"""Where a result comes from: version, libraries and platform, the files of the study by their digests, and seeds."""
+"""Where a result comes from: its heading, version, libraries and platform, the files of the study by their digests,
+and seeds."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import json
 import platform
 import re
 import subprocess
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from hashlib import sha256
 from importlib import metadata
@@ -17,10 +18,10 @@ from typing import Any
 from .. import __version__
 from ..core.errors import InputError
 from ..core.files import digest, write_file
+from ..reading.results import part, result
 from .config import Config, FileContents
 from .parts import beside
-from .registry import registered
-from .study_file import toml_text
+from .study_file import named_files, toml_text
 
 FILE, COPY = "provenance.json", "study_copy.toml"
 """Names of the provenance of a result and of the copy of its study file, in the folder of the result."""
@@ -81,14 +82,8 @@ def _digests_of(files: Iterable[tuple[str, Path]]) -> Iterator[tuple[str, str]]:
 
 def _digests(file: FileContents) -> Iterator[tuple[str, str]]:
     """The digests of all files that the study names: linkage, catalogues, motors and machines, recordings."""
-    catalogue = file.tables.get("catalogue", [])
-    names = [catalogue] if isinstance(catalogue, str) else list(catalogue)
-    for table, key in (("system", "motor"), ("system", "machine"), ("machine", "linkage")):
-        name = str(file.tables.get(table, {}).get(key, ""))
-        names += [name] if name.lower().endswith((".toml", ".fmu")) else []
-    of_parts = (part_file for part in registered() for part_file in part.files(file.tables))
-    names += [str(part_file.table.get(part_file.name, "")) for part_file in of_parts]
-    return _digests_of((name, beside(name, file.source)) for name in dict.fromkeys(filter(None, names)))
+    names = dict.fromkeys(str(named.table[named.name]) for named in named_files(file.tables))
+    return _digests_of((name, beside(name, file.source)) for name in names)
 
 
 @cache
@@ -125,3 +120,18 @@ def _commit() -> str | None:
         )
         return done.stdout.strip() or None
     return None
+
+
+@result
+class Heading:
+    """Where a result comes from."""
+
+    chainunit: str = part("version of chainunit")
+    title: str = part("title of the study")
+    source: str = part("the study file")
+    report: Mapping[str, str] = part("labels of the report")
+
+    @classmethod
+    def of(cls, title: str, file: FileContents) -> Heading:
+        """The heading of a result of a study with that title and file."""
+        return cls(__version__, title, file.source, file.labels)

@@ -1,23 +1,21 @@
-"""Quantities that are read from a run of a drive: at the shaft of the motor, at the crank, over whole turns."""
+"""Quantities that are read from a run of a drive: at the shaft of the motor, at the crank, over whole turns; and the
+energy that the moving masses hold, take up over a turn, and lend to a cut."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..drives.gearing import lost_torque
 from ..reading.text import number
 from ..system import shaft_torque, through
-from .arrays import peak
+from .arrays import Dataset, peak, stretches
 from .drive import AbsentError, Drive
 
-if TYPE_CHECKING:
-    import xarray as xr
 
-
-def series(run: xr.Dataset, name: str) -> Any:
+def series(run: Dataset, name: str) -> Any:
     """A variable of a run, shape (time,).
 
     Raises
@@ -30,7 +28,7 @@ def series(run: xr.Dataset, name: str) -> Any:
     return run[name].values
 
 
-def machine_series(run: xr.Dataset) -> dict[str, Any]:
+def machine_series(run: Dataset) -> dict[str, Any]:
     """The variables of the machine in a run by name, each of shape (time,)."""
     return {
         name.removeprefix("machine."): run[name].values
@@ -39,17 +37,17 @@ def machine_series(run: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def load_inertia(drive: Drive, run: xr.Dataset) -> Any:
+def load_inertia(drive: Drive, run: Dataset) -> Any:
     """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); see `Line.at_motor`."""
     return drive.whole_line.at_motor(run["machine.J"].values)
 
 
-def motor_shaft(drive: Drive, run: xr.Dataset) -> tuple[Any, Any]:
+def motor_shaft(drive: Drive, run: Dataset) -> tuple[Any, Any]:
     """Torque of the load [N m] and speed [rad/s] of the motor's shaft, shape (time,)."""
     return through(run, drive.motor_bond)
 
 
-def shaft_power(drive: Drive, run: xr.Dataset) -> Any:
+def shaft_power(drive: Drive, run: Dataset) -> Any:
     """Power at the motor's shaft [W], shape (time,)."""
     full = f"{drive.motor_bond.machine}.power"
     if full in run:
@@ -58,24 +56,24 @@ def shaft_power(drive: Drive, run: xr.Dataset) -> Any:
     return torque * speed
 
 
-def torque_before_gear(drive: Drive, run: xr.Dataset) -> Any:
+def torque_before_gear(drive: Drive, run: Dataset) -> Any:
     """Torque on the motor's shaft [N m], shape (time,), with the one that the gear loses."""
     torque = run[drive.motor_torque].values
     return torque + lost_torque(np, drive.gear_loss, torque, run[drive.motor_speed].values)
 
 
-def gear_loss(drive: Drive, run: xr.Dataset) -> Any:
+def gear_loss(drive: Drive, run: Dataset) -> Any:
     """Power that the gear loses [W], shape (time,)."""
     torque, w = run["motor.tau"].values, run["motor.w"].values
     return lost_torque(np, drive.gear_loss, torque, w) * w + drive.gear_friction * w * w
 
 
-def crank_torque(drive: Drive, run: xr.Dataset) -> Any:
+def crank_torque(drive: Drive, run: Dataset) -> Any:
     """Torque at the crank in a run [N m], shape (time,), also for a machine without its motor."""
     return shaft_torque(run, drive.machine_bond) * drive.ratio_at_machine
 
 
-def crank_motion(drive: Drive, run: xr.Dataset) -> tuple[Any, Any]:
+def crank_motion(drive: Drive, run: Dataset) -> tuple[Any, Any]:
     """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also for a machine without its motor."""
     ratio = drive.ratio_at_machine
     pairs = (
@@ -87,22 +85,22 @@ def crank_motion(drive: Drive, run: xr.Dataset) -> tuple[Any, Any]:
     return run[phi].values / ratio, run[w].values / ratio
 
 
-def crank_angle(drive: Drive, run: xr.Dataset) -> Any:
+def crank_angle(drive: Drive, run: Dataset) -> Any:
     """Angle of the crank in a run [rad], see `crank_motion`."""
     return crank_motion(drive, run)[0]
 
 
-def crank_speed(drive: Drive, run: xr.Dataset) -> Any:
+def crank_speed(drive: Drive, run: Dataset) -> Any:
     """Speed of the crank in a run [rad/s], see `crank_motion`."""
     return crank_motion(drive, run)[1]
 
 
-def turns_made(drive: Drive, run: xr.Dataset) -> float:
+def turns_made(drive: Drive, run: Dataset) -> float:
     """Turns that the crank makes from the first to the last row of a run."""
     return float(_turns(drive, run)[-1])
 
 
-def _turns(drive: Drive, run: xr.Dataset) -> Any:
+def _turns(drive: Drive, run: Dataset) -> Any:
     """The turns of the crank since the first row of a run, shape (time,)."""
     angle = crank_angle(drive, run)
     return (angle - angle[0]) / (2.0 * math.pi)
@@ -117,7 +115,7 @@ def _whole(turns: Any) -> int:
     return math.floor(float(np.max(turns)) + _ROUNDING)
 
 
-def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
+def only_whole_turns(drive: Drive, run: Dataset, most: float = math.inf) -> Dataset | None:
     """The part of the run from its first row until the crank has made the largest number of whole turns, at most
     `most`, both ends included; None where it makes less than one turn.
 
@@ -142,19 +140,19 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
     )
 
 
-def has_turn(drive: Drive, run: xr.Dataset) -> bool:
+def has_turn(drive: Drive, run: Dataset) -> bool:
     """Whether the crank makes a whole turn in a run."""
     return _whole(_turns(drive, run)) >= 1
 
 
-def less_than_a_turn(drive: Drive, run: xr.Dataset) -> str:
+def less_than_a_turn(drive: Drive, run: Dataset) -> str:
     """The words on a run without a whole turn of the crank."""
     turns, time = number(turns_made(drive, run), "1"), run["time"].values
     span = number(float(time[-1] - time[0]), "s")
     return f"the {drive.driver_noun} makes {turns} of a turn in the {span} that are evaluated"
 
 
-def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
+def largest_torque(drive: Drive, run: Dataset, T: float) -> Any:
     """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its winding
     at `T` [K]; see `Motor.largest_torque`."""
     drive.needs_own("the largest torque")
@@ -164,6 +162,7 @@ def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
         x = run[f"motor.{name}"].values
         if name == "w":
             x = np.where(braking, -np.abs(x), np.abs(x))
+        # instants that are alike to this resolution are computed once
         unit = resolution * max(peak(x), 1e-9)
         columns.append(np.round(x / unit) * unit)
     instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
@@ -173,7 +172,7 @@ def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
     return np.array(limits)[np.reshape(which, -1)]
 
 
-def pull_out_torque(drive: Drive, run: xr.Dataset, T: float) -> float:
+def pull_out_torque(drive: Drive, run: Dataset, T: float) -> float:
     """Largest torque at the crank [N m] that the motor gives while a rising load slows it down from the mean state of
     a run until it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
     drive.needs_own("the pull-out torque")
@@ -181,7 +180,7 @@ def pull_out_torque(drive: Drive, run: xr.Dataset, T: float) -> float:
     return torque / (1.0 + drive.gear_loss) * drive.ratio
 
 
-def breakdown_speed(drive: Drive, run: xr.Dataset) -> float:
+def breakdown_speed(drive: Drive, run: Dataset) -> float:
     """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature of a run; 0
     where the motor has no such speed. See `Motor.breakdown_speed`."""
     drive.needs_own("the breakdown speed")
@@ -189,6 +188,64 @@ def breakdown_speed(drive: Drive, run: xr.Dataset) -> float:
     return drive.motor.breakdown_speed(drive.fmu_parameters, T, *_mean_supply(drive, run)) / drive.ratio
 
 
-def _mean_supply(drive: Drive, run: xr.Dataset) -> list[float]:
+def _mean_supply(drive: Drive, run: Dataset) -> list[float]:
     """The means over a run of the variables `Motor.limited_by`."""
     return [float(np.mean(run[f"motor.{name}"].values)) for name in drive.motor.limited_by]
+
+
+def energy_behind(drive: Drive, run: Dataset) -> Any:
+    """Kinetic and potential energy of the machine, and of the line before it [J], shape (time,). The energy of a part
+    that does not tell it, as a foreign FMU may, is left out."""
+    held = np.zeros(run.sizes["time"])
+    for part in ("machine", *(part.name for part in drive.line)):
+        names = [f"{part}.{kind}_energy" for kind in ("kinetic", "potential")]
+        if set(names) <= set(run):
+            held = held + run[names[0]].values + run[names[1]].values
+    return held
+
+
+def energy_held(drive: Drive, run: Dataset) -> Any:
+    """Energy of all moving masses [J], shape (time,): that of the machine, see `energy_behind`, and that of the
+    motor's shaft, where the motor is no foreign FMU."""
+    try:
+        drive.needs_own("the inertia of its rotor")
+    except AbsentError:
+        return energy_behind(drive, run)
+    return energy_behind(drive, run) + 0.5 * drive.fmu_parameters.rotor.J * run[drive.motor_speed].values ** 2
+
+
+def energy_gap(drive: Drive, turns: Dataset) -> float:
+    """Energy that the moving masses take up between the ends of `turns`, relative to the energy that passes the
+    motor's shaft to and fro: the integral of |power|. Negative where they give energy."""
+    held = energy_held(drive, turns)
+    passed = float(np.trapezoid(np.abs(shaft_power(drive, turns)), turns["time"].values))
+    return float(held[-1] - held[0]) / max(passed, 1e-9)
+
+
+def cutting_power(run: Dataset) -> Any:
+    """Power that the stack takes from the blade [W], shape (time,)."""
+    vx, vy, fx, fy = (run[f"machine.blade.{name}"].values for name in ("vx", "vy", "cut_fx", "cut_fy"))
+    return -(fx * vx + fy * vy)
+
+
+def stored_shares(turns: Dataset, held: Any) -> tuple[float | None, float | None]:
+    """Energy that the motor's shaft and the machine give to a cut, of the energy `held` by them [J], shape (time,),
+    over the work of the cut: from the begin of the cut to its end, and from the begin to their least energy. None
+    where nothing is cut. The rest of the work comes from the motor through the air gap, less friction.
+    Towards the end of a cut, where the blade slows down, the motor may already restore their energy. `turns`
+    are whole, periodic turns.
+    """
+    power, time = cutting_power(turns), turns["time"].values
+    if not np.max(power) > 0.0:
+        return None, None
+    rows = len(time)
+    # a cut that begins before the last row ends in the turns after it
+    time = np.append(time, time[1:] + time[-1] - time[0])
+    power, held = (np.append(x, x[1:]) for x in (power, held))
+    net = most = work = 0.0
+    for a, b in stretches(power > 0.01 * np.max(power)):
+        if 0 < a < rows:
+            net += float(held[a] - held[b - 1])
+            most += float(held[a] - np.min(held[a:b]))
+            work += float(np.trapezoid(power[a:b], time[a:b]))
+    return (net / work, most / work) if work > 0.0 else (None, None)

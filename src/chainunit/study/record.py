@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from ..core.brief import briefly_shown
 from ..core.errors import RunError
@@ -15,13 +14,14 @@ from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
 from ..reading.results import as_data
 from . import verdict
+from .arrays import Dataset
 from .config import Config
 from .drive import Drive
 from .event import Event
 from .limits import reaches
 from .measures import Answers, not_known
+from .organ_limits import LeastPull
 from .proposal import DriveProposal
-from .pulls import LeastPull
 from .relay import LIGHT
 from .remark import Remark, RemarkCode, Value
 from .start_up import StartUp
@@ -29,15 +29,8 @@ from .statics import DriveStatics
 from .verdict import STEADY, Verdict
 from .window import Phase, Trip, Window, whole_turns
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 LOAD_CYCLE = "load_cycle.csv"
 """Name of the file with torque and speed of the motor's shaft in the steady turns."""
-
-
-SPEED_MISSED = "The motor does not keep the speed asked for."
-"""The sentence on a study whose crank does not turn at the requested speed."""
 
 
 @dataclass
@@ -65,7 +58,7 @@ class StudyRecord:
     """the drive, where a capability chose it"""
     fmus: dict[str, Origin] = field(default_factory=dict)
     """the origin of each FMU"""
-    runs: dict[str, xr.Dataset] = field(default_factory=dict)
+    runs: dict[str, Dataset] = field(default_factory=dict)
     started: StartUp | None = None
     """the start-up and steady running, once it is made"""
     event: dict[str, float] = field(default_factory=dict)
@@ -185,20 +178,13 @@ class StudyRecord:
     @property
     def not_known(self) -> frozenset[str]:
         """Names of the measures of steady running that cannot be read, as the motor is a foreign FMU."""
-        if self.drive.foreign is None:
+        if self.drive.foreign is None or STEADY not in self.answers:
             return frozenset()
-        return frozenset(name for name, part in self.absent.items() if part == "motor")
+        parts = not_known(self.window(Phase.STEADY, self.steady))
+        return frozenset(name for name, part in parts.items() if part == "motor")
 
     @property
-    def absent(self) -> Mapping[str, str]:
-        """The measures of steady running that cannot be read, each with the part (motor or machine) that
-        lacks a variable."""
-        if verdict.STEADY not in self.answers:
-            return {}
-        return not_known(self.window(Phase.STEADY, self.steady))
-
-    @property
-    def steady(self) -> xr.Dataset:
+    def steady(self) -> Dataset:
         """The steady turns that are evaluated, both ends included; where the crank does not make whole turns,
         the whole run from the time at which it should be steady."""
         run = self.runs["start_up"]
@@ -209,7 +195,7 @@ class StudyRecord:
     def window(
         self,
         phase: Phase,
-        run: xr.Dataset,
+        run: Dataset,
         begin: float = 0.0,
         trip: Trip | None = None,
         event: Event | None = None,
@@ -223,13 +209,8 @@ class StudyRecord:
         passes = event is not None and event.passes
         return Window(phase, run, self.drive, sides, requested, begin, steady, trip, self.relay_class, passes)
 
-    @property
-    def motor(self) -> Any:
-        """Parameters of the motor."""
-        return self.drive.parameters
 
-
-class Findings(ABC):
+class Findings:
     """What an analysis found: a declared result (`chainunit.reading.results`), whose data are the part of result.json
     under the name of the analysis."""
 
@@ -264,6 +245,5 @@ class Findings(ABC):
         data: dict[str, Any] = as_data(self, driver=study.driver_noun)
         return data
 
-    @abstractmethod
     def remark(self, study: StudyRecord) -> None:
-        """Add to the study the remarks that the reader needs beside the numbers."""
+        """Add to the study the remarks that the reader needs beside the numbers; by default they are enough."""

@@ -44,7 +44,6 @@ HEAVIER = 40
 """The class of a start during which a relay of class 30 may trip."""
 HOLDS_AT, TRIPS_AT = 1.05, 1.2
 """Multiples of its setting: at the first a relay must not trip within two hours, at the second it must."""
-_PICK_UP = 1.1  # between the two
 _LASTING = 5
 MORE_CURRENT = 1.2
 """Locked-rotor current of a cage motor by the tolerance of IEC 60034-1, over that of its catalogue."""
@@ -111,7 +110,7 @@ def stall_trip(trip_class: TripClass, setting: float, before: float, current: fl
     if before >= TRIPS_AT * setting:
         return None
     # a record without a row of the stall: all of it is the current that flows on
-    return relay_trip([0.0], [current], setting, before, current, trip_class.longest, TRIPS_AT)
+    return relay_trip([0.0], [current], setting, before, current, trip_class.longest)
 
 
 def lasting_current(current: Any, after: float | None = None) -> float:
@@ -127,50 +126,33 @@ def class_words(trip_class: int) -> str:
     return f"class {trip_class}" if trip_class <= HEAVIEST else f"heavier than class {HEAVIEST}"
 
 
-def time_constant(seconds: float, pick_up: float = _PICK_UP) -> float:
-    """Time constant [s] of a thermal image that trips after so many `seconds` at `MULTIPLE` times the setting, from
-    cold, and after a long time at `pick_up` times the setting; with the number of a class it trips at its end."""
-    heating = MULTIPLE**2
-    return seconds / math.log(heating / (heating - pick_up**2))
-
-
-def relay_image(
-    time: Any, current: Any, setting: float, before: float, seconds: float = LIGHT, pick_up: float = _PICK_UP
-) -> Any:
-    """Thermal image of a relay, set to `setting` [A], over `time` [s] with `current` [A], shape (n,); it
-    trips at 1.
-
-    The image is of first order in the square of the current; `before` is the RMS current before the run [A]. For
-    `seconds` and `pick_up` see `time_constant`.
-    """
-    tau = time_constant(seconds, pick_up)
-    heating = (np.asarray(current) / (setting * pick_up)) ** 2
-    image = np.empty(len(heating))
-    image[0] = (before / (setting * pick_up)) ** 2
-    step = np.diff(np.asarray(time))
-    decay = np.exp(-step / tau)
-    middle = 0.5 * (heating[1:] + heating[:-1])
-    for k in range(len(step)):
-        image[k + 1] = middle[k] + (image[k] - middle[k]) * decay[k]
-    return image
-
-
 def relay_trip(
-    time: Any,
-    current: Any,
-    setting: float,
-    before: float,
-    holds: float,
-    seconds: float = LIGHT,
-    pick_up: float = _PICK_UP,
+    time: Any, current: Any, setting: float, before: float, holds: float, seconds: float
 ) -> float | None:
-    """Time at which the relay trips [s], also after the run, with the lasting current `holds` [A]; None where
-    it never trips. Other arguments as in `relay_image`."""
-    image = relay_image(time, current, setting, before, seconds, pick_up)
+    """Time at which the slowest relay of its class trips [s], also after the run; None where it never trips.
+
+    Its thermal image is of first order in the square of the current. It trips at 1: from cold after so many `seconds`
+    at `MULTIPLE` times the setting, the end of its class, and after a long time at `TRIPS_AT` times the setting.
+
+    Parameters
+    ----------
+    time, current : times [s] and current [A] there, shape (n,)
+    setting, before : current to which it is set, and RMS current before the run [A]
+    holds : current that lasts after the run [A]
+    """
+    pick_up, whole = setting * TRIPS_AT, MULTIPLE**2
+    tau = seconds / math.log(whole / (whole - TRIPS_AT**2))
+    heating = (np.asarray(current) / pick_up) ** 2
+    image = np.empty(len(heating))
+    image[0] = (before / pick_up) ** 2
+    decay = np.exp(-np.diff(np.asarray(time)) / tau)
+    middle = 0.5 * (heating[1:] + heating[:-1])
+    for k in range(len(decay)):
+        image[k + 1] = middle[k] + (image[k] - middle[k]) * decay[k]
     over = np.flatnonzero(image >= 1.0)
     if over.size:
         return float(time[over[0]])
-    final = (holds / (setting * pick_up)) ** 2
+    final = (holds / pick_up) ** 2
     if final <= 1.0:
         return None
-    return float(time[-1]) + time_constant(seconds, pick_up) * math.log((final - image[-1]) / (final - 1.0))
+    return float(time[-1]) + tau * math.log((final - image[-1]) / (final - 1.0))

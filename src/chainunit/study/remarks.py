@@ -406,16 +406,16 @@ def _on_star(study: StudyRecord) -> None:
         return
     findings, times = StartFindings.found_in(study), run["time"].values
     starts = () if findings is None else findings.starts
-    speeds = [(first, 0.0), *((s.star_speed, s.angle) for s in starts if s.star_speed is not None)]
     after = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.switched_until]
     delta = float(max([*after, *(start.current for start in starts)], default=0.0))
-    if held := [angle for speed, angle in speeds[1:] if speed < _STANDING]:
+    by_angle = {start.angle: start.star_speed for start in starts if start.star_speed is not None}
+    if held := [angle for angle, share in by_angle.items() if share < _STANDING]:
         angles = ", ".join(number(angle, "rad") for angle in held)
         where = f"from {len(held)} of {len(starts)} angles ({angles})"
-        least = min((speed for speed, _ in speeds[1:] if speed >= _STANDING), default=None)
+        least = min((share for angle, share in by_angle.items() if angle not in held), default=None)
         study.say(_STANDS_IN_STAR, START, where=where, share=least, delta=delta)
         return
-    share, angle = min(speeds)
+    share, angle = min([(first, 0.0), *((share, angle) for angle, share in by_angle.items())])
     if times[-1] <= drive.switched_until or share >= _LITTLE_STAR:
         return
     if share < FULL_STAR:
@@ -481,7 +481,11 @@ def _on_runs(study: StudyRecord) -> None:
     for code in dict.fromkeys(code for _, code, *_ in happenings):
         runs = {name: (text, sizes) for name, kind, text, sizes in happenings if kind == code}
         where = (f"{study.title_of(name)}{aside(text)}" for name, (text, _) in runs.items())
-        limit = {"passed": study.drive.motor.current_limit(study.motor)} if code == "current-limit" else {}
+        limit = (
+            {"passed": study.drive.motor.current_limit(study.drive.parameters)}
+            if code == "current-limit"
+            else {}
+        )
         study.say(
             _HAPPENINGS[code],
             *runs,
@@ -498,7 +502,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and is_pushed:
         yield "rod-end-pushed", "", {}
-    largest = study.drive.motor.current_limit(study.motor)
+    largest = study.drive.motor.current_limit(study.drive.parameters)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current-limit", "", {}
     if answers.stall_time is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any
 
 from ..core.quantities import quantity, variables
@@ -13,14 +14,13 @@ from ..reading.results import InUnit, as_data, part, result
 from ..reading.tables import UnusualValue
 from ..reading.text import entries, entry, shown_in
 from .drive import Drive
-from .given import given_sections
-from .heading import Heading
+from .given import given_sections, origin_of, place_of
 from .judgement import MotorVerdict, motor_verdict
 from .line.rigid_line import RigidLine
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import Answers, measures_of
-from .origins import origin_of, place_of
+from .provenance import Heading
 from .record import StudyRecord
 from .remark import Remark
 from .verdict import Verdict
@@ -42,16 +42,8 @@ class MotorRating:
     @classmethod
     def of(cls, motor: CatalogueMotor) -> MotorRating:
         """The rating of that motor."""
-        plate = motor.nameplate
-        return cls(
-            plate.power,
-            plate.speed,
-            plate.torque,
-            plate.rated_current,
-            plate.voltage,
-            plate.frequency,
-            plate.poles,
-        )
+        names = ("power", "speed", "torque", "rated_current", "voltage", "frequency", "poles")
+        return cls(*attrgetter(*names)(motor.nameplate))
 
 
 @result
@@ -139,11 +131,7 @@ def _data(study: StudyRecord) -> StudyData:
         slips=study.config.file.slips,
         driver=study.driver_noun,
         runs=_runs(study),
-        findings=DriveFindings(
-            study.statics.loops,
-            study.statics.rigid_line,
-            speed_control(drive),
-        ),
+        findings=DriveFindings(study.statics.loops, study.statics.rigid_line, speed_control(drive)),
     )
 
 
@@ -173,7 +161,7 @@ def _motor(study: StudyRecord) -> dict[str, Any]:
     titles = {"kind": kind, "title": study.motor_title}
     rating = {} if plate is None else as_data(MotorRating.of(plate))
     # the parameters of a foreign motor are not known
-    return titles | rating | ({} if study.motor is None else entries(study.motor))
+    return titles | rating | ({} if study.drive.parameters is None else entries(study.drive.parameters))
 
 
 def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core.errors import refusal_prefix
 from ..system import (
@@ -19,15 +19,13 @@ from ..system import (
     certify,
     without,
 )
+from .arrays import Dataset
+from .cycle import no_feed
 from .drive import Drive
 from .drive_fmus import with_files
 from .event import Event, OverTime, Signals, Values
-from .load_cases import no_feed
 from .operation import OperatingConditions
 from .readings import machine_series
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FEED_RISE = 0.1
 """Share of a turn in which the feed comes to a machine that starts empty."""
@@ -96,7 +94,7 @@ class Rig:
         if event.on_line and self.drive.follows:
             return False
         machine = self.graph.components["machine"].connectors
-        return set(event.inputs(event.side)) <= set(self.inputs) and set(event.reads) <= set(machine)
+        return set(event.inputs) <= set(self.inputs) and set(event.reads) <= set(machine)
 
     def gives(self, full: str) -> bool:
         """Whether the drive has an output of that full name."""
@@ -159,7 +157,7 @@ class Rig:
         with refusal_prefix('simulation = "me": '):
             return ModelExchange(system, signals, begin)
 
-    def residuals(self, run: xr.Dataset, lead: xr.Dataset | None = None) -> dict[str, float]:
+    def residuals(self, run: Dataset, lead: Dataset | None = None) -> dict[str, float]:
         """Write the energy residual of each shaft into the run; a shaft that does not drive the machine
         itself is named after the part that it drives. Returns each residual over the energy moved. For `lead`
         see `Transient`."""
@@ -172,7 +170,7 @@ class Rig:
             shares[prefix + _SHARE] = share
         return shares
 
-    def _held(self, per_unit: Callable[[Mapping[str, Any]], Any], run: xr.Dataset) -> Any:
+    def _held(self, per_unit: Callable[[Mapping[str, Any]], Any], run: Dataset) -> Any:
         return per_unit(machine_series(run))
 
 
@@ -185,7 +183,7 @@ def worst_residual(shares: Mapping[str, float]) -> float:
     return max(share for name, share in shares.items() if name.endswith(_SHARE))
 
 
-def join(pieces: list[xr.Dataset]) -> xr.Dataset:
+def join(pieces: list[Dataset]) -> Dataset:
     """One run from pieces that follow each other; at an instant that two pieces share, the later piece
     counts."""
     import xarray as xr

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
+from operator import or_
 from typing import Any
 
 from ..core.errors import InputError, shown
@@ -82,10 +83,7 @@ def _default(machine: str = "") -> Parts:
 
 
 def _any(conditions: list[Condition]) -> Condition:
-    joined, *rest = conditions or [NEVER]
-    for condition in rest:
-        joined = joined | condition
-    return joined
+    return reduce(or_, conditions or [NEVER])
 
 
 MACHINE_FMU, MOTOR_FMU = ends_with("system.machine", FMU), ends_with("system.motor", FMU)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..core.errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
@@ -20,16 +19,16 @@ from ..work.progress import Progress, TaskProgress, quiet
 from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
+from .arrays import Dataset
 from .bearings import pin_loads
 from .choice import choose_for, with_parts_beside
 from .config import Config
+from .cycle import turns_by_load
 from .drive_fmus import export_coasting, export_drive
 from .event import Event
 from .event_table import random_runs
-from .event_torques import from_event_on
-from .load_cases import turns_by_load
 from .measures import read_answers, read_measure
-from .pulls import least_pulls
+from .organ_limits import least_pulls
 from .readings import crank_angle
 from .record import Spread, StudyRecord
 from .relay import class_holding, locked_rotor, protecting_class, start_seconds
@@ -38,12 +37,9 @@ from .rig import Rig
 from .start_up import start_up
 from .starts import StartAnalysis, StartFindings
 from .statics import statics
-from .torques import on_coupling, quasi_static_peak
+from .torques import from_event_on, on_coupling, quasi_static_peak
 from .transients import Transient, coast, compare, follow, lead_times, release
 from .window import Phase, Trip
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _AFTER_TRIP = 1.0
 """Time for which a start in which the coupling opens is followed without it [s]: the first swings are the largest."""
@@ -149,8 +145,8 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
     study.relay_class = trip_class
     for name in study.overloads:
         if study.answers[name].coupling_trip_time is None:
-            phase = Phase.LOADED_START if study.config.events[name].from_rest else Phase.EVENT
             event = study.config.events[name]
+            phase = Phase.LOADED_START if event.from_rest else Phase.EVENT
             window = study.window(phase, from_event_on(study, name), study.event[name], event=event)
             later = read_measure("thermal_trip_time", window)
             study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
@@ -176,10 +172,14 @@ class Runner:
         """Make every run of the study. With `check` each is compared with the monolithic solution; `coasting`
         writes the FMU of the machine behind an open coupling."""
         self._export_coasting = coasting
-        self._leave_out()
+        for event in self.study.config.events.values():
+            if event not in (*self.events, *self.starts):
+                self.study.say(EVENT_LEFT_OUT, event.name, title=event.title, reason=event.without)
         with self.rig.from_rest() as simulation:
             self._start_up(simulation)
-            self._note_states(simulation)
+            for part in simulation.without_states if self.events else ():
+                title = self.rig.graph.components[part].title
+                self.study.say(STATE_NOT_SAVED, *(event.name for event in self.events), title=title)
             begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
             angle = float(crank_angle(self.rig.drive, self.study.runs["start_up"])[-1])
             progress, transients = 0.0, []
@@ -190,7 +190,9 @@ class Runner:
             for transient in transients:
                 self._assumption(simulation, transient, progress)
         if check:
-            self._check(transients)
+            states = self._compare("the start-up", "start_up", None)
+            for transient in transients:
+                self._compare(transient.event.title, transient.event.name, transient, states)
         for k, event in enumerate(self.starts):
             self._loaded_start(event, self.total - (len(self.starts) - k) * self.stop, check)
 
@@ -199,18 +201,6 @@ class Runner:
             self.progress(what, min(before + time, self.total), self.total)
 
         return progress
-
-    def _leave_out(self) -> None:
-        """Add a remark on each event for which the system has no input."""
-        for event in self.study.config.events.values():
-            if event not in (*self.events, *self.starts):
-                self.study.say(EVENT_LEFT_OUT, event.name, title=event.title, reason=event.without)
-
-    def _note_states(self, simulation: Simulation) -> None:
-        """Add a remark on each FMU that cannot save its state."""
-        for part in simulation.without_states if self.events else ():
-            title = self.rig.graph.components[part].title
-            self.study.say(STATE_NOT_SAVED, *(event.name for event in self.events), title=title)
 
     def _start_up(self, simulation: Simulation) -> None:
         """Make the start-up and steady running, and read their answers.
@@ -252,7 +242,7 @@ class Runner:
                 "coupling.trip_torque must be above that"
             )
 
-    def _relay(self, run: xr.Dataset) -> None:
+    def _relay(self, run: Dataset) -> None:
         """Record the trip class of the relay that the start-up needs; that of a proposed drive holds from
         every crank angle."""
         study, drive = self.study, self.rig.drive
@@ -279,8 +269,7 @@ class Runner:
             transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
             self._close(simulation, transient, self.stop, Phase.LOADED_START)
         if check:
-            self.progress(f"monolithic reference: {event.title}", self.total, self.total)
-            self._compare(event.name, transient)
+            self._compare(event.title, event.name, transient)
 
     def _close(self, simulation: Simulation, transient: Transient, stop: float, phase: Phase) -> None:
         """Read the answers of a transient. Where the coupling opened, follow it until it passes no torque,
@@ -303,18 +292,17 @@ class Runner:
 
     def _opens_in_start(self, time: float) -> str:
         """The reason why a study ends whose coupling opens in the start-up, at `time` [s]."""
-        coupling = self.study.config.coupling
+        coupling, share = self.study.config.coupling, ""
         assert coupling is not None
         with self.rig.from_rest() as simulation:
             run = simulation.run(time + _AFTER_TRIP, self.rig.step)
         start, trip = on_coupling(self.rig.drive, run), coupling.trip_torque
         lasting = quasi_static_peak(self.rig.drive, run, on_coupling)
-        share = (
-            " for some milliseconds (the electromagnetic transient of the motor; load and acceleration put "
-            f"{number(lasting, 'N.m')} on it)"
-            if lasting <= trip
-            else ""
-        )
+        if lasting <= trip:
+            share = (
+                " for some milliseconds (the electromagnetic transient of the motor; load and acceleration put "
+                f"{number(lasting, 'N.m')} on it)"
+            )
         return (
             f"the torque limiter opens in the start-up, at t = {time:.3g} s: it is set to {number(trip, 'N.m')}, "
             f"and this start puts up to {number(start, 'N.m')} on it{share}; coupling.trip_torque must be above "
@@ -322,7 +310,7 @@ class Runner:
             "compares the ways"
         )
 
-    def _pins_and_pulls(self, name: str, run: xr.Dataset) -> None:
+    def _pins_and_pulls(self, name: str, run: Dataset) -> None:
         """Record the loads of the pins and the pulls in the rods."""
         drive = self.rig.drive
         if pulls := least_pulls(drive, run, drive.machine.loaded_sides(self.study.config.feed)):
@@ -330,7 +318,7 @@ class Runner:
         if loads := pin_loads(self.rig.drive, run):
             self.study.pins[name] = loads
 
-    def _certify(self, name: str, run: xr.Dataset, lead: xr.Dataset | None = None) -> None:
+    def _certify(self, name: str, run: Dataset, lead: Dataset | None = None) -> None:
         self.study.certificate[name] = self.rig.residuals(run, lead)
         self.study.runs[name] = run
 
@@ -361,17 +349,11 @@ class Runner:
             {name: (min(x), max(x)) for name, x in peaks.items() if None not in x},
         )
 
-    def _check(self, transients: list[Transient]) -> None:
-        """Compare every run from the start-up on with the monolithic solution."""
-        self.progress("monolithic reference of the start-up", self.total, self.total)
-        states = self._compare("start_up", None)
-        for transient in transients:
-            self.progress(f"monolithic reference: {transient.event.title}", self.total, self.total)
-            self._compare(transient.event.name, transient, states)
-
     def _compare(
-        self, name: str, transient: Transient | None, states: dict[str, float] | None = None
+        self, title: str, name: str, transient: Transient | None, states: dict[str, float] | None = None
     ) -> dict[str, float]:
+        """Compare a run with the monolithic solution; the states at its end."""
+        self.progress(f"monolithic reference: {title}", self.total, self.total)
         differences, end = compare(self.rig, self.study.runs[name], transient, states)
         self.study.certificate[name] |= differences
         return end

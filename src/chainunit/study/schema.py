@@ -1,5 +1,5 @@
-"""The JSON Schema of study files, by which editors complete and check them. It is made from the keys
-(`keys`); the rules of their combinations are in `schema_rules`.
+"""The JSON Schema of study files, by which editors complete and check them: the keys (`keys`), the keys that follow
+from machine and motor, and the rules of keys that do not go together (`chainunit.study.rules`).
 
 An editor sees a date of TOML as a text. A schema can neither compare the sizes of two values, such as lengths
 with which the crank cannot turn, nor read another file: the reader of study files checks these.
@@ -8,20 +8,67 @@ with which the crank cannot turn, nor read another file: the reader of study fil
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from ..core.declared_numbers import may_be_share
 from ..core.quantities import Variable
 from ..drives.catalogue import catalogue
+from ..models import MACHINES, MOTORS
 from ..reading.unit_patterns import pattern, zero
-from .entry_values import MOST_FILES
+from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
+from .file_section import MOST_FILES
 from .keys import Key, KeyTable, entry_tables, key_tables
-from .parts import LONGEST_FILE
-from .schema_rules import OF_PARTS, rules
+from .parts import FMU, LINKAGE, LONGEST_FILE
+from .rules import all_rules, machine_is, motor_is
 from .sections import all_sections
+
+OF_PARTS = ("machine", "feed", "motor")
+"""Tables whose keys follow from the machine and the motor that the file names."""
+
+
+def rules() -> Iterator[Schema]:
+    """The conditions of a whole file."""
+    yield from (rule.schema() for rule in all_rules())
+    machines = is_one_of("system.machine", *MACHINES) | ends_with("system.machine", FMU)
+    yield _where(given("system.machine"), (machines | ends_with("system.machine", LINKAGE)).schema())
+    yield _where(given("machine.linkage"), (~given("system.machine")).schema())
+    yield _where(given("machine.linkage"), ends_with("machine.linkage", LINKAGE).schema())
+    for name in MACHINES:
+        yield _where(machine_is(name), _of_machine(name))
+    packaged = [motor.designation for motor in catalogue()]
+    motors = motor_is(*MOTORS, *packaged) | ends_with("system.motor", FMU)
+    yield _where(given("system.motor") & ~given("catalogue"), motors.schema())
+    for name in MOTORS:
+        condition = motor_is(name) | ~given("system.motor") if name == "DcMotor" else motor_is(name)
+        yield _where(condition, {"properties": {"motor": {"$ref": f"#/definitions/motor.{name}"}}})
+    for table, section in all_sections().items():
+        for key in section.form.required:
+            yield _where(given(table), given(f"{table}.{key}").schema())
+        if section.form.conditions is not None:
+            yield _where(given(table), {"properties": {table: dict(section.form.conditions())}})
+
+
+def _where(condition: Condition, then: Schema) -> Schema:
+    return {"if": condition.schema(), "then": then}
+
+
+def _of_machine(name: str) -> Schema:
+    """The tables and events of a machine."""
+    model = MACHINES[name]
+    inputs = {v.name for v in model.input_layout.variables}
+    inputs |= {v.name for motor in MOTORS.values() for v in motor.input_layout.variables}
+    events = [
+        kind
+        for kind, event_type in TYPES.items()
+        if event_type.has_input or {*event_type.on("left" if event_type.has_side else "").inputs} <= inputs
+    ]
+    tables: Schema = {table: {"$ref": f"#/definitions/{table}.{name}"} for table in ("machine", "feed")}
+    tables["event"] = {"items": {"properties": {"type": {"enum": events}}}}
+    return {"properties": tables}
+
 
 FILE = "chainunit.schema.json"
 """The name by which examples refer to it."""
@@ -29,7 +76,8 @@ _EVENT_NAME = {
     "pattern": rf"^[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}$",
     "not": {"anyOf": [{"enum": list(RESERVED)}, {"pattern": "_coasting$"}]},
 }
-_VALUE: dict[str, Any] = {"type": ["number", "string"]}
+_TYPES = {"switch": "boolean", "list": "array", "value": ["number", "string"], "table": "object"}
+"""The type of a value, by the sort of its key."""
 _FORMS: dict[str, dict[str, Any]] = {
     "event.name": _EVENT_NAME,
     "catalogue": {"maxLength": LONGEST_FILE, "pattern": r"^[^\x00-\x1f\x7f]*$"},
@@ -46,7 +94,7 @@ def _further(name: str) -> Mapping[str, Any] | None:
         return {"maxItems": lists[name].most} | least
     table, _, key = name.partition(".")
     sections = all_sections()
-    return _FORMS.get(name) or (sections[table].forms.get(key) if table in sections else None)
+    return _FORMS.get(name) or (sections[table].form.texts.get(key) if table in sections else None)
 
 
 def json_schema() -> dict[str, Any]:
@@ -70,24 +118,17 @@ class _Schema:
             if table.name == "event":
                 self.definitions[f"event.{table.of}"] = self._event(table)
                 continue
-            place = properties
+            above, _, name = table.name.partition(".")
+            if table.is_named:
+                _object(properties, above, table.title)["additionalProperties"] = self._entry(table)
+                continue
             if table.name in entry_tables():
-                above, _, name = table.name.partition(".")
-                if table.is_named:
-                    _object(properties, above, table.title)["additionalProperties"] = self._entry(table)
-                    continue
                 properties[above]["properties"][name]["items"] = self._entry(table)
                 continue
-            if table.name:
-                place = _object(properties, table.name, table.title)["properties"]
-            for key in table.keys:
-                self._add(place, key, table)
+            place = _object(properties, table.name, table.title)["properties"] if table.name else properties
+            self._add(place, table)
             if table.name in OF_PARTS:
-                part_tables: dict[str, Any] = {}
-                inside = _object(part_tables, table.name)["properties"]
-                for key in table.keys:
-                    self._add(inside, key, table)
-                self.definitions[f"{table.name}.{table.of}"] = part_tables[table.name]
+                self._add(_object(self.definitions, f"{table.name}.{table.of}")["properties"], table)
         for name in OF_PARTS:
             # the keys depend on the machine and the motor: the `rules` give them
             del properties[name]["additionalProperties"]
@@ -121,21 +162,20 @@ class _Schema:
             "definitions": self.definitions,
         }
 
-    def _add(self, place: dict[str, Any], key: Key, table: KeyTable) -> None:
-        """Add a key to the properties of a table; a key that is there already takes the values of both."""
-        *tables, name = key.name.split(".")
-        for part in tables:
-            place = _object(place, part)["properties"]
-        form = self._form(key, table)
-        if table.of:
-            form["description"] = f"{table.of}: {form['description']}"
-        if name in place:
-            others = place[name].get("anyOf", [place[name]]) if "anyOf" in place[name] else [place[name]]
-            if form not in others:
-                description = "; ".join(dict.fromkeys((place[name]["description"], form["description"])))
+    def _add(self, properties: dict[str, Any], table: KeyTable) -> None:
+        """Add the keys of a table to its properties; a key that is there already takes the values of both."""
+        for key in table.keys:
+            *tables, name = key.name.split(".")
+            place, form = properties, self._form(key, table)
+            for part in tables:
+                place = _object(place, part)["properties"]
+            if table.of:
+                form["description"] = f"{table.of}: {form['description']}"
+            other = place.setdefault(name, form)
+            others = other.get("anyOf", [other])
+            if other is not form and form not in others:
+                description = "; ".join(dict.fromkeys((other["description"], form["description"])))
                 place[name] = {"anyOf": [*others, form], "description": description}
-        else:
-            place[name] = form
 
     def _event(self, table: KeyTable, *, random: bool = False) -> dict[str, Any]:
         properties: dict[str, Any] = {}
@@ -148,11 +188,9 @@ class _Schema:
                 pair = {"type": "array", "items": ends, "minItems": 2, "maxItems": 2}
                 form = {"anyOf": [*form["anyOf"], pair], "description": form["description"]}
             properties[key.name] = form
-        needed = ["type"] if not random or table.of != "jam" else []
-        if "side" in properties and not random:
-            needed.append("side")
-        if "input" in properties:
-            needed.append("input")
+        # a random event is a jam by default, and its side may be drawn
+        by_default = {"type", "side"} if random and table.of == "jam" else {"side"} if random else set()
+        needed = [name for name in ("type", "side", "input") if name in properties and name not in by_default]
         return {
             "type": "object",
             "title": table.of,
@@ -172,31 +210,31 @@ class _Schema:
         } | dict(entry_tables()[table.name].conditions)
 
     def _form(self, key: Key, table: KeyTable) -> dict[str, Any]:
-        description = {"description": _sentence(key)}
+        """The form of the value of a key."""
+        return self._value(key, f"{table.name}.{key.name}".lstrip(".")) | {"description": _sentence(key)}
+
+    def _value(self, key: Key, name: str) -> dict[str, Any]:
+        """The form of the value of a key with that full name, without its description."""
         if key.variable is not None:
-            return self._quantity(key.variable) | description
-        if key.sort == "switch":
-            return {"type": "boolean"} | description
-        if key.sort == "list" and key.items is None:
-            return {"type": "array"} | dict(_further(f"{table.name}.{key.name}") or {}) | description
-        if key.sort == "list":
-            return self._list(key) | description
-        if key.sort == "value":
-            return dict(_VALUE) | description
+            return self._quantity(key.variable)
+        if key.items is not None:
+            return self._list(key)
+        if key.sort in _TYPES:
+            return {"type": _TYPES[key.sort]} | (dict(_further(name) or {}) if key.sort == "list" else {})
+        text = {"type": "string"} | dict(_further(name) or ({"minLength": 1} if "_names." in name else {}))
         if key.sort == "texts":
-            one = {"type": "string"} | dict(_further(key.name) or {})
-            listed = {"type": "array", "items": one | {"minLength": 1}, "minItems": 1, "maxItems": MOST_FILES}
-            return {"anyOf": [one, listed]} | description
-        if key.sort == "table":
-            return {"type": "object"} | description
+            listed = {
+                "type": "array",
+                "items": text | {"minLength": 1},
+                "minItems": 1,
+                "maxItems": MOST_FILES,
+            }
+            return {"anyOf": [text, listed]}
         choices = [word.strip('"') for word in key.words if word.startswith('"')]
         if choices and len(choices) == len(key.words):
-            return {"type": "string", "enum": choices} | description
+            return {"type": "string", "enum": choices}
         # a file or a designation is allowed beside the known names
-        name = f"{table.name}.{key.name}".lstrip(".")
-        further = _further(name) or ({"minLength": 1} if "_names." in name else {})
-        form: dict[str, Any] = {"type": "string"} | dict(further)
-        return form | ({"examples": choices} if choices else {}) | description
+        return text | ({"examples": choices} if choices else {})
 
     def _list(self, key: Key) -> dict[str, Any]:
         assert key.items is not None

@@ -7,23 +7,19 @@ import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
 from ..system import run_together
 from ..system.certificate import torque_names
-from .arrays import peak
+from .arrays import Dataset, peak
 from .drive import Drive
 from .event import Event
 from .measures import STARTED, time_to_start
 from .relay import class_holding, start_seconds
 from .rig import Rig, join
 from .torques import CURVE, PeakOf, at_gear, on_coupling, quasi_static_peak
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 START_ANGLES = 8
 """Number of crank angles, evenly over the turn, from which the machine is started."""
@@ -149,7 +145,7 @@ def _read(rig: Rig) -> list[str]:
 
 
 def _numbers(
-    drive: Drive, angle: float, run: xr.Dataset, reached: float | None, peak_of: PeakOf, before: float
+    drive: Drive, angle: float, run: Dataset, reached: float | None, peak_of: PeakOf, before: float
 ) -> StartNumbers:
     """The numbers of a start that has `reached` its speed at that time [s]."""
     time, current = run["time"].values, np.abs(run[f"motor.{drive.motor.current}"].values)
@@ -177,7 +173,7 @@ def _numbers(
     )
 
 
-def speed_backwards(drive: Drive, run: xr.Dataset) -> float:
+def speed_backwards(drive: Drive, run: Dataset) -> float:
     """The largest speed of an induction motor backwards in a run, over the synchronous one, once it has turned
     forwards; 0 if it never turns back. A load that turns a motor back at first does not count."""
     share = run["motor.w"].values / _synchronous(drive)
@@ -191,7 +187,7 @@ def _synchronous(drive: Drive) -> float:
     return float(2.0 * math.pi * p.supply.f / p.pole_pairs)
 
 
-def speed_in_star(drive: Drive, run: xr.Dataset) -> float | None:
+def speed_in_star(drive: Drive, run: Dataset) -> float | None:
     """The speed of the motor at the end of its time in star in a run from rest, over the synchronous one; None for
     another start."""
     if drive.star_delta is None:

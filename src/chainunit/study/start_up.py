@@ -6,19 +6,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..system import Simulation
 from ..work.progress import Progress
+from .arrays import Dataset
 from .measures import STARTED
 from .readings import crank_motion, only_whole_turns, turns_made
 from .rig import Rig, join
 from .window import Phase, Window, is_settled, whole_turns
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LONGEST_START = 30.0
 """Time after the ramp at which an empty machine is fed, unless it would reach its speed in `LONGEST_RISE`
@@ -42,13 +39,13 @@ class StartUp:
     """Start-up and steady running: the run, the time from which it is steady and the time to which it should
     have run [s], and the `rig` with which the study goes on."""
 
-    run: xr.Dataset
+    run: Dataset
     steady_from: float
     stop: float
     rig: Rig
 
     @cached_property
-    def turns(self) -> xr.Dataset:
+    def turns(self) -> Dataset:
         """The turns of steady running that are evaluated, see `whole_turns`."""
         run = self.run.sel(time=slice(self.steady_from, None))
         return whole_turns(self.rig.drive, run, self.rig.operation.run.turns)
@@ -65,7 +62,7 @@ class StartUp:
 
 def _start_empty(
     rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
-) -> tuple[xr.Dataset, Rig]:
+) -> tuple[Dataset, Rig]:
     """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a
     guard ends it, or until it is clear that the machine speeds up too slowly; and the rig that is fed
     from then on."""
@@ -94,7 +91,7 @@ def _start_empty(
 def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]) -> StartUp:
     """Start-up and steady running to the time at which it should end, or longer, see `_missing`; a machine that
     starts empty runs so long after it is fed."""
-    pieces: list[xr.Dataset] = []
+    pieces: list[Dataset] = []
     steady_from, stop = rig.operation.steady_begin, rig.operation.stop
     if rig.operation.empty_start:
         run, rig = _start_empty(rig, simulation, progress, guards)
@@ -124,7 +121,7 @@ def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mappi
     return StartUp(run, steady_from, stop, rig)
 
 
-def speeds_up(rig: Rig, run: xr.Dataset, before: float = 0.0) -> bool:
+def speeds_up(rig: Rig, run: Dataset, before: float = 0.0) -> bool:
     """Whether the start has not ended with the last turn of a run, and ends by the rise of its speed over this turn
     within `LONGEST_RISE` after the ramp. `before` is the time from rest to the zero of the run's own time [s]."""
     angle, speed = crank_motion(rig.drive, run)
@@ -141,22 +138,15 @@ def speeds_up(rig: Rig, run: xr.Dataset, before: float = 0.0) -> bool:
     return lack > 0.0 and rise > RISES * mean and lack * span <= rise * left
 
 
-def until_settled(
-    rig: Rig,
-    simulation: Simulation,
-    stop: float,
-    length: float,
-    most: float = math.inf,
-    late: float = math.inf,
-) -> list[xr.Dataset]:
+def until_settled(rig: Rig, simulation: Simulation, stop: float, length: float, late: float) -> list[Dataset]:
     """Runs of a turning drive, the first to the time `stop` [s], each further one of the `length` [turns], until the
-    whole turns of a run, at most `most`, close, it makes none, or `PATIENCE` has passed; a start that has not ended
-    is awaited up to the time `late` [s]."""
+    whole turns of a run close, it makes none, or `PATIENCE` has passed; a start that has not ended is awaited up to
+    the time `late` [s]."""
     turn, drive = rig.operation.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
     longest = stop + PATIENCE * turn
     while simulation.time < longest:
-        turns = only_whole_turns(drive, runs[-1], most)
+        turns = only_whole_turns(drive, runs[-1])
         if turns is None or is_settled(drive, turns):
             break
         if speeds_up(rig, runs[-1]):
@@ -167,7 +157,7 @@ def until_settled(
     return runs
 
 
-def _missing(rig: Rig, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:
+def _missing(rig: Rig, run: Dataset, steady_from: float) -> tuple[float | None, float]:
     """The number of turns that are still missing for the evaluation, as the crank turns too slowly or the motor
     has not settled, or None where none is missing; and the time from which running is steady [s], a turn later
     if the motor has not settled."""

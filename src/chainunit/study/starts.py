@@ -14,13 +14,13 @@ from ..reading.text import number
 from .analysis import Analysis, Findings, Work
 from .catalogue_drive import usual_boost
 from .drive import Drive
-from .event_torques import running_peak, running_words
+from .operation import DriveTables
 from .record import StudyRecord
 from .remark import fault, warning
 from .rig import Rig
 from .sections import SOFTER
 from .start_runs import BACKWARDS, StartNumbers, longest_start, starts_from_all
-from .torques import at_gear
+from .torques import at_gear, running_peak, running_words
 from .verdict import START
 
 LIMIT = "starter.inverter.limit"
@@ -163,11 +163,11 @@ _NO_START = fault(
 
 
 def _with_own_limit(
-    study: StudyRecord, rig: Rig, starts: Sequence[StartNumbers], longest: float
+    tables: DriveTables, rig: Rig, starts: Sequence[StartNumbers], longest: float
 ) -> tuple[tuple[StartNumbers, ...], float | None]:
     """The starts with the current limit of an inverter with the rated current of the motor, and this limit [A]; none
     where the starts take less current, where the file gives a limit, or on the line."""
-    drive, tables = rig.drive, study.config.drive
+    drive = rig.drive
     limit = tables.starter.overload * (drive.rated_current or 0.0)
     if not drive.follows or LIMIT in tables.given or max(start.current for start in starts) <= limit:
         return (), None
@@ -220,8 +220,8 @@ class StartAnalysis(Analysis):
         work.progress(f"starts from other {study.driver_noun} angles", 1.0, 1.0)
         rig, longest = work.rig, longest_start(work.rig.operation.ramp_end, study.start.start_time)
         starts = starts_from_all(rig, longest)
-        limited, limit = _with_own_limit(study, rig, starts, longest)
         tables = study.config.drive
+        limited, limit = _with_own_limit(tables, rig, starts, longest)
         permitted = tables.gear.start_limit if "gear.torque_limit" in tables.given else math.inf
         running = running_peak(study, at_gear)
         return StartFindings(tuple(starts), running.torque, permitted, running.run, limited, limit)

@@ -45,7 +45,12 @@ def statics(drive: Drive, turns: Mapping[str, Cycle], step: float) -> DriveStati
     """
     turn = next(iter(turns.values()))
     inertia = turn.inertia_at(drive.ratio)
-    modes = None if drive.line.part("driveline") is None else _modes(drive, inertia, step)
+    modes = None if drive.line.part("driveline") is None else line_modes(drive, inertia)
+    if modes is not None and step > modes.step_longest:
+        raise InputError(
+            f"run.step = {step:g} s: the driveline swings at {modes.k_largest:.4g} rad/s; must be <= "
+            f"{modes.step_longest:.3g} s"
+        )
     return DriveStatics(
         cycles=turns,
         loops={} if drive.foreign else _loops(drive, inertia),
@@ -69,14 +74,3 @@ def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
         for name, size in sizes.items()
     }
     return {name: loop for name, loop in loops.items() if loop is not None}
-
-
-def _modes(drive: Drive, inertia: Any, step: float) -> LineModes:
-    """The natural frequencies of the line; a communication step [s] that is too long for them is refused."""
-    line = line_modes(drive, inertia)
-    if step > line.step_longest:
-        raise InputError(
-            f"run.step = {step:g} s: the driveline swings at {line.k_largest:.4g} rad/s; must be <= "
-            f"{line.step_longest:.3g} s"
-        )
-    return line

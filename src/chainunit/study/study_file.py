@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..mechanism.models import MachineModel
+from .capability import FileReference
 from .config import Config
 from .parts import LENGTHS
 from .registry import registered
@@ -39,16 +40,25 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
             inner = inner.setdefault(part, {})
         inner[last] = float(value)
     tables["title"] = f"{config.title}: {title}" if config.title else title.capitalize()
-    for table, key in (("", "catalogue"), ("system", "machine"), ("system", "motor"), ("machine", "linkage")):
-        inner = tables.get(table, {}) if table else tables
-        if isinstance(inner.get(key), str) and inner[key].lower().endswith((".toml", ".fmu", ".csv")):
-            inner[key] = _from(folder, Path(config.file.source).parent / inner[key])
-    if isinstance(names := tables.get("catalogue"), list):
-        tables["catalogue"] = [_from(folder, Path(config.file.source).parent / name) for name in names]
-    for file in (file for part in registered() for file in part.files(tables)):
-        if file.name in file.table:
-            file.table[file.name] = _from(folder, Path(config.file.source).parent / file.table[file.name])
+    for file in named_files(tables):
+        file.table[file.name] = _from(folder, Path(config.file.source).parent / file.table[file.name])
     return tables
+
+
+def named_files(tables: Mapping[str, Any]) -> Iterator[FileReference]:
+    """The files that the tables of a study file name: catalogues, motor and machine, and files of capabilities."""
+    catalogues: Any = tables.get("catalogue")
+    if isinstance(catalogues, list):
+        yield from (FileReference("catalogue", catalogues, place) for place in range(len(catalogues)))
+    for table, key in (("", "catalogue"), ("system", "motor"), ("system", "machine"), ("machine", "linkage")):
+        inner: Any = tables.get(table, {}) if table else tables
+        name = inner.get(key)
+        if isinstance(name, str) and (
+            name if key == "catalogue" else name.lower().endswith((".toml", ".fmu"))
+        ):
+            yield FileReference(f"{table}.{key}".removeprefix("."), inner, key)
+    for part in registered():
+        yield from (file for file in part.files(tables) if file.table.get(file.name))
 
 
 def _place(model: MachineModel, name: str) -> int:

@@ -1,10 +1,9 @@
-"""The torque on the parts between motor and machine in a run, at the crank: on a torque limiter on the
-motor's shaft, and at the output of the gear."""
+"""The torque on the parts between motor and machine, at the crank: on a torque limiter on the motor's shaft, and at
+the output of the gear; in a run, in the events of a study, and in its normal duty."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,31 +11,35 @@ import numpy as np
 from ..core.engines import numpy_
 from ..drives.gearing import geared_acceleration
 from ..drives.induction_steady import steady
-from .arrays import peak
+from .arrays import Dataset, peak
 from .drive import Drive
+from .event import Role
+from .proposal import DutyPeak
 from .readings import crank_torque, load_inertia
+from .verdict import START, STEADY
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from .record import StudyRecord
 
-PeakOf = Callable[[Drive, "xr.Dataset"], float]
+
+PeakOf = Callable[[Drive, Dataset], float]
 """The peak of a torque in a run, at the crank [N m]."""
 
 
-def on_coupling(drive: Drive, run: xr.Dataset) -> float:
+def on_coupling(drive: Drive, run: Dataset) -> float:
     """Peak torque in a run on a coupling that sits on the motor shaft behind rotor and added inertia, at the crank
     [N m]: the torque of the motor less the one that accelerates the inertia on its side."""
     return peak(run[drive.motor_torque].values) * drive.ratio
 
 
-def gear_torque(drive: Drive, run: xr.Dataset) -> Any:
+def gear_torque(drive: Drive, run: Dataset) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where the
     driveline is there, else at the crank."""
     behind_gear = bool(drive.line) and drive.driven_machine.ratio == 1.0
     return run[drive.motor_torque].values * drive.ratio if behind_gear else crank_torque(drive, run)
 
 
-def at_gear(drive: Drive, run: xr.Dataset) -> float:
+def at_gear(drive: Drive, run: Dataset) -> float:
     """Peak torque in a run at the output of the gear [N m], see `gear_torque`."""
     return peak(gear_torque(drive, run))
 
@@ -45,7 +48,7 @@ CURVE = ("motor.v", "motor.supply.frequency", "machine.tau_bias", "machine.J")
 """The outputs of a run, beside the speed, that `quasi_static_torque` follows from."""
 
 
-def quasi_static_torque(drive: Drive, run: xr.Dataset, before: float = 0.0) -> Any:
+def quasi_static_torque(drive: Drive, run: Dataset, before: float = 0.0) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,), by load and acceleration: the motor gives the
     torque of its curve at the present speed, voltage and frequency, and accelerates rotor and machine as one body.
     With the inertia `before` [kg m2 at the motor's shaft] it is that on a part which accelerates this inertia, too.
@@ -67,7 +70,7 @@ def quasi_static_torque(drive: Drive, run: xr.Dataset, before: float = 0.0) -> A
     return ratio * (load + (inertia + before / (1.0 + drive.gear_loss)) * a)
 
 
-def quasi_static_peak(drive: Drive, run: xr.Dataset, peak_of: PeakOf = at_gear, before: float = 0.0) -> float:
+def quasi_static_peak(drive: Drive, run: Dataset, peak_of: PeakOf = at_gear, before: float = 0.0) -> float:
     """Peak torque of a part in a run by load and acceleration, at the crank [N m], see `quasi_static_torque`; at
     most what `peak_of` reads from the run, whose motor may speed up faster than its field follows the curve."""
     most = peak_of(drive, run)
@@ -76,15 +79,7 @@ def quasi_static_peak(drive: Drive, run: xr.Dataset, peak_of: PeakOf = at_gear, 
     return min(peak(quasi_static_torque(drive, run, before)), most)
 
 
-@dataclass(frozen=True)
-class DutyPeak:
-    """The largest torque of normal duty without the starts, at the crank [N m], and the run in which it is."""
-
-    torque: float
-    run: str
-
-
-def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], peak_of: PeakOf) -> DutyPeak:
+def duty_peak(drive: Drive, runs: Iterable[tuple[str, Dataset]], peak_of: PeakOf) -> DutyPeak:
     """The largest torque, read by `peak_of`, in the runs of normal duty, each with its name: steady running, events
     that may last, and all feed on either side (`all_feed_on`)."""
     return max((DutyPeak(peak_of(drive, run), name) for name, run in runs), key=lambda peak: peak.torque)
@@ -93,3 +88,55 @@ def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], peak_of: Pea
 def all_feed_on(side: str) -> str:
     """The name of the run with all feed on a side, and while it moves there."""
     return f"all_feed_on_the_{side}"
+
+
+def from_event_on(study: StudyRecord, name: str) -> Dataset:
+    """The part of a run from the begin of its event on."""
+    return study.runs[name].sel(time=slice(study.event[name], None))
+
+
+def peaks_in_events(study: StudyRecord, *roles: Role) -> dict[str, float]:
+    """Peak torque on a coupling in each event with one of these `roles`, or in every event without `roles` [N m]."""
+    events = study.config.events
+    return {
+        name: on_coupling(study.drive, from_event_on(study, name))
+        for name in study.event
+        if name in study.runs and (not roles or events[name].role in roles)
+    }
+
+
+def gear_peaks(study: StudyRecord) -> dict[str, float]:
+    """Peak torque at the output of the gear in steady running, in the start-up and in each event [N m], by the name
+    of the run. If the supply is switched, in starts and in disturbances, it is that by load and acceleration."""
+    events, rise = study.config.events, study.runs["start_up"].sel(time=slice(None, study.steady_begin))
+    peaks = {
+        STEADY: at_gear(study.drive, study.steady),
+        START: quasi_static_peak(study.drive, rise),
+    }
+    for name in study.event:
+        if name in study.runs:
+            is_switched = events[name].from_rest or events[name].role is Role.DISTURBANCE
+            peak_of = quasi_static_peak if is_switched else at_gear
+            peaks[name] = peak_of(study.drive, from_event_on(study, name))
+    return peaks
+
+
+def running_peak(study: StudyRecord, peak_of: PeakOf = on_coupling) -> DutyPeak:
+    """The largest torque of normal duty without the starts: of steady running, of events that may last, and of the
+    runs from which a drive was chosen."""
+    events = study.config.events
+    lasting = [
+        (name, from_event_on(study, name))
+        for name in study.event
+        if name in study.runs and events[name].role is Role.DUTY and not events[name].from_rest
+    ]
+    peaks = [duty_peak(study.drive, [(STEADY, study.steady), *lasting], peak_of)]
+    if study.proposal is not None and study.proposal.duty is not None:
+        peaks.append(study.proposal.duty)
+    return max(peaks, key=lambda peak: peak.torque)
+
+
+def running_words(study: StudyRecord, run: str) -> str:
+    """The case of normal duty of a run, in words."""
+    title = study.title_of(run)
+    return title if run == STEADY else f"running ({title})"

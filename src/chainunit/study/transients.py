@@ -6,20 +6,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..system import Jump, ModelComponent, Profile, Simulation, System, monolithic
 from ..work.progress import Progress
+from .arrays import Dataset
 from .drive_fmus import coasting_model, coasting_parameters
 from .event import Event, Signals, angle_of_begin
 from .readings import machine_series
 from .rig import Rig, join
 from .window import time_at
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 DIFFERENCE = "_difference_to_monolithic"
 """Suffix of the name of a variable for its largest difference to the monolithic solution, over its peak."""
@@ -34,10 +32,10 @@ class Transient:
 
     event: Event
     begin: float
-    run: xr.Dataset
+    run: Dataset
     signals: Signals
     jumps: dict[str, Jump]
-    lead: xr.Dataset | None = None
+    lead: Dataset | None = None
 
 
 def lead_times(
@@ -78,7 +76,7 @@ def follow(
     state: dict[str, float] = {}
     pieces = []
     if event.reads:
-        before = dict(rig.inputs[name] for name in event.inputs(event.side))
+        before = dict(rig.inputs[name] for name in event.inputs)
         simulation.signals = rig.signals(before)
         pieces.append(simulation.run(begin, rig.step, progress))
         state = {name: float(pieces[0][f"machine.{name}"][-1]) for name in event.reads}
@@ -95,7 +93,7 @@ def follow(
 
 def follow_each(
     rig: Rig, simulation: Simulation, events: Sequence[Event], angle: float, speed: float
-) -> Iterator[tuple[Event, xr.Dataset]]:
+) -> Iterator[tuple[Event, Dataset]]:
     """Each of the `events` with its run from its begin on, without guards. The simulation is at its saved state; for
     `angle` and `speed` see `lead_times`."""
     saved = simulation.time
@@ -105,7 +103,7 @@ def follow_each(
         yield event, run.sel(time=slice(begin, None))
 
 
-def coast(rig: Rig, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:
+def coast(rig: Rig, transient: Transient, run: Dataset, stop: float, file: Path) -> Dataset:
     """The run of the machine (FMU `file`) behind the coupling that opened at the end of `run`, with the
     same loads. It ends a second after the time `stop` [s] to which the motor would have been followed."""
     begin = float(run["time"][-1])
@@ -119,7 +117,7 @@ def coast(rig: Rig, transient: Transient, run: xr.Dataset, stop: float, file: Pa
         return simulation.run(max(stop, begin) + 1.0, rig.step)
 
 
-def release(rig: Rig, simulation: Simulation, run: xr.Dataset, time: float) -> tuple[xr.Dataset, float]:
+def release(rig: Rig, simulation: Simulation, run: Dataset, time: float) -> tuple[Dataset, float]:
     """A run that ended when the coupling opened, continued for the `time` [s] until no torque passes the
     coupling; and the energy that passes in that time [J]."""
     if time <= 0.0:
@@ -131,7 +129,7 @@ def release(rig: Rig, simulation: Simulation, run: xr.Dataset, time: float) -> t
 
 
 def compare(
-    rig: Rig, run: xr.Dataset, transient: Transient | None = None, start: Mapping[str, float] | None = None
+    rig: Rig, run: Dataset, transient: Transient | None = None, start: Mapping[str, float] | None = None
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Compare a run with the monolithic solution of the same signals, from the states `start` on or from
     rest. Returns the differences of torque and speed, relative to their peaks, and the states at the

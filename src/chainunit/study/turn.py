@@ -11,8 +11,7 @@ from ..core.quantities import Value, declaration, quantity
 from ..reading.results import derived, part, result
 from .analysis import Analysis, Findings, Work
 from .arrays import peak
-from .cycle import Cycle, cycle, energy_swing
-from .load_cases import no_feed
+from .cycle import Cycle, cycle, energy_swing, no_feed
 from .record import StudyRecord
 
 POINTS = 3600
@@ -75,9 +74,6 @@ class TurnFindings(Findings):
         """The course over the turn."""
         curves = (self.loaded.angle, self.loaded.crank_torque, self.free.crank_torque, self.inertia)
         return TurnCourse(*(x[::EVERY] for x in curves))
-
-    def remark(self, study: StudyRecord) -> None:
-        """No remarks: the numbers are enough."""
 
 
 class TurnAnalysis(Analysis):

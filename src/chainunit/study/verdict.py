@@ -8,22 +8,18 @@ capability that brings another model brings its verdict, too.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Set
+from collections.abc import Collection, Mapping, Set
 from dataclasses import field, replace
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from ..core.descriptions import USUAL_DRIVER
 from ..core.quantities import quantity
 from ..machines.chain_unit import RodName
 from ..reading.results import OWN, derived, part, result
 from ..reading.text import number
-from .pulls import LeastPull
+from .organ_limits import LeastPull, passed_limits, speed_limits
 from .remark import Remark, RemarkCode, fault, warning
 
-ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6
-"""Crank speeds, relative to the lowest natural frequency of the organ, up to which two bars give the rocker
-torque (loaded, with an empty side) and the crank torque to a tenth of the peak of chains; found on the
-packaged machine, see docs/physics.md."""
 RESIDUAL = 1e-3
 """Energy residual, relative to the energy moved, up to which a run counts as right."""
 BARS = "two bars"
@@ -102,13 +98,6 @@ TOPICS: Mapping[str, Topic] = {
 }
 """By kind of fault, its words."""
 _SLACK_AT_REST = fault("model-slack-at-rest", "A web is slack at rest already{where}.")
-_BEYOND = {
-    "slack speed": "Crank speed at or above the speed at which a web goes slack",
-    "crank torque": "Crank speed too high for the crank torque of two bars, which may be off by more than 10 %; the "
-    "limit for the rocker torque is lower",
-    "rocker torque": "Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %",
-}
-"""By limit of the crank speed, the words on speeds beyond it."""
 
 
 @result
@@ -170,19 +159,6 @@ class Verdict:
         return "false" if any(reason.grave for reason in self.reasons) else "in part"
 
     @property
-    def _judged_speed(self) -> str:
-        return _speed(self.speed)
-
-    @property
-    def _turns(self) -> str:
-        return _speed(self.speed if self.actual is None else shown_speed(self.actual, self.speed))
-
-    @property
-    def _is_at_requested_speed(self) -> bool:
-        """Whether the model is judged at a speed that the crank does not have."""
-        return self._turns != self._judged_speed
-
-    @property
     def _stalls(self) -> bool:
         """Whether the crank hardly turns."""
         return self.actual is not None and abs(self.actual) < CREEPS * self.speed
@@ -221,12 +197,9 @@ class Verdict:
         holds = _HOLDS[self.holds].format(_BARS_IN_PART if self.model == BARS else "")
         if self._stalls and self.holds != "false":
             holds = f"would be {holds} if the {self.driver} turned"
-        line = f"{_SUBJECTS[self.subject].format(self.model)}, {self.driver} at "
-        line += (
-            f"{self._turns}, judged at the required {self._judged_speed}"
-            if self._is_at_requested_speed
-            else self._judged_speed
-        )
+        judged, turns = _speed(self.speed), _speed(shown_speed(self.reached, self.speed))
+        line = f"{_SUBJECTS[self.subject].format(self.model)}, {self.driver} at {turns}"
+        line += "" if turns == judged else f", judged at the required {judged}"
         why, remedies = [], []
         for topic, (short, _, remedy) in self.topics.items():
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
@@ -312,47 +285,6 @@ def _where(runs: Set[str]) -> str:
     return f"in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]} "
 
 
-@result
-class SpeedLimit:
-    """A limit of the crank speed for two bars as a model of the organs."""
-
-    topic: str = part("kind of limit, as of a reason")
-    speed: float = part("crank speed", unit="rad/s", kind="speed", name="limit")
-    grave: bool = False
-
-    def passed(self, speed: Any) -> Any:
-        """Whether each crank speed [rad/s] is beyond the limit, shape of `speed`."""
-        return speed >= self.speed if self.topic == "slack speed" else speed > self.speed
-
-    @derived(name="text")
-    def words(self) -> str:
-        """The begin of a sentence on speeds beyond it."""
-        return _BEYOND[self.topic]
-
-
-def speed_limits(slack_speed: float, mode: float, empty: bool = False) -> tuple[SpeedLimit, ...]:
-    """The limits of the crank speed for two bars: that of slack webs, of the crank torque and of the rocker torque.
-
-    Parameters
-    ----------
-    slack_speed, mode : see `two_bars`
-    empty : whether a side carries no material
-    """
-    return (
-        SpeedLimit("slack speed", slack_speed, grave=True),
-        SpeedLimit("crank torque", CRANK_GOOD * mode, grave=True),
-        SpeedLimit("rocker torque", (ROCKER_GOOD_EMPTY if empty else ROCKER_GOOD) * mode),
-    )
-
-
-def passed_limits(limits: Iterable[SpeedLimit], speed: float) -> list[SpeedLimit]:
-    """The limits that a crank speed [rad/s] passes. Where the crank torque may be wrong, the rocker torque is not
-    named beside it."""
-    passed = [limit for limit in limits if limit.passed(speed)]
-    whole = any(limit.topic == "crank torque" for limit in passed)
-    return [limit for limit in passed if not (whole and limit.topic == "rocker torque")]
-
-
 def two_bars(
     speed: float,
     mode: float,
@@ -400,35 +332,11 @@ def two_bars(
     return Verdict("organs", BARS, speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
 
 
-def rigid_links(
-    speed: float, residuals: Mapping[str, float], *, actual: float | None = None, driver: str = USUAL_DRIVER
-) -> Verdict:
-    """The verdict on a linkage without organs, whose links are rigid: it holds where the energy balance is kept.
-
-    Parameters
-    ----------
-    speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another [rad/s]
-    residuals : by run, the energy residual over the energy moved
-    driver : the noun of the link that the motor turns
-    """
-    return Verdict("machine", "rigid links", speed, tuple(balance_faults(residuals)), actual, driver)
-
-
-def foreign_machine(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
-    """The verdict on a machine that is a foreign FMU: only on its energy balance.
-
-    Parameters
-    ----------
-    speed, actual, residuals : see `rigid_links`
-    """
-    return Verdict("energy balance", None, speed, tuple(balance_faults(residuals)), actual)
-
-
-def balance_faults(residuals: Mapping[str, float]) -> list[Reason]:
+def balance_faults(residuals: Mapping[str, float]) -> tuple[Reason, ...]:
     """The runs, by their energy residual over the energy moved, whose balance is not kept."""
-    return [
+    return tuple(
         Reason("energy", "energy_residual", share, RESIDUAL, "1", run, grave=run == STEADY)
         for run, share in residuals.items()
         # a balance of NaN is not kept either
         if not share < RESIDUAL
-    ]
+    )

@@ -7,19 +7,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .arrays import peak
+from .arrays import Dataset, peak
 from .drive import Drive
-from .readings import crank_motion, crank_speed, crank_torque, has_turn, only_whole_turns, series
+from .readings import (
+    crank_motion,
+    crank_speed,
+    crank_torque,
+    energy_behind,
+    energy_gap,
+    energy_held,
+    has_turn,
+    only_whole_turns,
+    series,
+)
 from .relay import LIGHT
-from .stored import energy_behind, energy_gap, energy_held
 from .verdict import CREEPS
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
@@ -36,7 +42,7 @@ LASTING = 0.05
 _EVEN = 1e-4
 """Relative change of the speed over the steady turns that counts as none."""
 
-Reading = Callable[[Drive, "xr.Dataset"], Any]
+Reading = Callable[[Drive, Dataset], Any]
 """A value that is read from a run of a drive, shape (time,)."""
 
 
@@ -58,7 +64,7 @@ class Trip:
 
     time: float
     energy: float
-    coasting: xr.Dataset | None
+    coasting: Dataset | None
 
 
 @dataclass(frozen=True)
@@ -68,7 +74,7 @@ class Window:
     opened."""
 
     phase: Phase
-    run: xr.Dataset
+    run: Dataset
     drive: Drive
     sides: tuple[str, ...]
     """sides whose organs have a weight"""
@@ -86,7 +92,7 @@ class Window:
         return series(self.run, name)
 
     @cached_property
-    def turns(self) -> xr.Dataset:
+    def turns(self) -> Dataset:
         """The rows over which means and RMS are taken: whole turns of steady running, or all of it where the crank
         does not make one; of another run all that is followed, as its turns differ."""
         return whole_turns(self.drive, self.run) if self.phase is Phase.STEADY else self.run
@@ -107,7 +113,7 @@ class Window:
         return self.mean(crank_speed)
 
     @property
-    def coasting(self) -> xr.Dataset | None:
+    def coasting(self) -> Dataset | None:
         """The run of the machine behind a coupling that opened; else None."""
         return self.trip.coasting if self.trip else None
 
@@ -195,19 +201,19 @@ class Window:
         return min(pulls, default=math.inf)
 
 
-def mean(run: xr.Dataset, x: Any) -> float:
+def mean(run: Dataset, x: Any) -> float:
     """Mean over the time of a run, by the trapezoidal rule."""
     time = run["time"].values
     return float(np.trapezoid(x, time) / (time[-1] - time[0]))
 
 
-def whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset:
+def whole_turns(drive: Drive, run: Dataset, most: float = math.inf) -> Dataset:
     """Whole turns of a run, see `only_whole_turns`; all of it where the crank does not make one."""
     turns = only_whole_turns(drive, run, most)
     return run if turns is None else turns
 
 
-def time_at(drive: Drive, run: xr.Dataset, angle: float) -> float | None:
+def time_at(drive: Drive, run: Dataset, angle: float) -> float | None:
     """Time [s] at which the crank passes the `angle` [rad] in a run, by a cubic between two rows; None where it does
     not get there."""
     from scipy.interpolate import CubicHermiteSpline
@@ -223,7 +229,7 @@ def time_at(drive: Drive, run: xr.Dataset, angle: float) -> float | None:
     return float(CubicHermiteSpline(angles, times, 1.0 / speeds)(angle))
 
 
-def end_gap(drive: Drive, turns: xr.Dataset) -> float:
+def end_gap(drive: Drive, turns: Dataset) -> float:
     """Difference between the ends of `turns` over the largest value: the larger one of crank speed and
     torque."""
     _, speed = crank_motion(drive, turns)
@@ -231,7 +237,7 @@ def end_gap(drive: Drive, turns: xr.Dataset) -> float:
     return max(abs(float(size)) for size in sizes)
 
 
-def drift(drive: Drive, turns: xr.Dataset) -> float:
+def drift(drive: Drive, turns: Dataset) -> float:
     """Change of the crank speed between the ends of `turns`, relative to its ripple: 0 where it hardly
     changes, positive where it rises, 1 or -1 where it only rises or falls."""
     _, speed = crank_motion(drive, turns)
@@ -246,7 +252,7 @@ def closes(gap: float, drifts: float, energy: float) -> bool:
     return gap <= CLOSED and abs(drifts) <= DRIFT and abs(energy) <= STORED
 
 
-def is_settled(drive: Drive, turns: xr.Dataset) -> bool:
+def is_settled(drive: Drive, turns: Dataset) -> bool:
     """Whether `turns` close, or are of a machine that never repeats a turn."""
     if drive.simulated_machine.model.never_repeats:
         return True

@@ -9,8 +9,8 @@ from pydantic import Field
 from chainunit.core.errors import InputError, near_name, shown
 from chainunit.report.capability import Capability, Contents
 from chainunit.study.analysis import Analysis
-from chainunit.study.file_reading import FileReading
-from chainunit.study.file_section import FileSection
+from chainunit.study.config import FileReading
+from chainunit.study.file_section import FileSection, TableForm
 from chainunit.study.rules import MACHINE_FMU, Rule
 
 from .table import LifePlan, PinLifeTable
@@ -28,7 +28,7 @@ class PinLifeCapability(Capability):
             keys={"pin": (str, Field("", description="pin that gets a rolling bearing, by its title"))},
             title="Rolling bearing of a pin",
             apart=True,
-            required=("pin", "C"),
+            form=TableForm(required=("pin", "C")),
         )
     }
 

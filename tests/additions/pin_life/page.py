@@ -12,7 +12,7 @@ from chainunit.study.record import StudyRecord
 from .analysis import PinLife
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table of the life."""
     yield life_table(PinLife.of_study(study), "findings.pin_life")
 

@@ -13,7 +13,7 @@ from chainunit.report import study_task
 from chainunit.report.cited import cited, source_line
 from chainunit.report.task import Task
 from chainunit.study.config import Config
-from chainunit.study.heading import Heading
+from chainunit.study.provenance import Heading
 from chainunit.study.record import StudyRecord
 from chainunit.study.result import as_dict
 from chainunit.work.progress import TaskProgress

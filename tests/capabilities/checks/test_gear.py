@@ -25,12 +25,13 @@ from chainunit.capabilities.checks.gear import (
     rating_of,
 )
 from chainunit.capabilities.checks.row import Checks
-from chainunit.capabilities.checks.tables import GearRatingTable
+from chainunit.capabilities.checks.tables import GearRatingTable, MotorShaftTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.drives.gearing import Transmission
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.study import event_torques
+from chainunit.reading.results import InUnit
+from chainunit.study import torques
 from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
 
@@ -76,8 +77,13 @@ def test_the_example():
     assert shares["overhung load"] == pytest.approx(0.667, rel=0.01)
     radial = pulley_force(20.0, 0.16, 1.75)
     assert radial == pytest.approx(437.5, rel=0.01)
-    shaft = _PULLEY.row("motor", "checks.motor_shaft", ShaftLoad(20.0, radial), 700.0)
+    tables = {"motor_shaft": MotorShaftTable(pulley_diameter=0.16, tension_factor=1.75)}
+    shaft = _PULLEY.row("motor", "checks.motor_shaft", ShaftLoad(20.0, radial), 700.0, tables)
     assert shaft.utilisation == pytest.approx(0.625, rel=0.01)
+    # the numbers of the formula, of the findings and of the study file, with their places
+    assert shaft.letters["T"] == (InUnit(20.0, "N.m"), "findings.checks.motor_shaft.torque")
+    assert shaft.letters["f"] == (InUnit(1.75, "1"), "given.motor_shaft.tension_factor")
+    assert shaft.numbers["d"] == "motor_shaft.pulley_diameter"
 
 
 def test_the_torque_of_equal_damage_lies_between_mean_and_largest_and_grows_with_the_exponent():
@@ -171,13 +177,13 @@ def test_running_puts_its_torque_of_the_run_on_the_gear_not_that_of_the_curve(mo
     def of_run(drive, run):
         return float(run["torque"].max())
 
-    monkeypatch.setattr(event_torques, "at_gear", of_run)
-    monkeypatch.setattr(event_torques, "quasi_static_peak", lambda *given: 0.4 * of_run(*given))
+    monkeypatch.setattr(torques, "at_gear", of_run)
+    monkeypatch.setattr(torques, "quasi_static_peak", lambda *given: 0.4 * of_run(*given))
     study = SimpleNamespace(
         drive=None, config=SimpleNamespace(events={}), event={}, runs={"start_up": run}, steady_begin=2.5,
         steady=run.sel(time=slice(2.5, None)),
     )  # fmt: skip
-    assert event_torques.gear_peaks(study) == {"steady": 5.0, "start_up": pytest.approx(3.6)}
+    assert torques.gear_peaks(study) == {"steady": 5.0, "start_up": pytest.approx(3.6)}
 
 
 @pytest.mark.second

@@ -22,7 +22,6 @@ from chainunit.study.config import parse
 from chainunit.study.measures import read_measure
 from chainunit.study.relay import (
     CLASSES,
-    TRIPS_AT,
     protecting_class,
     relay_trip,
     stall_trip,
@@ -231,7 +230,7 @@ def test_the_clock_of_an_event_in_running_says_nothing_of_star():
         return read_measure("thermal_trip_time", window)
 
     current = np.full_like(time, 4.0)
-    usual = relay_trip(time, current, 1.0, 0.0, 4.0, 10, TRIPS_AT)
+    usual = relay_trip(time, current, 1.0, 0.0, 4.0, 10)
     assert trip(Phase.EVENT) == pytest.approx(usual)
     # 6 s of star heat three times as much
     assert trip(Phase.LOADED_START) == pytest.approx(usual - 12.0, rel=0.05)

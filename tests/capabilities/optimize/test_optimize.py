@@ -33,10 +33,10 @@ from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
-from chainunit.study.heading import Heading
+from chainunit.study.organ_limits import ROCKER_GOOD
 from chainunit.study.parts import EXAMPLES, example
+from chainunit.study.provenance import Heading
 from chainunit.study.study_file import toml_text
-from chainunit.study.verdict import ROCKER_GOOD
 
 LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
 TABLE = """

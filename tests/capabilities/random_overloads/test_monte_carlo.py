@@ -34,7 +34,6 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number as shown
-from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
 from chainunit.study import block_runs, quantiles
 from chainunit.study.block_runs import BlockRuns, Cause, EventSimulation
@@ -477,7 +476,7 @@ def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
         {"side": ("run", [])} | {v.name: ("run", []) for v in Layout(monte_carlo.Sample).variables}
     )
     findings = monte_carlo.MonteCarloResult(no_runs, Path("runs.nc"), task.method)
-    (block,) = page.blocks(Source({}), SimpleNamespace(findings={"monte_carlo": findings}))
+    (block,) = page.blocks(SimpleNamespace(findings={"monte_carlo": findings}))
     assert plain_line(block.line) == f"The random overloads were run {words}."
 
 

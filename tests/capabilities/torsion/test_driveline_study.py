@@ -563,8 +563,7 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     band = found.natural_frequency
     assert high[1] - low[0] > 2.0 * (band.largest - band.least)
     study.findings["torsion"] = found
-    source = blocks.Source({"torsion": as_data(found)})
-    shown = list(torsion_report.blocks(source, study))
+    shown = list(torsion_report.blocks(study))
     table = next(each for each in shown if isinstance(each, blocks.Table) and "ranges" in each.title)
     rows = {row.cells[0]: [cell.value for cell in row.cells[1:]] for row in table.rows if row.cells[2]}
     assert rows["natural frequency, over a turn of the shaft"] == pytest.approx([band.least, band.largest])

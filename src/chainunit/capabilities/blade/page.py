@@ -25,7 +25,7 @@ PICTURE = "blade_path.png"
 _EDGE = DrawnLink("edge", ENDS, "heavy")
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the blade."""
     findings = BladeFindings.of_study(study)
     rows = quantity_rows(cited(findings, "findings.blade").numbers, study.driver_noun, digits=4)

@@ -44,7 +44,7 @@ _ORDERS = (
 )
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """Text, tables and figure."""
     chain = ChainResult.of_study(study)
     x = cited(chain, "findings.chain")

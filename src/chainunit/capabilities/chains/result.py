@@ -9,7 +9,6 @@ from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Findings
 from ...study.quantiles import CONFIDENCE, HIGH
-from ...study.record import StudyRecord
 
 
 @declaration
@@ -139,6 +138,3 @@ class ChainResult(Findings):
             if low <= speed.speed <= high and clear:
                 speeds.append(speed)
         return speeds
-
-    def remark(self, study: StudyRecord) -> None:
-        """No remarks: they stand with those on the model."""

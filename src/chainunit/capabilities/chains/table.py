@@ -12,7 +12,7 @@ from ...core.quantities import Value, declaration, quantity
 from ...machines.api import ChainUnitMachine
 from ...machines.chain_organs import LEAST, MOST, USUAL, OrganLaw
 from ...machines.chain_unit import Parameters
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 from ...study.file_section import FileSection
 from ...study.organ_limits import slack_and_mode
 

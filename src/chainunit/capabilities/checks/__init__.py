@@ -8,7 +8,7 @@ from ...machines.machine import Machine
 from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 from ...study.record import StudyRecord
 from ...study.rules import MACHINE_FMU, MOTOR_FMU, Rule
 from .plan import CheckPlan, read_plan

@@ -85,7 +85,11 @@ class CheckAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> CheckFindings:
         """The checks over steady running, and of the largest loads of all runs."""
         plan: CheckPlan = study.config.plans[CheckAnalysis.name]
-        checks, turns, line = Checks(), has_turn(study.drive, study.steady), study.statics.rigid_line
+        checks, turns, line = (
+            Checks(tables=study.config.values),
+            has_turn(study.drive, study.steady),
+            study.statics.rigid_line,
+        )
         rolling, plain = bearings.find(study, plan.bearings, checks) if turns else ({}, {})
         if line is None:
             why = "the file gives no elastic line; add [driveline]"

@@ -20,11 +20,10 @@ from ...drives.gearing import Transmission
 from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
-from ...study.event_torques import gear_peaks, running_peak
 from ...study.readings import crank_angle, shaft_power, torque_before_gear
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
-from ...study.torques import at_gear, gear_torque
+from ...study.torques import at_gear, gear_peaks, gear_torque, running_peak
 from ...study.verdict import START
 from ...study.window import mean
 from .plan import CheckPlan

@@ -19,7 +19,7 @@ PATH = "findings.checks"
 """Place of the checks in the result of a study."""
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables of the checks: with all that stands behind each, with a line each, and for a sheet with a line each
     and behind them each clause and formula once, by its number in the table."""
     findings = CheckFindings.of_study(study)
@@ -44,11 +44,11 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     heads = b.heads("check", "value", "limit", "used")
     title = "Checks by clause"
     pairs = list(zip(rows, cited(findings, PATH).rows, strict=True))
-    noted = tuple(b.TableRow(_cells(s, row, x), _note(s, row, x)) for row, x in pairs)
+    noted = tuple(b.TableRow(_cells(row, x), _note(row, x)) for row, x in pairs)
     yield b.Table(noted, heads, title=title, note_title="clause, formula, numbers", form="long")
     laws = dict.fromkeys((row.clause, row.formula) for row in rows)
     places = {law: f"[{place}]" for place, law in enumerate(laws, 1)}
-    by_place = tuple(b.TableRow((*_cells(s, row, x), places[row.clause, row.formula])) for row, x in pairs)
+    by_place = tuple(b.TableRow((*_cells(row, x), places[row.clause, row.formula])) for row, x in pairs)
     used = b.Column("used", of_text=True)
     yield b.Table(by_place, (*heads[:3], used, *b.heads("by")), title=title, form="sheet")
     for (clause, formula), place in places.items():
@@ -56,22 +56,27 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if coupling is not None and coupling.candidates:
         x = cited(coupling, f"{PATH}.flexible_coupling").candidates
         yield _tried_couplings(coupling.candidates, x)
-    short = tuple(b.TableRow(_cells(s, row, x)) for row, x in pairs)
+    short = tuple(b.TableRow(_cells(row, x)) for row, x in pairs)
     yield b.Table(short, heads, title=title, form="short")
 
 
-def _cells(s: b.Source, row: CheckRow, x: CheckRow) -> tuple[b.Cell, ...]:
+def _cells(row: CheckRow, x: CheckRow) -> tuple[b.Cell, ...]:
     """A check, cited as `x`, in a line: its title, its value, its limit and the used share."""
     limit = line("at least " if row.at_least else "at most ", number(x.limit))
     # of a check that fails, a number that the result does not have is not finite
     value, used = ("-", "-") if row.holds else ("never", number_words(math.inf, "1", "used"))
     share = b.Share(number(x.utilisation, over=not row.holds, none=used))
-    return line(x.of, ": ", x.title), s.number(row.number, none=value), limit, share
+    return (
+        line(x.of, ": ", x.title),
+        number(cited(row.size, f"findings.{row.number}"), none=value),
+        limit,
+        share,
+    )
 
 
-def _note(s: b.Source, row: CheckRow, x: CheckRow) -> Line:
+def _note(row: CheckRow, x: CheckRow) -> Line:
     """Clause, formula, and the numbers of the formula."""
-    numbers = join([line(f"{symbol} = ", s.number(place)) for symbol, place in row.numbers.items()])
+    numbers = join([line(f"{symbol} = ", number(cited(*size))) for symbol, size in row.letters.items()])
     law = filled("{}. {}", x.clause, x.formula)
     return line(law, " (", numbers, ")") if numbers else law
 
@@ -106,7 +111,7 @@ def _tried_couplings(candidates: Sequence[CouplingCandidate], x: Sequence[Coupli
     return b.Table(tuple(rows), heads, numeric=False, title=title, form="long")
 
 
-def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def missing(study: StudyRecord) -> Iterator[b.Block]:
     """What was not checked, and why."""
     return table(
         cited(CheckFindings.of_study(study), PATH).not_checked,
@@ -117,7 +122,7 @@ def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     )
 
 
-def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def relay(study: StudyRecord) -> Iterator[b.Block]:
     """The classes of the relay, beside the start and the stall of the motor; nothing where no relay is checked."""
     relay = CheckFindings.of_study(study).relay
     if relay is None:

@@ -11,7 +11,7 @@ from ...drives.catalogue import offer
 from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.lists import Entry
 from ...reading.tables import instance
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 from ...study.parts import catalogues_of
 from . import tables as t
 

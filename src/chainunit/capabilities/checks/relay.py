@@ -15,7 +15,6 @@ import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
-from ...study.event_torques import from_event_on
 from ...study.record import StudyRecord
 from ...study.relay import (
     CLASSES,
@@ -30,6 +29,7 @@ from ...study.relay import (
     start_seconds,
 )
 from ...study.starts import StartFindings
+from ...study.torques import from_event_on
 from ...study.verdict import STEADY
 from .plan import CheckPlan
 from .row import CheckRule, Checks
@@ -119,7 +119,7 @@ def stall_heat(
     if before >= TRIPS_AT * setting:
         return None
     lasts = lasting_current(current, after)
-    trip = relay_trip(time, current, setting, before, lasts, relay_class.longest, TRIPS_AT)
+    trip = relay_trip(time, current, setting, before, lasts, relay_class.longest)
     if trip is None:
         return None
     until = time <= trip

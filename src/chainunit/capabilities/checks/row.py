@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...reading.results import OWN, derived, part, parts, result
+from ...reading.results import OWN, InUnit, derived, part, parts, result
 
 
 @result
@@ -27,6 +27,13 @@ class CheckRow:
     at_least: bool = part(
         "whether the value must reach the limit, in place of staying below it", default=False
     )
+    letters: Mapping[str, tuple[InUnit, str]] = field(default_factory=dict)
+    """by symbol of the formula, its number and the whole place of it"""
+
+    @property
+    def size(self) -> InUnit:
+        """The value with its unit."""
+        return InUnit(self.value, self.unit, self.kind)
 
     @derived("1", "used")
     def utilisation(self) -> float:
@@ -67,39 +74,42 @@ class CheckRule:
     letters: str = ""
     at_least: bool = False
 
-    def row(self, part: str, path: str, numbers: Any, limit: float, **slots: str) -> CheckRow:
-        """The row of a part: its `numbers` are a result that stands at `path` of the whole one."""
-        holder, name = _holder(numbers, self.value, slots)
-        kind: Any = type(holder)
-        declared = next(member for member in parts(kind) if member.name == name)
-        letters = {}
+    def row(
+        self, part: str, path: str, numbers: Any, limit: float, tables: Mapping[str, Any], **slots: str
+    ) -> CheckRow:
+        """The row of a part: its `numbers` are a result that stands at `path` of the findings; `tables` are tables of
+        the study file."""
+        size, letters = _size(numbers, self.value, slots), {}
         for letter, place in (pair.split(" = ") for pair in self.letters.split("; ") if pair):
             if place.startswith("/"):
-                letters[letter] = place[1:]
-            elif getattr(*_holder(numbers, place, slots)) is not None:
-                letters[letter] = f"{path}.{place.format(**slots)}"
+                letters[letter] = _size(tables, place[1:], slots), f"given.{place[1:]}"
+            elif (number := _size(numbers, place, slots)).value is not None:
+                letters[letter] = number, f"findings.{path}.{place.format(**slots)}"
         return CheckRow(
             of=part,
             title=self.title.format(**slots),
             clause=self.clause.format(**slots),
             formula=self.formula.format(**slots),
-            value=getattr(holder, name),
+            value=size.value,
             limit=limit,
             number=f"{path}.{self.value.format(**slots)}",
-            numbers=letters,
-            unit=declared.unit,
-            kind=declared.kind,
+            numbers={letter: place.partition(".")[2] for letter, (_, place) in letters.items()},
+            unit=size.unit,
+            kind=size.kind,
             at_least=self.at_least,
+            letters=letters,
         )
 
 
-def _holder(numbers: Any, place: str, slots: Mapping[str, str]) -> tuple[Any, str]:
-    """The result in `numbers` that has the number at that `place`, and its name there."""
+def _size(numbers: Any, place: str, slots: Mapping[str, str]) -> InUnit:
+    """The number at that `place` of the result `numbers`."""
     *steps, name = place.split(".")
     for step in steps:
         key = step.format(**slots)
         numbers = numbers[key] if isinstance(numbers, Mapping) else getattr(numbers, key)
-    return numbers, name
+    kind: Any = type(numbers)
+    declared = next(member for member in parts(kind) if member.name == name)
+    return InUnit(getattr(numbers, name), declared.unit, declared.kind)
 
 
 @dataclass(frozen=True)
@@ -108,6 +118,8 @@ class Checks:
 
     rows: list[CheckRow] = field(default_factory=list)
     missing: list[NotChecked] = field(default_factory=list)
+    tables: Mapping[str, Any] = field(default_factory=dict)
+    """the tables of the study file, of which some rules have numbers"""
 
     def lack(self, what: str, why: str, table: str = "") -> None:
         """Add something that is not checked."""
@@ -127,4 +139,4 @@ class Checks:
         if why and not limit:
             self.lack(f"{part}, {rule.title.format(**slots)}", why)
         else:
-            self.rows.append(rule.row(part, path, numbers, limit or 0.0, **slots))
+            self.rows.append(rule.row(part, path, numbers, limit or 0.0, self.tables, **slots))

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ...study.arrays import peak
-from ...study.event_torques import from_event_on
 from ...study.record import StudyRecord
+from ...study.torques import from_event_on
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,9 +8,8 @@ from ...core.errors import InputError, refusal_prefix
 from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
-from ...study.config import Config
-from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
+from ...study.config import Config, FileReading
+from ...study.file_section import FileSection, TableLists
 from ...study.record import StudyRecord
 from ...study.rules import MOTOR_FMU, Rule
 from .table import FIELDS, LOADS, Usage, UsagePlan, read_usage
@@ -27,7 +26,7 @@ class EnergyCapability(Capability):
             optional=True,
             keys=FIELDS,
             title="Use of the machine",
-            entries={"load": LOADS},
+            lists=TableLists({"load": LOADS}),
             follows={
                 "load": "the feed of the study all the time",
                 "other": "the same motor in the next efficiency class",

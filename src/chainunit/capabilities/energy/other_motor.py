@@ -10,7 +10,7 @@ from ...core.errors import InputError, shown
 from ...drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.drive import Drive
-from ...study.drive_tables import DriveTables
+from ...study.operation import DriveTables
 from .efficiency_class import next_class
 
 _SAME = 1e-3

@@ -22,7 +22,7 @@ def _titles(study: StudyRecord) -> dict[str, str]:
     return {v.name: v.template for v in Layout(Losses).variables} | {"gear": study.drive.transmission}
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the energy."""
     findings = EnergyFindings.of_study(study)
     x, years = (

@@ -12,7 +12,7 @@ from pydantic import Field
 from ...core.errors import Faults, InputError
 from ...core.quantities import Value, declaration, quantity
 from ...reading.lists import TableList
-from ...study.entry_values import numbers
+from ...study.file_section import numbers
 from .inverter import POINTS, InverterTable
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Set
 
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 
 
 class FlywheelCapability(Capability):

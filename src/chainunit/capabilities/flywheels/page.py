@@ -36,7 +36,7 @@ _HEADS = {
 """The columns with their heads on a terminal; result.json has further numbers."""
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the flywheels."""
     findings = FlywheelFindings.of_study(study)
     if study.config.plate is not None:

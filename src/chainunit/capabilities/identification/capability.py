@@ -10,8 +10,8 @@ from ...recordings.measurands import MEASURANDS
 from ...recordings.table import recording_rules
 from ...report.capability import Capability
 from ...study.capability import FileReference
-from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
+from ...study.config import FileReading
+from ...study.file_section import FileSection, TableForm, TableLists
 from ...study.rules import Rule
 from .reading import IdentificationPlan, read_identification
 from .table import FIELDS, MOST_SPEEDS, RUNS, SENSORS, SOUGHT, IdentifyTable
@@ -30,23 +30,27 @@ class IdentificationCapability(Capability):
             optional=True,
             keys=FIELDS,
             title="Identification from recordings",
-            is_used=lambda config: False,
+            is_used=lambda study: False,
             apart=True,
-            required=("parameter", "run"),
-            entries={"parameter": SOUGHT, "run": RUNS, "sensor": SENSORS},
-            forms={
-                "parameter.name": {"minLength": 1},
-                "run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
-                "run.file": {"minLength": 1},
-                "run.speeds": {
-                    "maxItems": MOST_SPEEDS,
-                    "items": {"type": "array", "items": _VALUE, "minItems": 3, "maxItems": 3},
+            lists=TableLists(
+                {"parameter": SOUGHT, "run": RUNS, "sensor": SENSORS},
+                single_keys=("parameter", "run", "sensor"),
+            ),
+            form=TableForm(
+                required=("parameter", "run"),
+                texts={
+                    "parameter.name": {"minLength": 1},
+                    "run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
+                    "run.file": {"minLength": 1},
+                    "run.speeds": {
+                        "maxItems": MOST_SPEEDS,
+                        "items": {"type": "array", "items": _VALUE, "minItems": 3, "maxItems": 3},
+                    },
+                    "sensor.column": {
+                        "enum": [name for name, measurand in MEASURANDS.items() if measurand.analog]
+                    },
                 },
-                "sensor.column": {
-                    "enum": [name for name, measurand in MEASURANDS.items() if measurand.analog]
-                },
-            },
-            single_keys=("parameter", "run", "sensor"),
+            ),
         ),
     }
 

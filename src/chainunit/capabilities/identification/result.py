@@ -16,8 +16,8 @@ from ...reading.text import shown_in
 from ...recordings.fit import FittedValue, fitted_values
 from ...recordings.measurands import MEASURANDS
 from ...recordings.residuals import EXCESS_NOISE, ResidualTest
-from ...study.heading import Heading
-from ...study.plans import Estimates, EstimateUser
+from ...study.capability import Estimates, EstimateUser
+from ...study.provenance import Heading
 from ...study.study_file import changed_tables
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
 from .information import Combination, Information, Proposal, short_name

@@ -10,7 +10,7 @@ from pydantic import Field
 from ...core.quantities import Value, declaration, quantity
 from ...reading.lists import TableList
 from ...recordings.table import COLUMNS, FILE, FROM_RECORDING, RecordingTable
-from ...study.entry_values import entered, filled_text
+from ...study.file_section import entered, filled_text
 
 FEEDS = ("same", "none")
 """The feed of a run: that of all loaded runs, or none."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ...report.capability import Capability
-from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
+from ...study.config import FileReading
+from ...study.file_section import FileSection, TableForm, TableLists
 from ...study.organs import finer_models
 from ...study.parts import motor_is_left
 from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule
@@ -25,10 +25,10 @@ class OptimizeCapability(Capability):
             optional=True,
             keys=FIELDS,
             title="Search for the best machine",
-            is_used=lambda config: False,
+            is_used=lambda study: False,
             apart=True,
-            forms={"objectives": {"items": {"type": "string"}, "maxItems": 2}},
-            single_keys=("objectives", "free", "limits"),
+            form=TableForm(texts={"objectives": {"items": {"type": "string"}, "maxItems": 2}}),
+            lists=TableLists(single_keys=("objectives", "free", "limits")),
         )
     }
 

@@ -19,7 +19,7 @@ from ...report.live.page import live_of_config
 from ...report.live_block import Live, LiveMachine
 from ...report.task import Task, Writer
 from ...study.config import Config, FileContents, of_tables
-from ...study.heading import Heading
+from ...study.provenance import Heading
 from ...study.study_file import changed_tables, toml_text
 from ...work.progress import TaskProgress
 from .best import Best, find_best

@@ -11,9 +11,8 @@ from ...core.quantities import narrowed, quantity
 from ...reading.results import OWN, InUnit, part, result
 from ...reading.text import Units
 from ...study.cycle_quantities import CycleBasis
-from ...study.heading import Heading
-from ...study.organ_limits import limits_of_organs
-from ...study.verdict import SpeedLimit, passed_limits
+from ...study.organ_limits import SpeedLimit, limits_of_organs, passed_limits
+from ...study.provenance import Heading
 from .best import Best
 from .checks import STEPS, Neighbours
 from .search import Effort

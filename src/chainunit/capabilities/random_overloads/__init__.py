@@ -12,8 +12,8 @@ from ...report.blocks import Text
 from ...report.capability import AnswerBlocks, Capability, Contents
 from ...study.analysis import Analysis
 from ...study.conditions import given, is_above_zero
+from ...study.config import FileReading
 from ...study.event_table import read_random_event
-from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.record import StudyRecord
 from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, has_sides
@@ -40,7 +40,7 @@ class RandomOverloads(Capability):
                 )
             },
             title="Overloads at random",
-            is_used=lambda config: config.plans["random_overloads"].runs > 0,
+            is_used=lambda study: study.config.plans["random_overloads"].runs > 0,
             apart=True,
             random_events=("event",),
         )

@@ -43,7 +43,7 @@ _METHODS: dict[str, str] = {
 """The ways in which random overloads are run, see `.runs.RandomTask.method`."""
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table of the quantiles of random overloads, and how they were run."""
     findings = MonteCarloResult.of_study(study)
     x = cited(findings, PATH)

@@ -16,9 +16,9 @@ from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.cycle import cycle
 from ...study.drive import Drive
-from ...study.load_cases import OverloadFactors, cycle_alone, overload_factors
 from ...study.organ_limits import two_bar_limits
 from ...study.record import StudyRecord
+from .factors import OverloadFactors, cycle_alone, overload_factors
 
 
 @result
@@ -136,9 +136,6 @@ class OrganFindings(Findings):
             side: {name: Factor(x, uses[name]) for name, x in vars(factors).items()}
             for side, factors in self.factors.items()
         }
-
-    def remark(self, study: StudyRecord) -> None:
-        """No remarks: the numbers are enough."""
 
 
 class OrganAnalysis(Analysis):

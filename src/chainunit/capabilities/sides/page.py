@@ -12,15 +12,15 @@ from ...report.cited import cited, number, quantity_rows
 from ...report.given_numbers import asked_speed
 from ...report.lines import Line, capital, filled, join, line
 from ...report.pictures import Pictures
-from ...study.load_cases import OverloadFactors
+from ...study.organ_limits import CRANK_GOOD, ROCKER_GOOD_EMPTY
 from ...study.record import StudyRecord
-from ...study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 from .analysis import OrganFindings, Sides
+from .factors import OverloadFactors
 
 PICTURES = Pictures()
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """Factors, limits and figure."""
     x = cited(OrganFindings.of_study(study), "findings.organs")
     yield _factors(study, x)

@@ -12,8 +12,7 @@ from ...report.capability import AnswerBlocks, Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, has_entries, is_one_of
-from ...study.config import Config
-from ...study.file_reading import FileReading
+from ...study.config import Config, FileReading
 from ...study.file_section import FileSection
 from ...study.record import StudyRecord
 from ...study.rules import BESIDE_MOTOR, Rule, has_sides

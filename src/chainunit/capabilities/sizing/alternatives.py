@@ -19,12 +19,11 @@ from ...study.arrays import peak
 from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.cycle import cycle
 from ...study.drive import Drive
-from ...study.drive_tables import DriveTables
 from ...study.event import Event, Role
-from ...study.event_torques import from_event_on
 from ...study.events import one_sided_event
 from ...study.limits import starting
 from ...study.measures import STARTED
+from ...study.operation import DriveTables
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
 from ...study.relay import HEAVIEST
@@ -32,7 +31,7 @@ from ...study.rig import Rig, join
 from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
 from ...study.start_up import start_up
 from ...study.starts import StartAnalysis, StartFindings
-from ...study.torques import PeakOf, all_feed_on, duty_peak, on_coupling
+from ...study.torques import PeakOf, all_feed_on, duty_peak, from_event_on, on_coupling
 from ...study.transients import follow, follow_each
 from ...study.verdict import STEADY
 from ...system import ModelComponent, monolithic

@@ -16,8 +16,8 @@ from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.drive import Drive
 from ...study.limits import Check
+from ...study.proposal import DutyPeak
 from ...study.relay import class_holding, tolerant_class
-from ...study.torques import DutyPeak
 from .parts import OrderedPart, total_price
 
 TOLERANCES = ("crank_speed", "gear_speed")

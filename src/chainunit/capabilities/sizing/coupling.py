@@ -12,11 +12,10 @@ from ...drives.catalogue_couplings import CatalogueCoupling
 from ...study.arrays import peak
 from ...study.coupling import at_motor_shaft, hardest_start, pull_out
 from ...study.event import Role
-from ...study.event_torques import from_event_on, peaks_in_events, running_peak
 from ...study.judgement import wrong_runs
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
-from ...study.torques import at_gear, gear_torque
+from ...study.torques import at_gear, from_event_on, gear_torque, peaks_in_events, running_peak
 from ...study.verdict import STEADY
 from .parts import coupling_for
 from .protection import CouplingEffect, Setting, goal

@@ -14,10 +14,10 @@ from ...study.coupling import (
     hardest_start,
     transient_of_starts,
 )
-from ...study.event_torques import running_peak, running_words
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
 from ...study.starts import transient_words
+from ...study.torques import running_peak, running_words
 from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
 
 

@@ -15,8 +15,7 @@ from ...core.quantities import Value, declaration, quantity
 from ...fmu.backends import Backend
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import derived, part, result
-from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
-from ...study.load_cases import all_on_one
+from ...study.cycle import Cycle, all_on_one, cycle, energy_swing, needed_inertia
 from ...study.organs import ConstantSpeed, OrganModel
 from ...study.quantiles import HIGH
 from .table import Sizing

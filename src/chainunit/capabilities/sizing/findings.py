@@ -16,7 +16,7 @@ from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import as_used
 from ...study.coupling import at_motor_shaft, remark_on_rams
 from ...study.drive import Drive
-from ...study.drive_tables import DriveTables
+from ...study.operation import DriveTables
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from ...study.remark import fault, note, warning

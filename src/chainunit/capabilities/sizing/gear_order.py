@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from ...drives.gearing import ordered_torque
 from ...reading.text import number
 from ...study.event import Role
-from ...study.event_torques import gear_peaks, running_peak, running_words
 from ...study.judgement import wrong_runs
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
-from ...study.torques import at_gear
+from ...study.torques import at_gear, gear_peaks, running_peak, running_words
 from ...study.verdict import STEADY
 from .protection import Setting
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ...drives.catalogue_gears import CatalogueGear
-from ...study.drive_tables import DriveTables
+from ...study.operation import DriveTables
 
 
 def with_gear(tables: DriveTables, gear: CatalogueGear) -> DriveTables:

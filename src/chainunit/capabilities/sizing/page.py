@@ -222,7 +222,7 @@ def _relay(relay: MotorProtection, x: MotorProtection) -> Line:
     return line(setting, relay.class_words)
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The choice, the candidates with the share that each takes of the limits, and the demands on the drive."""
     findings = SizingFindings.of_study(study)
     drive, x = findings.sized(study), cited(findings, "findings.sizing")

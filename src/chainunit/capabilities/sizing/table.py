@@ -13,7 +13,7 @@ from ...drives.gear_ratios import UNITS
 from ...drives.gearing import Transmission
 from ...drives.service_factor import LOAD_CLASSES, LOAD_WORDS, belt_factor, gear_factor, load_class
 from ...study.catalogue_drive import GearOffer
-from ...study.entry_values import numbers
+from ...study.file_section import numbers
 
 
 @declaration

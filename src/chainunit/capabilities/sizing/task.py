@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from ...drives.catalogue_couplings import CatalogueCoupling
 from ...drives.catalogue_gears import CatalogueGear
 from ...machines.machine import Machine
-from ...study.drive_tables import DriveTables
 from ...study.event import Event
-from ...study.operation import OperatingConditions
+from ...study.operation import DriveTables, OperatingConditions
 from .gear_tables import with_gear
 from .table import SizingPlan
 

@@ -24,6 +24,7 @@ from ...study.inverter import need_of
 from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
 from ...study.permitted_starts import permitted_starts, starting_data
+from ...study.proposal import DutyPeak
 from ...study.readings import crank_angle, load_inertia, turns_made
 from ...study.relay import start_seconds
 from ...study.rig import Rig, join
@@ -38,7 +39,7 @@ from ...study.start_runs import (
     starts_from_all,
 )
 from ...study.start_up import speeds_up, until_settled
-from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak, quasi_static_peak
+from ...study.torques import all_feed_on, at_gear, duty_peak, quasi_static_peak
 from ...study.transients import follow
 from ...study.verdict import CREEPS, SETTLING, STEADY
 from ...study.window import BURNT

@@ -15,8 +15,8 @@ from ...report.capability import AnswerBlocks, Capability
 from ...report.cited import cited, number
 from ...report.lines import filled
 from ...study.analysis import Analysis, Findings, Work
+from ...study.config import FileReading
 from ...study.drive import Drive
-from ...study.file_reading import FileReading
 from ...study.record import StudyRecord
 from ...study.rules import motor_is_chosen
 
@@ -30,9 +30,6 @@ class StaticInertiaFindings(Findings):
 
     machine: float = quantity("N.m", "RMS torque over a turn at constant speed")
     static: float = quantity("N.m", "the same with the inertia as one number")
-
-    def remark(self, study: StudyRecord) -> None:
-        """No remark: the line of `StaticInertiaCapability.answer` says it."""
 
 
 class StaticInertiaAnalysis(Analysis):

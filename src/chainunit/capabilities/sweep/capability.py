@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 from ...report.capability import Capability
 from ...study.conditions import given, has_entries, has_entry, is_one_of
-from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
+from ...study.config import FileReading
+from ...study.file_section import FileSection, TableForm, TableLists
 from ...study.organs import finer_models
 from ...study.rules import MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, Rule, motor_is_chosen
 from .plan import SweepPlan
@@ -25,28 +25,32 @@ class SweepCapability(Capability):
             optional=True,
             keys=FIELDS,
             title="Sweep",
-            is_used=lambda config: False,
-            entries={"parameter": SWEPT},
+            is_used=lambda study: False,
+            lists=TableLists(
+                {"parameter": SWEPT},
+                single_keys=("parameter", "quantities", "measures"),
+                deciders={"points": "method"},
+            ),
             follows={
                 "quantities": "without measures peak(crank_torque) and rms(crank_torque)",
                 "event": "the only one of the study, or that whose quantities are swept",
                 "best": "the first one",
             },
-            forms={
-                "quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
-                "measures": {
-                    "items": {"enum": list(MEASURES_OF_SWEEP)},
-                    "maxItems": len(MEASURES_OF_SWEEP),
-                },
-                "parameter.name": {"minLength": 1},
-                "parameter.values": {
-                    "items": {"type": ["number", "string"]},
-                    "minItems": 1,
-                    "maxItems": MOST_VALUES,
-                },
-            },
-            single_keys=("parameter", "quantities", "measures"),
-            deciders={"points": "method"},
+            form=TableForm(
+                texts={
+                    "quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
+                    "measures": {
+                        "items": {"enum": list(MEASURES_OF_SWEEP)},
+                        "maxItems": len(MEASURES_OF_SWEEP),
+                    },
+                    "parameter.name": {"minLength": 1},
+                    "parameter.values": {
+                        "items": {"type": ["number", "string"]},
+                        "minItems": 1,
+                        "maxItems": MOST_VALUES,
+                    },
+                }
+            ),
         )
     }
 

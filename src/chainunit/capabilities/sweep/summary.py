@@ -20,11 +20,10 @@ from ...core.quantities import quantity
 from ...reading.results import OWN, Estimate, InUnit, part, result
 from ...reading.text import shown_in
 from ...study.cycle_quantities import CycleBasis
-from ...study.heading import Heading
 from ...study.limits import limit_reached
-from ...study.organ_limits import limits_of_organs
+from ...study.organ_limits import SpeedLimit, limits_of_organs, passed_limits
+from ...study.provenance import Heading
 from ...study.quantiles import CONFIDENCE, quantile
-from ...study.verdict import SpeedLimit, passed_limits
 from ...work.job import made_anew
 from .plan import SweptParameter
 from .points import SweepFindings

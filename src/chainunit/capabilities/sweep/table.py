@@ -13,10 +13,10 @@ from ...core.errors import Faults, InputError, near_name, one_of, refusal_prefix
 from ...core.messages import unit_behind
 from ...core.quantities import Quantity, Value, Variable, declaration, named_values, quantity, variables
 from ...reading.lists import Entry, TableList
+from ...study.config import FileReading
 from ...study.cycle_quantities import CycleBasis, cycle_quantity
-from ...study.entry_values import Entered, entered, filled_text
 from ...study.event import Event
-from ...study.file_reading import FileReading
+from ...study.file_section import Entered, entered, filled_text
 from .plan import MOST_OF_HYPERCUBE, SweepPlan, SweptParameter
 
 SPEED = "run.crank_speed"

@@ -11,9 +11,8 @@ from ...drives.line_table import Damping
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.conditions import given
-from ...study.entry_values import numbers
-from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
+from ...study.config import FileReading
+from ...study.file_section import FileSection, numbers
 from ...study.rules import Rule
 from .table import JOINTS, TorsionPlan, TorsionTable
 
@@ -37,7 +36,7 @@ class TorsionCapability(Capability):
                 ),
             },
             title="Torsion of the driveline",
-            with_findings=True,
+            is_used=lambda study: "torsion" in study.findings,
             order=(("slowest", ">", "fastest"), ("bend_low", ">", "bend_high")),
         )
     }

@@ -22,7 +22,7 @@ _OVER_BOTH = "over the turns of shaft and machine"
 turn of the machine."""
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """A text on the line, the tables of its numbers, and the figures."""
     analysis = TorsionFindings.of_study(study)
     lead = (

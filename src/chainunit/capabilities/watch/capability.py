@@ -10,14 +10,12 @@ from ...core.errors import InputError
 from ...recordings.table import FROM_RECORDING, recording_rules
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
-from ...study.capability import FileReference
+from ...study.capability import Estimates, EstimateUser, FileReference, PartBeside
 from ...study.conditions import given
-from ...study.config import Config
+from ...study.config import Config, FileReading
 from ...study.cycle import Cycle
 from ...study.drive import Drive
-from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
-from ...study.plans import Estimates, EstimateUser, PartBeside
+from ...study.file_section import FileSection, TableForm
 from ...study.rules import MOTOR_FMU, Rule, has_sides
 from .tables import KEYS, ObserverTable, WatchPlan, WatchTable, read_watch
 
@@ -59,14 +57,17 @@ class WatchCapability(Capability):
             optional=True,
             keys=KEYS,
             title="Recording that is watched",
-            is_used=lambda config: False,
+            is_used=lambda study: False,
             apart=True,
-            required=("file",),
+            form=TableForm(texts={"file": {"minLength": 1}}, required=("file",)),
             follows=FROM_RECORDING,
-            forms={"file": {"minLength": 1}},
         ),
         "observer": FileSection(
-            ObserverTable, optional=True, title="Load observer", with_findings=True, apart=True
+            ObserverTable,
+            optional=True,
+            title="Load observer",
+            is_used=lambda study: "observer" in study.findings,
+            apart=True,
         ),
     }
 

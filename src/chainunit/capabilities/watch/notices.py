@@ -14,10 +14,10 @@ from ...reading.results import derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.drive import Drive
-from ...study.event_torques import from_event_on
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
 from ...study.remark import note, warning
+from ...study.torques import from_event_on
 
 if TYPE_CHECKING:
     import xarray as xr

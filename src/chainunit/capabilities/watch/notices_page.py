@@ -20,7 +20,7 @@ from .notices import DEVICES, ObserverFindings
 PICTURES = Pictures()
 
 
-def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table of the notices, the estimates in normal running, and a figure of each event."""
     x = cited(ObserverFindings.of_study(study), "findings.observer")
     if x.notices:

@@ -13,9 +13,9 @@ from ...drives.gearing import lost_torque
 from ...drives.terminal_signals import TerminalSignals, terminal_signals
 from ...machines.load_observer import LoadObserver
 from ...study.arrays import rms
+from ...study.capability import Estimates
 from ...study.cycle import Cycle
 from ...study.drive import Drive
-from ...study.plans import Estimates
 from ...system import ModelComponent
 from .false_loads import false_loads
 from .tables import ObserverTable

@@ -16,7 +16,7 @@ from ...recordings.fit import FittedValue, fitted_values
 from ...recordings.inspection import constant_parts
 from ...recordings.problem import speed_column
 from ...recordings.residuals import ResidualTest, describes, prior_conflicts, sensor_conflicts
-from ...study.heading import Heading
+from ...study.provenance import Heading
 from .watch import GAP, GROUNDS, OUTPUTS, Alarm, Begin, WatchedRecording, columns_watched, declared_outputs
 
 ROWS = 1500

@@ -20,7 +20,7 @@ from ...recordings.table import (
     read_span,
     recording_values,
 )
-from ...study.file_reading import FileReading
+from ...study.config import FileReading
 
 
 @declaration

@@ -149,7 +149,7 @@ def _event(rig: Rig, event: Event) -> dict[str, Any]:
         "title": event.title,
         "from_rest": event.from_rest,
         "values": {v.name: x for v, x in named_values(event.p)},
-        "normal": {name: rig.inputs[name][0] for name in event.inputs(event.side)},
+        "normal": {name: rig.inputs[name][0] for name in event.inputs},
         "reads": {name: f"machine.{name}" for name in event.reads},
         "signals": event_signals(event, lambda name: rig.inputs[name][0]),
     }

@@ -13,8 +13,8 @@ from ...drives.catalogue import CatalogueMotor
 from ...machines.machine import Machine
 from ...study.config import Config
 from ...study.drive import Drive
-from ...study.drive_tables import DriveTables
 from ...study.event import Event
+from ...study.operation import DriveTables
 from ...study.parts import LENGTHS
 from ...study.proposal import DriveProposal
 from ...study.registry import parts_of_line
@@ -146,6 +146,6 @@ def _entry(event: Event) -> dict[str, Any]:
     """An event as a study file has it, with all its quantities."""
     names = {"type": event.kind, "name": event.name} | ({"side": event.side} if event.side else {})
     if event.has_input:
-        names["input"] = event.acts_on[0]
+        names["input"] = event.input
     values = {v.name: (int(x) if v.type == "Integer" else x) for v, x in named_values(event.p)}
     return names | values

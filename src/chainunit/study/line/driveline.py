@@ -23,9 +23,9 @@ from .part import PartOfLine
 
 if TYPE_CHECKING:
     from ..analysis import Analysis
+    from ..config import FileReading
     from ..cycle import Cycle
     from ..drive import Drive
-    from ..file_reading import FileReading
     from ..keys import Key
     from ..record import StudyRecord
     from .placed import PlacedPart

@@ -1,62 +1,21 @@
-"""The load cases of a machine: its turns with them, and the factors of a load from one side over that from both."""
+"""The factors of a load from one side of a chain unit over that from both, at constant speed."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from ..core.quantities import Layout, Value, declaration, quantity
-from ..machines.api import EMPTY, ChainUnitMachine
-from ..machines.chain_unit import Feed, SideLoads, SideName, other
-from ..machines.machine import Machine
-from .arrays import peak
-from .cycle import Cycle, cycle
-
-
-def all_on_one(side: SideName, feed: Feed) -> Feed:
-    """The feed with which the organ of `side` has the load of both organs."""
-    left, right = feed.left, feed.right
-    whole = SideLoads(
-        material_mass=left.material_mass + right.material_mass,
-        processing_force=left.processing_force + right.processing_force,
-    )
-    return Feed(left=whole, right=EMPTY) if side == "left" else Feed(left=EMPTY, right=whole)
-
-
-def without(side: SideName, feed: Feed) -> Feed:
-    """The feed with the organ of that side empty."""
-    return Feed(left=feed.left, right=EMPTY) if side == "right" else Feed(left=EMPTY, right=feed.right)
+from ...core.quantities import Value, declaration, quantity
+from ...machines.api import ChainUnitMachine
+from ...machines.chain_unit import Feed, SideName, other
+from ...study.arrays import peak
+from ...study.cycle import Cycle, all_on_one, cycle, without
 
 
 def alone(machine: ChainUnitMachine, side: SideName) -> ChainUnitMachine:
     """The machine with its organ of that side alone: the papers' one-sided loading."""
     gone = other(side)
     return machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
-
-
-def one_sided_feeds(feed: Feed) -> dict[str, Feed]:
-    """The feed of both sides and the one-sided feeds, by the name of the case."""
-    return {
-        "both sides": feed,
-        "right side empty": without("right", feed),
-        "left side empty": without("left", feed),
-        "all feed on the left": all_on_one("left", feed),
-        "all feed on the right": all_on_one("right", feed),
-    }
-
-
-def no_feed(feed: Any) -> Any:
-    """A feed of the same kind without material; a quantity that cannot be zero has its start value."""
-    layout = Layout(type(feed))
-    return layout.instance([0.0 if v.quantity.admits(0.0) else v.quantity.start for v in layout.variables])
-
-
-def turns_by_load(machine: Machine, crank_speed: float, feed: Any) -> dict[str, Cycle]:
-    """The turns of a machine at that speed of its crank [rad/s], by load case: normal running with this `feed`, and
-    the one-sided cases, or that without feed."""
-    sided = bool(machine.model.sides)
-    feeds = one_sided_feeds(feed) if sided else {"normal running": feed, "without feed": no_feed(feed)}
-    return {name: cycle(machine, crank_speed, load) for name, load in feeds.items()}
 
 
 def cycle_alone(
