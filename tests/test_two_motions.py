@@ -450,6 +450,7 @@ def test_arrays_of_both_motions():
             assert together[key][k] == pytest.approx(float(value), rel=1e-12, abs=1e-9), key
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", ["five-bar with a servo on a table", "five-bar with two motors"])
 def test_the_report_has_both_drivers(name):
     machine, _ = machine_of(name, FRICTION)

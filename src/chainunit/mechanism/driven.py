@@ -162,32 +162,28 @@ class DrivenState(MachineState):
         self.driven = driven_from(xp, m, m.q, w, free)
         self.J, self.bias = self.driven.port(0, geared)
 
-    def port_slopes(self, number: int, a: Any = 0.0) -> tuple[Any, Any, Any]:
-        """Of the load port of a driver the derivatives of the inertia by its place, and of the bias by its place and
-        by its speed; `a` is the acceleration of the first one."""
-        engine = dual(self._xp)
-
-        def port(place: Any, speed: Any) -> tuple[Any, Any]:
-            free, q, w = dict(self._free), self.m.q, self.w
-            if number:
-                free[number] = place, speed, free[number][2]
-            else:
-                q, w = place, speed
-            return driven_from(engine, self.m, q, w, free).port(number, self._geared, a)
-
-        motion = self.driven.motions[number]
-        inertia, bias = port(Dual(motion.place, 1.0), motion.speed)
-        _, by_speed = port(motion.place, Dual(motion.speed, 1.0))
-        return slope(inertia), slope(bias), slope(by_speed)
+    def port_slope(self, number: int, a: Any = 0.0, by_speed: bool = False) -> tuple[Any, Any]:
+        """The derivatives of inertia and bias of the load port of a driver by its place, or by its speed; `a` is the
+        acceleration of the first one."""
+        place, speed, *_ = self.driven.motions[number]
+        seeded = (place, Dual(speed, 1.0)) if by_speed else (Dual(place, 1.0), speed)
+        free, (q, w) = dict(self._free), (self.m.q, self.w)
+        if number:
+            free[number] = *seeded, free[number][2]
+        else:
+            q, w = seeded
+        driven = driven_from(dual(self._xp), self.m, q, w, free)
+        inertia, bias = driven.port(number, self._geared, a)
+        return slope(inertia), slope(bias)
 
     @property
     def inertia_slope(self) -> Any:
         """See `MachineState`."""
-        return self.port_slopes(0)[0]
+        return self.port_slope(0)[0]
 
     def slopes(self) -> tuple[Any, Any]:
         """See `MachineState`."""
-        return self.port_slopes(0)[1:]
+        return self.port_slope(0)[1], self.port_slope(0, by_speed=True)[1]
 
     @property
     def kinetic_energy(self) -> Any:

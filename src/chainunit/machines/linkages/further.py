@@ -189,7 +189,7 @@ class FurtherDrivers:
             common = {"tau": efforts[k], "power": efforts[k] * motion.speed}
             if entry.is_free:
                 assert isinstance(s, DrivenState)
-                (J, bias), (dJ, *_) = driven.port(k, self.geared, a), s.port_slopes(k, a)
+                (J, bias), (dJ, _) = driven.port(k, self.geared, a), s.port_slope(k, a)
                 load = {"tau_bias": bias, "J": J, "dJ_dphi": dJ, "phi0": motion.place, "w0": motion.speed}
             else:
                 load = {"phi": motion.place, "w": motion.speed, "a": accelerations[k]}
@@ -200,7 +200,7 @@ class FurtherDrivers:
         """The slopes of the load ports of the drivers that are inputs."""
         values = {}
         for k, entry in self.free.items():
-            _, by_place, by_speed = s.port_slopes(k, a)
+            (_, by_place), (_, by_speed) = s.port_slope(k, a), s.port_slope(k, a, by_speed=True)
             declared = self.port(entry).slopes
             values[self.names[entry.name]] = declared(tau_bias_dphi=by_place, tau_bias_dw=by_speed)
         return values
