@@ -386,6 +386,23 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
         np.testing.assert_array_equal(runs[name], wanted[name])
 
 
+def test_a_parcel_makes_its_system_once_and_closes_it_when_it_goes(monkeypatch):
+    made, closed = [], []
+
+    class Simulation:
+        def __init__(self, rig, start):
+            made.append(start)
+
+        def close(self):
+            closed.append(self)
+
+    monkeypatch.setattr(monte_carlo, "EventSimulation", Simulation)
+    parcel = monte_carlo.Parcel(task_by(parse(STUDY.format(runs=4))), "", {})
+    assert parcel.system is parcel.system and made == [1.0] and not closed
+    del parcel
+    assert len(closed) == 1
+
+
 @pytest.mark.slow
 def test_a_scheduler_is_asked_before_any_run(tmp_path):
     pytest.importorskip("distributed")
