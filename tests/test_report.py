@@ -318,7 +318,7 @@ def test_lines():
 
 
 RENDERERS = (
-    "blocks figure files html lines linkage live_block markdown motion packing".split()
+    "blocks figure files html lines linkage markdown motion packing".split()
     + "page_figures print_figures style terminal".split()
 )
 

@@ -23,7 +23,6 @@ from . import blocks as b
 from . import motion
 from .figure import Figure
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
-from .live_block import Live, LiveMachine
 from .packing import packed, packed_bytes
 
 NAME = "report.html"
@@ -139,7 +138,7 @@ def fragment(report: b.Report) -> str:
     scripts of the page draw: figures, motion, live machine."""
     page = Page(report.units)
     failure = f"<p>The run stopped early: {page.line(report.failure)}.</p>" if report.failure else ""
-    drawn = (Figure, motion.Animation, Live)
+    drawn = (Figure, motion.Animation, b.Live)
     still = [block for block in report.blocks("long") if not isinstance(block, drawn)]
     return f"<h3>{escape(report.title or report.kind)}</h3>\n{failure}{page.blocks(still)}"
 
@@ -185,7 +184,7 @@ class Page:
 
     def __init__(self, units: Units) -> None:
         self.units = units
-        self.live: LiveMachine | None = None
+        self.live: b.LiveMachine | None = None
         """the live machine among the blocks so far"""
 
     # -- pieces
@@ -267,10 +266,10 @@ class Page:
                 return self._figure(block) if block.on_page else ""
             case motion.Animation():
                 return resource("motion.html").replace("<!-- caption -->", self.line(block.caption))
-            case Live():
+            case b.Live():
                 return self._live(block)
 
-    def _live(self, block: Live) -> str:
+    def _live(self, block: b.Live) -> str:
         try:
             self.live = block.make()
         except InputError as error:
@@ -300,36 +299,33 @@ class Page:
         )
 
     def _table(self, table: b.Table) -> str:
-        columns = [i for i, c in enumerate(table.columns) if c.form != "short"] or range(
-            len(table.rows[0].cells)
-        )
-        marks = [' class="text"' if table.columns and table.columns[i].of_text else "" for i in columns]
+        marks = [' class="text"' if column.of_text else "" for column in table.columns] or [""] * table.width
         heads = "".join(
-            f'<th scope="col"{mark}>{self.line(table.columns[i].title)}</th>'
-            for i, mark in zip(columns, marks, strict=True)
-            if table.columns
+            f'<th scope="col"{mark}>{self.line(column.title)}</th>'
+            for column, mark in zip(table.columns, marks, strict=False)
         )
-        noted = any(row.note for row in table.rows)
-        rows = [self._row(row, columns, marks) for row in table.rows if row.form != "short"]
-        body = "".join(rows) if noted else f"<tbody>{''.join(rows)}</tbody>"
-        css = "candidates" if noted else "numbers" if table.numeric else "words"
+        is_noted = any(row.note for row in table.rows)
+        body = "".join(self._row(row, marks) for row in table.rows)
+        css = "candidates" if is_noted else "numbers" if table.numeric else "words"
         # on paper a short table stays on one page
-        whole = " data-short" if len(rows) <= _SHORT else ""
+        whole = " data-short" if len(table.rows) <= _SHORT else ""
         return (
             f'<div class="wide"><table class="{css}"{whole}>'
             + (f"<caption>{self.line(table.title)}</caption>" if table.title else "")
             + (f"<thead><tr>{heads}</tr></thead>" if heads else "")
-            + f"{body}</table></div>"
+            + (body if is_noted else f"<tbody>{body}</tbody>")
+            + "</table></div>"
         )
 
-    def _row(self, row: b.TableRow, columns: Iterable[int], marks: Sequence[str]) -> str:
-        first, *rest = (row.cells[i] for i in columns)
+    def _row(self, row: b.TableRow, marks: Sequence[str]) -> str:
+        first, *others = row.cells
         span = ' rowspan="2"' if row.note else ""
-        others = "".join(map(self._cell, rest, marks[1:]))
-        cells = f'<th scope="row"{span}>{self._inside(first)}</th>{others}'
+        cells = (
+            f'<th scope="row"{span}>{self._inside(first)}</th>{"".join(map(self._cell, others, marks[1:]))}'
+        )
         if not row.note:
             return f"<tr>{cells}</tr>"
-        note = f'<tr><td class="why" colspan="{len(rest)}">{self.line(row.note)}</td></tr>'
+        note = f'<tr><td class="why" colspan="{len(others)}">{self.line(row.note)}</td></tr>'
         return f'<tbody class="{row.severity or "plain"}"><tr>{cells}</tr>{note}</tbody>'
 
     def _cell(self, cell: b.Cell, mark: str) -> str:
@@ -350,7 +346,7 @@ class Page:
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
         rows = "".join(
             f'<tr><th scope="row" title="{escape(_named(value))}">{escape(value.description)}</th>'
-            f"<td>{self.line((value.value,))}{self.origin(value)}</td></tr>"
+            f"<td>{self.line(value.value)}{self.origin(value)}</td></tr>"
             for value in values
         )
         return (

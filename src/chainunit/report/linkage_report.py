@@ -21,7 +21,6 @@ from . import linkage, linkage_loads, linkage_rest
 from .cited import cited, exact, number, quantity_rows, table
 from .drawing import drawing
 from .lines import Line, Name, Number, Strong, capital, filled, join, line
-from .live_block import Live, LiveMachine
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
@@ -74,13 +73,13 @@ def linkage_report(
 
 
 def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
-    def make() -> LiveMachine:
+    def make() -> b.LiveMachine:
         # a page alone needs it
         from .live.linkage import of_linkage
 
         return of_linkage(f.machine, f.speed, Path(source).name)
 
-    yield Live(make, "the file")
+    yield b.Live(make, "the file")
 
 
 def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:

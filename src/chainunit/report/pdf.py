@@ -22,7 +22,6 @@ from ..reading.text import Units
 from . import blocks as b
 from .figure import Figure
 from .html import Page, marks, resource
-from .live_block import Live
 from .motion import Animation
 
 NAME = "sheet.pdf"
@@ -62,7 +61,7 @@ class _PrintedPage(Page):
 
     def block(self, block: b.Block) -> str:
         """One block; nothing for one that moves, and for a figure that has no file. Given values run on."""
-        if isinstance(block, Animation | Live) or (isinstance(block, b.Text) and block.role == "hint"):
+        if isinstance(block, Animation | b.Live) or (isinstance(block, b.Text) and block.role == "hint"):
             return ""
         if isinstance(block, b.Given):
             groups = "".join(
@@ -94,12 +93,15 @@ class _PrintedPage(Page):
     def _value(self, value: b.GivenValue) -> str:
         """A given value in running text."""
         name = escape(value.description)
-        return f'<span title="{escape(value.name)}">{name}</span> {self.line((value.value,))}{self.origin(value)}'
+        return (
+            f'<span title="{escape(value.name)}">{name}</span> {self.line(value.value)}{self.origin(value)}'
+        )
 
     def _table(self, table: b.Table) -> str:
         """A table; one with many shares has the numbers alone, as paper has no room for their bars."""
         # the page has the rows that a terminal leaves out
-        table = replace(table, rows=tuple(row for row in table.rows if row.form != "long") or table.rows)
+        rows = tuple(row for row in table.rows if row.form != "long")
+        table = replace(table, rows=rows or table.rows).of_form("long")
         if sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) > _BARS:
             table = replace(table, rows=tuple(map(_without_bars, table.rows)))
         return super()._table(table)

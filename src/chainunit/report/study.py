@@ -31,7 +31,6 @@ from .given_numbers import asked_speed, motor_title, ratio, run_settings
 from .lines import Line, Number, capital, filled, join, line, spoken
 from .live.runs import stand_in, whole_of
 from .live.study import of_study
-from .live_block import Live
 from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
@@ -73,11 +72,10 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
         for block in answer.blocks(study):
             if isinstance(block, b.Text) and block.central:
                 blocks.append(block)
-            elif isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
+            elif isinstance(block, b.Judgement) and block.severity in b.VERDICTS:
                 blocks.append(replace(block, form="both"))
         if study.answers:
-            table = runs.table_of_runs(study)
-            blocks.append(replace(table, rows=tuple(row for row in table.rows if row.form != "long")))
+            blocks.append(runs.table_of_runs(study).of_form("short"))
         return b.Report(
             study.config.title,
             study.kind,
@@ -204,7 +202,7 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if study.drive.foreign_machine:
         return
     config = study.config
-    yield Live(
+    yield b.Live(
         lambda: of_study(config, study.drive, config.drive, study.proposal, study.verdict),
         whole_of(stand_in(study.drive)),
     )

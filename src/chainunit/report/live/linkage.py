@@ -7,7 +7,7 @@ from dataclasses import replace
 from ...core.quantities import Quantity, Variable
 from ...machines.machine import Machine
 from ...reading.text import DEFAULT_UNITS, Units
-from ..live_block import LiveMachine
+from ..blocks import LiveMachine
 from .machine import assembled, speed_of_crank
 from .quantities import of_machine
 from .turn import live_turn

@@ -13,7 +13,7 @@ from ...core.printing.javascript import program
 from ...core.quantities import variable_of
 from ...reading.text import Units
 from ...study.sections import Run
-from ..live_block import LiveMachine
+from ..blocks import LiveMachine
 from .quantities import LiveQuantity
 from .runs import LiveRuns
 from .turn import LiveTurn

@@ -21,7 +21,7 @@ from ...study.registry import parts_of_line
 from ...study.sections import FlywheelTable, choosing_tables
 from ...study.study_file import changed_tables
 from ...study.verdict import Verdict
-from ..live_block import LiveMachine
+from ..blocks import LiveMachine
 from .machine import assembled, speed_of_crank
 from .quantities import LiveQuantity, of_machine
 from .runs import live_runs, reason_without_runs, stand_in
