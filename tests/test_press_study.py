@@ -20,7 +20,7 @@ from chainunit.capabilities.sizing.protection import CouplingEffect, spares
 from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import load_figures, page_figures, study_motion
 from chainunit.report.figure import Between, Curve
-from chainunit.report.linkage_loads import loads_on_slides
+from chainunit.report.linkage import loads_on_slides
 from chainunit.report.study_motion import machine_state
 from chainunit.study import config
 from chainunit.study.readings import crank_motion, crank_torque

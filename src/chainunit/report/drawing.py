@@ -152,9 +152,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     """
     low, high = machine.model.span
     phi = low + (high - low) / (2.0 * math.pi) if phi is None else phi
-    whole = machine.state(machine.inputs({"phi": phi * machine.ratio})).m
-    turns = np.linspace(low, high, 73)
-    orbit = machine.state(machine.inputs({"phi": turns * machine.ratio})).m
+    whole = machine.drive(phi * machine.ratio)
+    orbit = machine.drive(np.linspace(low, high, 73) * machine.ratio)
     places = {name: (float(x), float(y)) for name, (x, y) in linkage.places(whole).items()}
     crank, canvas = whole.linkage.driver, _Canvas()
     ways = linkage.rails(orbit)
@@ -165,7 +164,7 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     rims = [(x + side * r, y + side * r) for (x, y), r in circles for side in (-1.0, 1.0)]
     to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end]), *ends, *rims])
     page_points = {name: to_page(place) for name, place in places.items()}
-    links = [_straightened(link, page_points) for link in linkage.links(whole.linkage, {})]
+    links = [_straightened(link, page_points) for link in linkage.links(whole.linkage)]
     sizes = dimensions(machine)
     canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
     for way in ways.values():

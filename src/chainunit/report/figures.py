@@ -20,7 +20,7 @@ from ..study.readings import crank_speed, crank_torque, has_turn
 from ..study.record import StudyRecord
 from ..study.result import assumed_ranges
 from . import figure as fig
-from . import linkage_loads, load_figures, run_names
+from . import linkage, load_figures, run_names
 from .cited import cited, number
 from .given_numbers import asked_speed
 from .lines import Line, capital, filled, join, line
@@ -149,8 +149,8 @@ def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
     parts = {"steady": study.steady} | {
         name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in names
     }
-    states = {name: machine_state(study, part) for name, part in parts.items()}
-    return linkage_loads.force_over_stroke(states, {name: run_names.title(study, name) for name in parts})
+    runs = ((run_names.title(study, name), machine_state(study, part)) for name, part in parts.items())
+    return linkage.force_over_stroke(runs)
 
 
 @PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")

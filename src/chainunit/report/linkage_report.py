@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -17,7 +18,7 @@ from ..study.linkage_result import LinkageData, linkage_data
 from ..study.linkage_turn import LinkageFindings, Stroke, Swing, linkage_findings
 from . import blocks as b
 from . import figure as fig
-from . import linkage, linkage_loads, linkage_rest
+from . import linkage, linkage_rest
 from .cited import cited, exact, number, quantity_rows, table
 from .drawing import drawing
 from .lines import Line, Name, Number, Strong, capital, filled, join, line
@@ -180,36 +181,27 @@ def _animation(f: LinkageFindings) -> Animation:
         forth = values(f)[::step]
         return np.concatenate([forth, values(f.back)[::-1][::step][1:]]) if f.back else forth
 
-    state = _state(f, q, speed)
-    effort, unit = ("Force" if model.slides else "Torque"), model.driver_port.unit
-    driver = state.m.linkage.driver
-    joints = {variable: pin for variable, (pin, _) in model.joints.items()}
-
     def force(output: str) -> tuple[Any, Any]:
         x, y = (over(lambda g, axis=axis: g.outputs[f"{output}.{axis}"]) for axis in ("fx", "fy"))  # type: ignore[misc]
         return x, y
 
+    state = _state(f, q, speed)
+    effort, unit = ("Force" if model.slides else "Torque"), model.driver_port.unit
     readings = (
         Reading("Place of the driver", q, unit("rad")),
         Reading(f"{effort} at the driver", over(lambda g: g.outputs["tau"]) * machine.ratio, unit("N.m")),
     )
     clip = Clip(
-        "turn", f"{'There and back at' if f.back else 'At'} constant speed", time, linkage.places(state.m), readings,
-        (*linkage.arrows(model.pins, joints, force, named=True), *linkage_loads.load_arrows(state)),
+        "turn",
+        f"{'There and back at' if f.back else 'At'} constant speed",
+        time,
+        linkage.places(state.m),
+        readings,
+        (*linkage.arrows(machine, force), *linkage.load_arrows(state)),
         blocks=linkage.blocks(state.m),
-    )  # fmt: skip
-    return Animation(
-        tuple(linkage.links(state.m.linkage, {})),
-        linkage.supports(state.m.linkage),
-        (clip,),
-        float(time[-1]),
-        "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads.",
-        hanging=linkage.hanging(state.m),
-        circles=(*[(driver.bar.pin, driver.end)] * model.turns, *state.m.linkage.circles),
-        names=linkage.labels(state.m.linkage),
-        paths=linkage.paths(state.m, driver.end if f.back else ""),
-        rails=linkage.rails(state.m),
     )
+    caption = "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads."
+    return replace(linkage.picture(machine, state.m), runs=(clip,), turn=float(time[-1]), caption=caption)
 
 
 def _state(f: LinkageFindings, q: Any, speed: Any) -> MachineState:
@@ -282,11 +274,11 @@ def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.B
         ),
         file=PICTURES[1],
     )
-    yield from linkage_loads.force_over_stroke(
-        {way: _state(f, f.q, findings.speed) for way, findings in ways.items()},
-        {way: f"on the way {way}" if way else "a turn at constant speed" for way in ways},
-        PICTURES[3],
+    states = (
+        (f"on the way {way}" if way else "a turn at constant speed", _state(f, f.q, findings.speed))
+        for way, findings in ways.items()
     )
+    yield from linkage.force_over_stroke(states, PICTURES[3])
     forces = {
         way: tuple(
             fig.Curve(

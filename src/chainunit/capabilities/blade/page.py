@@ -95,7 +95,7 @@ def _positions(machine: Machine, findings: BladeFindings, fall: float) -> Iterat
         m = machine.drive(q * machine.ratio)
         places = linkage.places(m) | edge(machine.p, m.links)
         title = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
-        yield fig.Curve(title, *_polyline((*linkage.links(m.linkage, {}), _EDGE), places), look, "o")
+        yield fig.Curve(title, *_polyline((*linkage.links(m.linkage), _EDGE), places), look, "o")
     ends = sorted(float(places[name][0]) for name in ENDS)
     low, high = ([height, height] for height in (findings.stack.table, findings.stack.top))
     yield fig.Between("stack", ends, low, high, "hatched")

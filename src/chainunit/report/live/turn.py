@@ -32,22 +32,11 @@ class LiveTurn:
     data: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class _Force:
-    """A reaction: its title, its output, the joint at which it acts, and its name in the picture."""
-
-    title: str
-    output: str
-    joint: str
-    short: str
-
-
 def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     """The turn of a machine at a constant `speed` of its driver [rad/s, m/s]."""
     model = machine.model
     low, high = model.span
-    q = np.linspace(low, high, 121)
-    whole = machine.state(machine.inputs({"phi": q * machine.ratio, "w": speed * machine.ratio})).m
+    whole = machine.drive(np.linspace(low, high, 121) * machine.ratio)
     forces = list(_forces(machine))
     model_columns = trace(model).columns
     results = list(_results(machine, forces, model_columns, units))
@@ -56,13 +45,13 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     columns = dict.fromkeys(
         [
             *(result["of"] for result in results),
-            *(f"{force.output}.{axis}" for force in forces for axis in ("fx", "fy")),
+            *(f"{force['of']}.{axis}" for force in forces for axis in ("fx", "fy")),
             *(f"{axis}({pin})" for pin in shown for axis in "xy"),
             *lines,
             *(name for pull in _pulls(model_columns) for name in pull["columns"]),
         ]
     )
-    driver = whole.linkage.driver
+    picture = linkage.picture(machine, whole)
     data = {
         "parameters": machine.by_name,
         "turns": bool(model.turns),
@@ -74,24 +63,18 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         "place": shown_in_unit("m" if model.slides else "rad", "", units),
         "results": results,
         "pulls": list(_pulls(model_columns)),
-        "forces": [
-            {"title": force.title, "of": force.output, "at": force.joint, "short": force.short}
-            for force in forces
-        ],
+        "forces": forces,
         "curves": list(_curves(machine, model_columns, units)),
         "picture": {
-            "links": [asdict(link) for link in linkage.links(whole.linkage, {})],
-            "grounds": linkage.supports(whole.linkage),
-            "hanging": linkage.hanging(whole),
-            "circles": (*[(driver.bar.pin, driver.end)] * model.turns, *whole.linkage.circles),
-            "names": linkage.labels(whole.linkage),
+            "links": [asdict(link) for link in picture.links],
+            "grounds": picture.grounds,
+            "hanging": picture.hanging,
+            "circles": picture.circles,
+            "names": picture.names,
             "joints": shown,
             "blocks": {name[5:-1]: name for name in lines if name[5:-1] in shown},
-            "paths": {
-                title: title.removeprefix("path of ")
-                for title in linkage.paths(whole, "" if model.turns else driver.end)
-            },
-            "rails": list(linkage.rails(whole)),
+            "paths": {title: title.removeprefix("path of ") for title in picture.paths},
+            "rails": list(picture.rails),
         },
     }
     return LiveTurn(model_text(model, tuple(columns)), data)
@@ -102,16 +85,14 @@ def _effort(machine: Machine) -> str:
     return "force" if machine.model.slides else "torque"
 
 
-def _forces(machine: Machine) -> Iterator[_Force]:
-    model = machine.model
-    named = hasattr(model, "described_by")
-    for title, output in model.pins.items():
-        if output in model.joints:
-            yield _Force(title, output, model.joints[output][0], title if named else "")
+def _forces(machine: Machine) -> Iterator[dict[str, str]]:
+    """The reactions: title, output, joint at which it acts, and name in the picture."""
+    for output, title, joint, short in linkage.reactions(machine):
+        yield {"title": title, "of": output, "at": joint, "short": short}
 
 
 def _results(
-    machine: Machine, forces: list[_Force], model_columns: Any, units: Units
+    machine: Machine, forces: list[dict[str, str]], model_columns: Any, units: Units
 ) -> Iterator[dict[str, Any]]:
     """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
     the factors ``by``: the speed of the driver, or the square of the ratio."""
@@ -137,9 +118,9 @@ def _results(
             **shown_in_unit(row_unit, "", units),
         }  # fmt: skip
     for force in forces:
-        column = f"force({force.output})"
+        column = f"force({force['of']})"
         yield {
-            "name": f"peak({column})", "title": force.title, "reduce": "peak", "of": column, "by": "",
+            "name": f"peak({column})", "title": force["title"], "reduce": "peak", "of": column, "by": "",
             "group": "pins", **shown_in_unit("N", "", units),
         }  # fmt: skip
 
