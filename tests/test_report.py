@@ -24,7 +24,7 @@ from chainunit.report import html, print_figures, runs, terminal
 from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
-from chainunit.report.result_figures import ResultFigure
+from chainunit.report.reported_result import ResultFigure
 
 RESULT = {
     "speed": {"value": 314.159, "unit": "rad/s", "kind": "speed"},
@@ -318,7 +318,7 @@ def test_lines():
 
 
 RENDERERS = (
-    "blocks figure files html lines linkage markdown motion packing".split()
+    "blocks figure files html lines linkage markdown motion".split()
     + "page_figures print_figures style terminal".split()
 )
 

@@ -6,6 +6,8 @@ result (``<script id="result">``). Its curves and its animation come from the ti
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -23,13 +25,19 @@ from . import blocks as b
 from . import motion
 from .figure import Figure
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
-from .packing import packed, packed_bytes
 
 NAME = "report.html"
 
 _SPACE = "\u00a0"  # before a unit
 _SHORT = 16
 """Rows of a table that does not break across printed pages."""
+_SHORTEST_SERIES = 8
+"""Least number of numbers of a series."""
+_MOST_DIGITS, _LARGEST = 12, 2**53
+"""Most digits behind the point, and largest whole number, with which a page has the same number."""
+_SERIES = "+"
+"""Key of a series: its digits behind the point, and the differences of its numbers as whole numbers of the last
+digit, from 0 on."""
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
     "font-src data:"
@@ -131,6 +139,39 @@ def _figures(report: b.Report) -> dict[str, Any]:
 def _packed_plotly() -> str:
     """plotly.js, packed."""
     return packed_bytes((resources.files("plotly") / "package_data" / "plotly.min.js").read_bytes())
+
+
+def packed_bytes(content: bytes) -> str:
+    """Bytes, packed."""
+    return base64.b64encode(gzip.compress(content, 6, mtime=0)).decode()
+
+
+def packed(data: Any) -> str:
+    """Data as JSON has it, packed."""
+    text = json.dumps(_shortened(data), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    return packed_bytes(text.encode())
+
+
+def _shortened(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _shortened(x) for name, x in data.items()}
+    if isinstance(data, list | tuple):
+        series = _series(data)
+        return [_shortened(x) for x in data] if series is None else {_SERIES: series}
+    return data
+
+
+def _series(values: Any) -> list[int] | None:
+    """A list of numbers as a series; None where it is none, or would not come back the same."""
+    if len(values) < _SHORTEST_SERIES or any(type(x) not in (int, float) for x in values):
+        return None
+    digits = max(len(repr(x).partition(".")[2]) if type(x) is float else 0 for x in values)
+    if digits > _MOST_DIGITS or any("e" in repr(x) for x in values):
+        return None
+    whole = [round(x * 10**digits) for x in values]
+    if any(abs(n) > _LARGEST or n / 10**digits != x for n, x in zip(whole, values, strict=True)):
+        return None
+    return [digits, *(n - before for n, before in zip(whole, [0, *whole], strict=False))]
 
 
 def fragment(report: b.Report) -> str:

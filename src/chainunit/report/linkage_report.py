@@ -76,7 +76,7 @@ def linkage_report(
 def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
     def make() -> b.LiveMachine:
         # a page alone needs it
-        from .live.linkage import of_linkage
+        from .live.machine import of_linkage
 
         return of_linkage(f.machine, f.speed, Path(source).name)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import tempfile
 import weakref
@@ -11,13 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
 
 from ..core.errors import WriteError, check_kind
-from ..core.files import atomic_file
+from ..core.files import atomic_file, named_file
 from ..core.named import Named
+from ..reading.text import Units
 from ..work.progress import TaskProgress
-from . import files, html, terminal
+from . import files, html, print_figures, terminal
 from .blocks import Report
+from .figure import Figure
 from .notebook import shown_progress
-from .result_figures import ResultFigure
+from .style import styled
 from .task import Outcome, Question, Task
 
 if TYPE_CHECKING:
@@ -183,3 +186,57 @@ def _copy(file: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(target) as part:
         shutil.copyfile(file, part)
+
+
+class ResultFigure:
+    """A figure of a result. A notebook shows it as PNG; `save` writes it into a file.
+
+    `title` and `alt` describe it. Its axes are in the units of the study.
+    """
+
+    def __init__(self, figure: Figure, units: Units) -> None:
+        self._figure, self._units = figure, units
+
+    @property
+    def title(self) -> str:
+        """What the figure shows, in a line."""
+        return self._figure.title
+
+    @property
+    def alt(self) -> str:
+        """A description for a reader who does not see the figure."""
+        return self._figure.alt
+
+    def to_matplotlib(self) -> Any:
+        """A new figure of matplotlib, to be changed by the caller."""
+        return print_figures.drawn(self._figure, self._units)
+
+    def save(self, file: str | Path) -> Path:
+        """Write the figure into a file whose name ends in .png, .svg or .pdf; returns the file.
+
+        Raises
+        ------
+        InputError
+            for another ending.
+        WriteError
+            for a file that cannot be written.
+        """
+        path = named_file(file, ".png", ".svg", ".pdf")
+        with atomic_file(path) as part:
+            part.write_bytes(self._bytes(path.suffix.lower().removeprefix(".")))
+        return path
+
+    def _bytes(self, kind: str) -> bytes:
+        out = io.BytesIO()
+        # without the date the same figure is the same file
+        metadata = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
+        drawn = self.to_matplotlib()
+        with styled({"svg.hashsalt": self._figure.name}):
+            drawn.savefig(out, format=kind, metadata=metadata)
+        return out.getvalue()
+
+    def _repr_png_(self) -> bytes:
+        return self._bytes("png")
+
+    def __repr__(self) -> str:
+        return f"<Figure {self._figure.name!r}: {self.title}>"

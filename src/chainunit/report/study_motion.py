@@ -14,10 +14,9 @@ from ..mechanism.models import CrankMotion, names_of
 from ..study.readings import crank_motion, crank_torque
 from ..study.record import StudyRecord
 from . import linkage, run_names
-from .capability import capabilities
+from .capability import Supplement, capabilities
 from .lines import capital
 from .motion import Animation, Clip, DrawnLink, Reading
-from .supplement import Supplement
 
 _PER_SECOND = 60
 _PER_TURN = 90

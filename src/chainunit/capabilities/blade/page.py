@@ -13,9 +13,9 @@ from ...reading.text import number
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report import linkage
+from ...report.analyses import angle_axis
 from ...report.cited import cited, quantity_rows
 from ...report.motion import DrawnLink
-from ...report.turn import angle_axis
 from ...study.arrays import stretches
 from ...study.record import StudyRecord
 from .analysis import BladeFindings

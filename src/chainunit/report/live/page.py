@@ -15,7 +15,7 @@ from ...study.config import load as load_study
 from ...study.linkage_turn import speed_of_driver
 from .. import blocks as b
 from ..lines import line
-from .linkage import of_linkage
+from .machine import of_linkage
 from .runs import whole_of
 from .study import of_study, without_drive
 
