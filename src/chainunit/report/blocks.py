@@ -39,11 +39,10 @@ class Text:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A sentence that judges the study, or its run `run`; `items` are the entries of a list below it."""
+    """A sentence that judges the study; `items` are the entries of a list below it."""
 
     severity: Severity
     line: Line
-    run: str = ""
     items: tuple[Line, ...] = ()
     form: Form = "both"
 

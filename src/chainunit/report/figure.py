@@ -166,6 +166,26 @@ class Figure:
     on_page: bool = True
     form: ClassVar[str] = "long"
 
+    @property
+    def row_heights(self) -> tuple[float, ...]:
+        """The height of each row over the usual one."""
+        return self.heights or (1.0,) * len(self.panels)
+
+    @property
+    def column_widths(self) -> tuple[float, ...]:
+        """The width of each column over that of the others."""
+        return self.widths or (1.0,) * len(self.panels[0])
+
+    @property
+    def has_titles(self) -> bool:
+        """Whether a panel has a title."""
+        return any(panel.title for _, _, panel in self.all_panels())
+
+    @property
+    def has_names(self) -> bool:
+        """Whether an upright axis has names in place of numbers."""
+        return any(panel.y.names for _, _, panel in self.all_panels())
+
     def sharing(self, row: int, column: int) -> list[int]:
         """The unbroken rows around `row` in which the panel of this column has the same x axis as that of `row`."""
         panels = [panel_row[column] for panel_row in self.panels]

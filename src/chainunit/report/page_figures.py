@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable
+from functools import reduce
 from itertools import pairwise
+from operator import getitem
 from textwrap import wrap
 from typing import Any
 
@@ -87,9 +89,17 @@ _PHONE = 340
 
 def height(figure: Figure) -> int:
     """Height on the page [px]."""
-    row = _HALF_ROW if figure.half else _ROW
-    heights = figure.heights or (1.0,) * len(figure.panels)
-    return round(_ENDS + _above(figure) + _legend_rows(figure) + row * sum(heights))
+    return round(_ENDS + _above(figure) + _legend_rows(figure) + _row(figure) * sum(figure.row_heights))
+
+
+def _row(figure: Figure) -> int:
+    """Usual height of a row of panels [px]."""
+    return _HALF_ROW if figure.half else _ROW
+
+
+def _gap(figure: Figure, joined: bool) -> float:
+    """Room between two panels of a column [px], which is small if they are `joined` by one axis."""
+    return (22.0 if joined else 66.0) + (22.0 if figure.has_titles else 0.0)
 
 
 def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
@@ -111,20 +121,11 @@ def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
     }
     layout |= {"annotations": drawing.annotations} if drawing.annotations else {}
     layout |= {"shapes": drawing.shapes} if drawing.shapes else {}
-    embedded: dict[str, Any] = {"data": drawing.traces, "layout": layout}
-    embedded["rows"] = len(spec.panels)
-    embedded["tall"] = any(panel.y.names for _, _, panel in spec.all_panels())
-    narrow = drawing.narrow()
-    if narrow:
-        wide = {key: _at(embedded["layout"], key) for key in narrow}
-        embedded |= {"narrow": narrow, "wide": wide, "below": max(_LEAST, _COLUMN * len(spec.panels[0]))}
-    return embedded
-
-
-def _at(layout: Any, key: str) -> Any:
-    for name in key.split("."):
-        layout = layout[name]
-    return layout
+    shown = {"data": drawing.traces, "layout": layout, "rows": len(spec.panels), "tall": spec.has_names}
+    if not (narrow := drawing.narrow()):
+        return shown
+    wide = {key: reduce(getitem, key.split("."), layout) for key in narrow}
+    return shown | {"narrow": narrow, "wide": wide, "below": max(_LEAST, _COLUMN * len(spec.panels[0]))}
 
 
 def _hovers_by_point(panel: Panel) -> bool:
@@ -139,7 +140,7 @@ def _above(figure: Figure) -> int:
     panels = [panel for _, _, panel in figure.all_panels()]
     marks = [item for panel in panels for item in panel.items if isinstance(item, Mark) and item.words]
     room = 82 if any(mark.upright for mark in marks) else 18 if marks else 0
-    return room + (18 if any(panel.title for panel in panels) else 0)
+    return room + (18 if figure.has_titles else 0)
 
 
 def _legend_rows(figure: Figure, width: float = 0.0) -> int:
@@ -175,11 +176,9 @@ class _Drawing:
         self.shapes: list[dict[str, Any]] = []
         self.annotations: list[dict[str, Any]] = []
         rows, columns = len(spec.panels), len(spec.panels[0])
-        panels = list(spec.all_panels())
-        one_axis = all(len(spec.sharing(r, c)) == rows for r, c, _ in panels)
-        gap = (22.0 if one_axis else 66.0) + (22.0 if any(panel.title for _, _, panel in panels) else 0.0)
-        self.columns = _domains(spec.widths or (1.0,) * columns, 0.12 if columns > 2 else 0.1)
-        domains = _domains(spec.heights or (1.0,) * rows, gap / (height(spec) - _ENDS))
+        one_axis = all(len(spec.sharing(r, c)) == rows for r, c, _ in spec.all_panels())
+        self.columns = _domains(spec.column_widths, 0.12 if columns > 2 else 0.1)
+        domains = _domains(spec.row_heights, _gap(spec, one_axis) / (height(spec) - _ENDS))
         self.rows = [(1.0 - last, 1.0 - first) for first, last in domains]
         self.samples = _thin_groups(spec)
         self.x_axes: dict[tuple[int, int], str] = {}
@@ -204,14 +203,8 @@ class _Drawing:
             bottom = {"margin.b": 52 + _legend_rows(spec) + more} if more else {}
             return (changes or bottom) and {"height": height(spec) + more, **bottom, **changes}
         places = sorted(self.places, key=lambda place: (place[1], place[0]))
-        heights = spec.heights or (1.0,) * len(spec.panels)
-        row = _HALF_ROW if spec.half else _ROW
-        sizes = [row * min(heights[r], 1.1) for r, _ in places]
-        titled = 22.0 if any(panel.title for _, _, panel in spec.all_panels()) else 0.0
-        gaps = [
-            (22.0 if self.places[a][0] == self.places[b][0] else 66.0) + titled
-            for a, b in pairwise(places)
-        ]  # fmt: skip
+        sizes = [_row(spec) * min(spec.row_heights[r], 1.1) for r, _ in places]
+        gaps = [_gap(spec, self.places[a][0] == self.places[b][0]) for a, b in pairwise(places)]
         room, begin = sum(sizes) + sum(gaps), 0.0
         changes["height"] = round(room + _ENDS + _above(spec) + legend)
         changes["margin.b"] = 52 + legend
@@ -277,14 +270,15 @@ class _Drawing:
                     )  # fmt: skip
             case Shade():
                 colour = FILLS[item.look]
-                style = {
-                    "type": "rect",
-                    "fillcolor": colour,
-                    "opacity": 0.6,
-                    "line": {"width": 0},
-                    "layer": "below",
-                }
-                self.shapes.append({**style, **_across(item.axis, item.low, item.high, x, y)})
+                fill: dict[str, Any] = {"type": "rect", "fillcolor": colour, "opacity": 0.6}
+                self.shapes.append(
+                    {
+                        **fill,
+                        "line": {"width": 0},
+                        "layer": "below",
+                        **_across(item.axis, item.low, item.high, x, y),
+                    }
+                )
                 self._sample(item.name, place, mode="markers", marker=_square(colour))
             case Mark():
                 self._mark(item, place)
@@ -367,16 +361,8 @@ class _Drawing:
     def _hatch(self, hatch: Hatch, place: dict[str, Any]) -> None:
         x, y = hatch_lines(hatch)
         line = {"color": HATCHES[hatch.look % len(HATCHES)], "width": 1.0}
-        self._trace(
-            "scatter",
-            x=_small(x),
-            y=_small(y),
-            mode="lines",
-            line=line,
-            hoverinfo="skip",
-            **self._legend(hatch.name),
-            **place,
-        )
+        curve = {"x": _small(x), "y": _small(y), "mode": "lines", "line": line, "hoverinfo": "skip"}
+        self._trace("scatter", **curve, **self._legend(hatch.name), **place)
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
