@@ -10,8 +10,7 @@ import typer
 import typer.core
 
 from ..core.errors import InputError
-from ..report.command_options import Backend, BackendOption
-from ..report.console import study_file, terminal_console
+from ..report.console import Backend, BackendOption, study_file, terminal_console
 
 
 class VariableNames(Enum):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -241,67 +242,63 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
 
 def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.Block]:
     """The figures over the way of the driver, with a curve, or of reactions a panel, for each direction."""
-    model, unit, ratio, ways = f.machine.model, f.machine.model.driver_port.unit, f.machine.ratio, _ways(f)
-    angle = fig.Axis(
+    model, unit, ways = f.machine.model, f.machine.model.driver_port.unit, _ways(f)
+    place = fig.Axis(
         "way of the driver" if model.slides else "angle of the driver",
         unit("rad"),
         step=45.0 if model.turns else None,
     )
-    panels: tuple[tuple[fig.Axis, Callable[[LinkageFindings], Any]], ...] = (
-        (fig.Axis(f"{effort} at the driver", unit("N.m")), lambda g: g.outputs["tau"] * ratio),
-        (fig.Axis("power at the driver", "W"), lambda g: g.outputs["tau"] * ratio * g.speed),
-        (fig.Axis(f"reflected {inertia_word}", unit("kg.m2"), low=0.0), lambda g: g.outputs["J"] * ratio**2),
-    )
-    title = f"{capital(effort)}, power and {inertia_word}"
-    yield fig.Figure(
-        "linkage-turn",
-        f"{title} over the way of the driver",
-        f"{title} at the driver over its way.",
-        fig.stacked(
-            angle,
-            (
-                (
-                    axis,
-                    tuple(
-                        fig.Curve(
-                            way or axis.label, f.q, reader(findings), look, in_legend=bool(way) and k == 0
-                        )
-                        for look, (way, findings) in enumerate(ways.items())
-                    ),
-                )
-                for k, (axis, reader) in enumerate(panels)
-            ),
-        ),
-        file=PICTURES[1],
-    )
+    yield _turn_figure(f, place, effort, inertia_word)
     states = (
         (f"on the way {way}" if way else "a turn at constant speed", _state(f, f.q, findings.speed))
         for way, findings in ways.items()
     )
     yield from linkage.force_over_stroke(states, PICTURES[3])
-    forces = {
-        way: tuple(
-            fig.Curve(
-                name,
-                f.q,
-                np.hypot(findings.outputs[f"{v}.fx"], findings.outputs[f"{v}.fy"]),
-                look=k,
-                in_legend=way != "back",
-            )
-            for k, name in enumerate(f.joints)
-            for v in [f.description.variable("joint", name)]
-        )
-        for way, findings in ways.items()
-    }
     yield fig.Figure(
-        "linkage-reactions", "Reactions over the way of the driver",
+        "linkage-reactions",
+        "Reactions over the way of the driver",
         "The force in each joint over the way of the driver.",
-        tuple(
-            (fig.Panel(angle, fig.Axis(f"force{', ' * bool(way)}{way}", "N", low=0.0), curves),)
-            for way, curves in forces.items()
-        ),
+        tuple((_reactions(f, place, way, findings),) for way, findings in ways.items()),
         file=PICTURES[2],
-    )  # fmt: skip
+    )
+
+
+def _turn_figure(f: LinkageFindings, place: fig.Axis, effort: str, inertia_word: str) -> fig.Figure:
+    """Effort, power and inertia at the driver."""
+    unit, ratio, ways = f.machine.model.driver_port.unit, f.machine.ratio, _ways(f)
+    readers: dict[fig.Axis, Callable[[LinkageFindings], Any]] = {
+        fig.Axis(f"{effort} at the driver", unit("N.m")): lambda g: g.outputs["tau"] * ratio,
+        fig.Axis("power at the driver", "W"): lambda g: g.outputs["tau"] * ratio * g.speed,
+        fig.Axis(f"reflected {inertia_word}", unit("kg.m2"), low=0.0): lambda g: g.outputs["J"] * ratio**2,
+    }
+    curves: dict[fig.Axis, list[fig.Curve]] = {axis: [] for axis in readers}
+    for (k, (axis, reader)), (look, (way, findings)) in product(
+        enumerate(readers.items()), enumerate(ways.items())
+    ):
+        is_named = bool(way) and k == 0
+        curve = fig.Curve(way or axis.label, f.q, reader(findings), look, in_legend=is_named)
+        curves[axis].append(curve)
+    title = f"{capital(effort)}, power and {inertia_word}"
+    return fig.Figure(
+        "linkage-turn",
+        f"{title} over the way of the driver",
+        f"{title} at the driver over its way.",
+        fig.stacked(place, curves.items()),
+        file=PICTURES[1],
+    )
+
+
+def _reactions(f: LinkageFindings, place: fig.Axis, way: str, findings: LinkageFindings) -> fig.Panel:
+    """The force in each joint on one way."""
+
+    def force(name: str) -> Any:
+        variable = f.description.variable("joint", name)
+        return np.hypot(findings.outputs[f"{variable}.fx"], findings.outputs[f"{variable}.fy"])
+
+    curves = (
+        fig.Curve(name, f.q, force(name), k, in_legend=way != "back") for k, name in enumerate(f.joints)
+    )
+    return fig.Panel(place, fig.Axis(f"force{', ' * bool(way)}{way}", "N", low=0.0), tuple(curves))
 
 
 def _title(f: LinkageFindings, name: str) -> Line:
