@@ -57,11 +57,13 @@ class _Canvas:
 
     def add(self, tag: str, text: str = "", **attributes: Any) -> None:
         """Add an element. An underscore in the name of an attribute stands for a hyphen."""
-        words = (
+        attribute_texts = (
             f' {name.replace("_", "-")}="{f"{x:.2f}" if isinstance(x, float) else x}"'
             for name, x in attributes.items()
         )
-        self.pieces.append(f"<{tag}{''.join(words)}" + (f">{escape(text)}</{tag}>" if text else "/>"))
+        self.pieces.append(
+            f"<{tag}{''.join(attribute_texts)}" + (f">{escape(text)}</{tag}>" if text else "/>")
+        )
 
     def line(self, begin: Point, end: Point, **look: Any) -> None:
         """Add a line."""

@@ -16,7 +16,7 @@ from ..reading.text import number as number_words
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
-from ..study.readings import crank_motion, crank_speed, crank_torque, has_turn, shaft_power
+from ..study.readings import crank_motion, crank_speed, crank_torque, shaft_power
 from ..study.record import StudyRecord
 from ..study.result import assumed_ranges
 from ..study.window import mean
@@ -51,9 +51,7 @@ def _torque_speed(study: StudyRecord) -> fig.Figure:
     overloads = run_names.groups(study, [name for name in names if name not in starts])
     for group in [starts, *overloads]:
         # an overload is drawn from its event on: before, it is the steady running of the first panel
-        runs = {
-            name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in group
-        }
+        runs = {name: run_names.from_event(study, name) for name in group}
         curves = [
             fig.Curve(
                 run_names.title(study, name),
@@ -133,11 +131,7 @@ def _turn(study: StudyRecord) -> fig.Figure:
     )
 
 
-def _is_steady(study: StudyRecord) -> bool:
-    return "steady" in study.answers and has_turn(study.drive, study.steady)
-
-
-@PICTURES.declare(_is_steady, "power_turn.png")
+@PICTURES.declare(run_names.has_steady_turns, "power_turn.png")
 def _power(study: StudyRecord) -> fig.Figure:
     """The power at crank and motor over the last turn of steady running."""
     drive, steady, driver = study.drive, study.steady, study.driver_noun
@@ -163,7 +157,7 @@ def _power(study: StudyRecord) -> fig.Figure:
     )
 
 
-@PICTURES.declare(_is_steady, "load_histogram.png")
+@PICTURES.declare(run_names.has_steady_turns, "load_histogram.png")
 def _load_histogram(study: StudyRecord) -> fig.Figure:
     """The share of the time in which the torque lies in each class: at the crank and, where it is known, in the air
     gap of the motor, which the inertia of its rotor and a flywheel make smoother."""
@@ -206,13 +200,12 @@ def _averages(steady: xr.Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
 
 
 @PICTURES.declare(
-    lambda study: _is_steady(study) and not study.drive.foreign_machine, "force_over_stroke.png"
+    lambda study: run_names.has_steady_turns(study) and not study.drive.foreign_machine,
+    "force_over_stroke.png",
 )
 def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
     names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
-    parts = {"steady": study.steady} | {
-        name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in names
-    }
+    parts = {"steady": study.steady} | {name: run_names.from_event(study, name) for name in names}
     runs = ((run_names.title(study, name), machine_state(study, part)) for name, part in parts.items())
     return linkage.force_over_stroke(runs)
 

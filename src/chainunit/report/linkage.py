@@ -37,6 +37,20 @@ def picture(machine: Machine, way: Mechanism) -> Animation:
     )
 
 
+def driver_nouns(machine: Machine) -> tuple[str, str]:
+    """The nouns of the effort and of the inertia at the driver."""
+    return ("force", "mass") if machine.model.slides else ("torque", "inertia")
+
+
+def driver_axis(machine: Machine, low: float | None = None, high: float | None = None) -> fig.Axis:
+    """The axis of the place of the driver."""
+    model = machine.model
+    label = f"{'way' if model.slides else 'angle'} of the driver"
+    return fig.Axis(
+        label, model.driver_port.unit("rad"), low=low, high=high, step=45.0 if model.turns else None
+    )
+
+
 def links(linkage: Linkage) -> Iterator[DrawnLink]:
     """The links as they are drawn, the crank first. Links with a pin in the ground are heavier than the others; a
     link with more than two pins is an area."""

@@ -168,7 +168,7 @@ def _reversals(f: LinkageFindings, x: LinkageData, variables: Mapping[str, str])
 
 
 def _animation(f: LinkageFindings) -> Animation:
-    machine, model = f.machine, f.machine.model
+    machine = f.machine
     low, _ = f.description.span
     step = (2 if f.back else 1) * (len(f.q) - 1) // _PICTURES
     q, speed = f.q[::step], np.full(_PICTURES // (2 if f.back else 1) + 1, f.speed)
@@ -187,7 +187,7 @@ def _animation(f: LinkageFindings) -> Animation:
         return x, y
 
     state = _state(f, q, speed)
-    effort, unit = ("Force" if model.slides else "Torque"), model.driver_port.unit
+    effort, unit = capital(linkage.driver_nouns(machine)[0]), machine.model.driver_port.unit
     readings = (
         Reading("Place of the driver", q, unit("rad")),
         Reading(f"{effort} at the driver", over(lambda g: g.outputs["tau"]) * machine.ratio, unit("N.m")),
@@ -221,11 +221,10 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     there = ", there and back over its range" if f.back else ""
     lead = f"Inverse dynamics at {{}} of the driver{there}, with the loads of normal running."
     yield b.Text(filled(lead, exact(x.speed, 4)), "lead", central=True)
-    slides = f.machine.model.slides
-    effort, inertia_word = ("force", "mass") if slides else ("torque", "inertia")
+    effort, inertia = linkage.driver_nouns(f.machine)
     for way, forces in {"forth": x.forces, "back": x.back.forces}.items() if x.back else (("", x.forces),):
         on = f", on the way {way}" if way else ""
-        title = f"{capital(effort)}, power and {inertia_word} at the driver{on}"
+        title = f"{capital(effort)}, power and {inertia} at the driver{on}"
         yield b.Table(quantity_rows(forces.turn), title=title, central=True)
         yield from table(
             forces.joints.items(),
@@ -237,18 +236,13 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
             title=f"Reactions{on}",
             central=True,
         )
-    yield from _figures(f, effort, inertia_word)
+    yield from _figures(f)
 
 
-def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.Block]:
+def _figures(f: LinkageFindings) -> Iterator[b.Block]:
     """The figures over the way of the driver, with a curve, or of reactions a panel, for each direction."""
-    model, unit, ways = f.machine.model, f.machine.model.driver_port.unit, _ways(f)
-    place = fig.Axis(
-        "way of the driver" if model.slides else "angle of the driver",
-        unit("rad"),
-        step=45.0 if model.turns else None,
-    )
-    yield _turn_figure(f, place, effort, inertia_word)
+    place, ways = linkage.driver_axis(f.machine), _ways(f)
+    yield _turn_figure(f, place)
     states = (
         (f"on the way {way}" if way else "a turn at constant speed", _state(f, f.q, findings.speed))
         for way, findings in ways.items()
@@ -263,13 +257,14 @@ def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.B
     )
 
 
-def _turn_figure(f: LinkageFindings, place: fig.Axis, effort: str, inertia_word: str) -> fig.Figure:
+def _turn_figure(f: LinkageFindings, place: fig.Axis) -> fig.Figure:
     """Effort, power and inertia at the driver."""
+    effort, inertia = linkage.driver_nouns(f.machine)
     unit, ratio, ways = f.machine.model.driver_port.unit, f.machine.ratio, _ways(f)
     readers: dict[fig.Axis, Callable[[LinkageFindings], Any]] = {
         fig.Axis(f"{effort} at the driver", unit("N.m")): lambda g: g.outputs["tau"] * ratio,
         fig.Axis("power at the driver", "W"): lambda g: g.outputs["tau"] * ratio * g.speed,
-        fig.Axis(f"reflected {inertia_word}", unit("kg.m2"), low=0.0): lambda g: g.outputs["J"] * ratio**2,
+        fig.Axis(f"reflected {inertia}", unit("kg.m2"), low=0.0): lambda g: g.outputs["J"] * ratio**2,
     }
     curves: dict[fig.Axis, list[fig.Curve]] = {axis: [] for axis in readers}
     for (k, (axis, reader)), (look, (way, findings)) in product(
@@ -278,7 +273,7 @@ def _turn_figure(f: LinkageFindings, place: fig.Axis, effort: str, inertia_word:
         is_named = bool(way) and k == 0
         curve = fig.Curve(way or axis.label, f.q, reader(findings), look, in_legend=is_named)
         curves[axis].append(curve)
-    title = f"{capital(effort)}, power and {inertia_word}"
+    title = f"{capital(effort)}, power and {inertia}"
     return fig.Figure(
         "linkage-turn",
         f"{title} over the way of the driver",

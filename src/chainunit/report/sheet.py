@@ -131,8 +131,8 @@ def _not_assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> I
 
 def _given(report_sections: dict[str, b.Section], is_shown: Callable[[b.GivenValue], bool]) -> b.Given:
     """The given values of the report that are shown."""
-    (given,) = (block for block in report_sections["given"].blocks if isinstance(block, b.Given))
-    sections = ((title, tuple(filter(is_shown, values))) for title, values in given.sections)
+    (block,) = (block for block in report_sections["given"].blocks if isinstance(block, b.Given))
+    sections = ((title, tuple(filter(is_shown, values))) for title, values in block.sections)
     return b.Given(tuple(section for section in sections if section[1]))
 
 

@@ -53,16 +53,8 @@ def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
         sections = [
             section for section in sections if section.blocks or section.name not in analysis_sections()
         ]
-        return b.Report(
-            study.config.title,
-            study.kind,
-            result,
-            (),
-            tuple(sections),
-            source=source_line(cited(Heading.of(study.config.title, study.config.file))),
-            failure=_failure(study),
-            units=study.config.units,
-        )
+        source = source_line(cited(Heading.of(study.config.title, study.config.file)))
+        return _report(study, result, sections, source)
 
 
 def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
@@ -76,15 +68,16 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
                 blocks.append(replace(block, form="both"))
         if study.answers:
             blocks.append(runs.table_of_runs(study).of_form("short"))
-        return b.Report(
-            study.config.title,
-            study.kind,
-            result,
-            (),
-            (b.Section("summary", "Summary", tuple(blocks)),),
-            failure=_failure(study),
-            units=study.config.units,
-        )
+        return _report(study, result, [b.Section("summary", "Summary", tuple(blocks))])
+
+
+def _report(
+    study: StudyRecord, result: Mapping[str, Any], sections: Iterable[b.Section], source: Line = ()
+) -> b.Report:
+    config, failure = study.config, _failure(study)
+    return b.Report(
+        config.title, study.kind, result, (), tuple(sections), source, failure, units=config.units
+    )
 
 
 def _failure(study: StudyRecord) -> Line:

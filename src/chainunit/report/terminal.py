@@ -258,8 +258,13 @@ def _parted(table: Table, units: Units, room: int) -> list[Table]:
     """The table in parts that fit into the width `room`, each with the first column, where the words of all columns
     are too wide for it; a table with notes stays whole."""
     columns = _columns(table)
-    words = sum(max(len(word) for cell in column for word in _words(cell, units)) for column in columns)
-    if table.note_title or not table.columns or not table.numeric or words + 3 * len(columns) + 1 <= room:
+    word_sizes = sum(max(len(word) for cell in column for word in _words(cell, units)) for column in columns)
+    if (
+        table.note_title
+        or not table.columns
+        or not table.numeric
+        or word_sizes + 3 * len(columns) + 1 <= room
+    ):
         return [table]
     widths = [max(len(part) for cell in column for part in _parts(cell, units)) + 3 for column in columns]
     parts = [[0]]
@@ -298,10 +303,10 @@ def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[
     texts = [[plain_cell(cell, units) for cell in column] for column in columns]
     widths = [max(map(len, column)) for column in texts]
     whole = [max(len(part) for cell in column for part in _parts(cell, units)) for column in columns]
-    words = [max(len(word) for cell in column for word in _words(cell, units)) for column in columns]
+    word_sizes = [max(len(word) for cell in column for word in _words(cell, units)) for column in columns]
     heads = [max(len(piece) for piece in (*column[0].split(), *column[1:], "")) for column in texts]
     borders = 3 * len(columns) + 1
-    for least in (heads, whole, words):
+    for least in (heads, whole, word_sizes):
         while sum(widths) + borders > room:
             wide = [k for k, width in enumerate(widths) if width > least[k]]
             if not wide:

@@ -59,7 +59,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         "places": ANGLES if model.turns else _ON_THE_WAY,
         "speed": speed,
         "driver": model.driver_noun,
-        "effort": _effort(machine),
+        "effort": linkage.driver_nouns(machine)[0],
         "place": shown_in_unit("m" if model.slides else "rad", "", units),
         "results": results,
         "pulls": list(_pulls(model_columns)),
@@ -80,11 +80,6 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     return LiveTurn(model_text(model, tuple(columns)), data)
 
 
-def _effort(machine: Machine) -> str:
-    """The noun of the effort at the driver."""
-    return "force" if machine.model.slides else "torque"
-
-
 def _forces(machine: Machine) -> Iterator[dict[str, str]]:
     """The reactions: title, output, joint at which it acts, and name in the picture."""
     for output, title, joint, short in linkage.reactions(machine):
@@ -97,7 +92,7 @@ def _results(
     """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
     the factors ``by``: the speed of the driver, or the square of the ratio."""
     model = machine.model
-    port, driver, effort = model.driver_port.unit, model.driver_noun, _effort(machine)
+    port, driver, (effort, _) = model.driver_port.unit, model.driver_noun, linkage.driver_nouns(machine)
     unit, inertia = port("N.m"), port("kg.m2")
     rows: list[tuple[str, str, str, str, str]] = [
         (f"{driver} {effort}, peak", "peak", "crank_torque", unit, ""),
@@ -142,7 +137,7 @@ def _pulls(model_columns: Any) -> Iterator[dict[str, Any]]:
 def _curves(machine: Machine, model_columns: Any, units: Units) -> Iterator[dict[str, Any]]:
     """The plots over the turn: each has curves of one unit."""
     model = machine.model
-    port, driver, effort = model.driver_port.unit, model.driver_noun, _effort(machine)
+    port, driver, (effort, _) = model.driver_port.unit, model.driver_noun, linkage.driver_nouns(machine)
     curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
     if "rocker.tau" in model_columns:
         curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
