@@ -27,6 +27,8 @@ from .figure import Figure
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 NAME = "report.html"
+WARNINGS, FIGURES = "warnings", "figures"
+"""Groups of neighbouring blocks."""
 
 _SPACE = "\u00a0"  # before a unit
 _SHORT = 16
@@ -213,11 +215,11 @@ def marks(block: b.Given) -> str:
     return f'<p class="hint marks">Not in the study file: {"; ".join(entries)}.</p>' if origins else ""
 
 
-def _kind(block: b.Block) -> str:
+def group_of(block: b.Block) -> str:
     """The name of the group that a block forms with its neighbours; empty for a block that stands alone."""
     if isinstance(block, b.Judgement) and block.severity == "warning":
-        return "warnings"
-    return "figures" if isinstance(block, Figure) else ""
+        return WARNINGS
+    return FIGURES if isinstance(block, Figure) else ""
 
 
 class Page:
@@ -274,11 +276,11 @@ class Page:
     def blocks(self, blocks: Sequence[b.Block]) -> str:
         """Blocks in order; consecutive warnings form one list, consecutive figures one grid."""
         parts = []
-        for kind, together in groupby(blocks, _kind):
+        for kind, together in groupby(blocks, group_of):
             html = [self.block(block) for block in together]
-            if kind == "warnings":
+            if kind == WARNINGS:
                 html = [f'<ul class="verdicts">{"".join(html)}</ul>']
-            elif kind == "figures" and any(html):
+            elif kind == FIGURES and any(html):
                 html = [_PLOTS.format("".join(html))]
             parts += [text for text in html if text]
         return "\n".join(parts)

@@ -21,7 +21,7 @@ from ..core.errors import InputError
 from ..reading.text import Units
 from . import blocks as b
 from .figure import Figure
-from .html import Page, marks, resource
+from .html import FIGURES, WARNINGS, Page, group_of, marks, resource
 from .motion import Animation
 
 NAME = "sheet.pdf"
@@ -78,14 +78,14 @@ class _PrintedPage(Page):
         """Blocks in order, with capitals where a line begins; consecutive warnings form one list, and of consecutive
         figures the narrow ones stand in two columns after the others."""
         parts = []
-        for kind, together in groupby(blocks, _group):
+        for kind, together in groupby(blocks, group_of):
             group = list(together)
-            wide = [block for block in group if kind != _FIGURES or _is_wide(block)]
-            if kind == _FIGURES:
+            wide = [block for block in group if kind != FIGURES or _is_wide(block)]
+            if kind == FIGURES:
                 # the flattest first: it fits on the page that has begun
                 wide.sort(key=self._height)
             texts = list(filter(None, map(self.block, wide)))
-            parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == _WARNINGS and texts else texts
+            parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == WARNINGS and texts else texts
             if narrow := "".join(self.block(block) for block in group if block not in wide):
                 parts.append(f'<div class="prints">{narrow}</div>')
         return _BEGIN.sub(lambda match: match[1] + match[2].upper(), "\n".join(parts))
@@ -130,15 +130,6 @@ class _PrintedPage(Page):
 
 _FLAT = 0.5
 """Height over width below which two figures stand beside each other in a long annex."""
-
-_WARNINGS, _FIGURES = "warnings", "figures"
-
-
-def _group(block: b.Block) -> str:
-    """The name of the group that a block forms with its neighbours; empty for a block that stands alone."""
-    if isinstance(block, Figure):
-        return _FIGURES
-    return _WARNINGS if getattr(block, "severity", "") == "warning" else ""
 
 
 def _is_wide(block: b.Block) -> bool:
