@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -158,21 +159,20 @@ def _first_rows(
 ) -> str:
     """A table as the console prints it, with as many of its first rows as have room: the `size` of the text is up to
     `room`, and a row adds 1 to it at least. Empty if less than `fewest` rows, or than all, have room."""
-    rows = table.rows
-    low, high, best = min(fewest, len(rows)) - 1, min(len(rows), room), ""
-    count = high
-    while low < high:
-        part = replace(table, rows=rows[:count])
+
+    def printed(count: int) -> str:
+        part = replace(table, rows=table.rows[:count])
         text = _printed(console, partial(_show_table, part, console, units))
-        text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
-        if count < len(rows):
-            text += f"... and {len(rows) - count} more rows\n"
-        if size(text) <= room:
-            best, low = text, count
-        else:
-            high = count - 1
-        count = (low + high + 1) // 2
-    return best
+        lines = [line.rstrip() for line in text.splitlines()]
+        lines += [f"... and {len(table.rows) - count} more rows"] if count < len(table.rows) else []
+        return "".join(f"{line}\n" for line in lines)
+
+    total = len(table.rows)
+    if total <= room and size(whole := printed(total)) <= room:
+        return whole
+    counts = range(min(fewest, total), min(total - 1, room) + 1)
+    fitting = bisect_right(counts, room, key=lambda count: size(printed(count)))
+    return printed(counts[fitting - 1]) if fitting else ""
 
 
 def judgements(report: Report) -> list[str]:
@@ -193,13 +193,11 @@ _MOST_LETTERS = 1990
 """Largest length of the text for a screen of Python."""
 
 
-def brief(report: Report, count: int, width: int = 100) -> str:
+def brief(report: Report, count: int) -> str:
     """The judgements, the texts and the tables of the short form for which there is room, as plain text, and the
     number of the warnings, `count`. A table is cut to its first rows."""
     out = io.StringIO()
-    console = Console(
-        file=out, width=width, markup=False, highlight=False, force_jupyter=False, no_color=True
-    )
+    console = Console(file=out, width=100, markup=False, highlight=False, force_jupyter=False, no_color=True)
     end = f"Warnings: {count}. " if count else ""
     end += "All numbers: answers, to_json()."
     pieces = [f"The run stopped early: {plain_line(report.failure)}."] if report.failure else []
