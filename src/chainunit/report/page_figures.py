@@ -182,7 +182,6 @@ class _Drawing:
         self.rows = [(1.0 - last, 1.0 - first) for first, last in domains]
         self.samples = _thin_groups(spec)
         self.x_axes: dict[tuple[int, int], str] = {}
-        self.y_axes: dict[int, list[str]] = {}
         self.axes: dict[str, dict[str, Any]] = {}
         self.legend_names: set[str] = set()
         self.places: dict[tuple[int, int], tuple[str, str]] = {}
@@ -218,9 +217,8 @@ class _Drawing:
 
     def panel(self, r: int, c: int, panel: Panel) -> None:
         """Draw a panel into its place."""
-        count = sum(map(len, self.y_axes.values())) + 1
-        y = f"y{count if count > 1 else ''}"
-        self.y_axes.setdefault(r, []).append(y)
+        beside = [y for (row, _), (_, y) in self.places.items() if row == r]
+        y = f"y{len(self.places) + 1 if self.places else ''}"
         x = self.x_axes.setdefault(
             (c, self.spec.sharing(r, c)[0]), f"x{len(self.x_axes) + 1 if self.x_axes else ''}"
         )
@@ -232,8 +230,8 @@ class _Drawing:
         self.axes[_long(y)] |= {"title": {"text": panel.y.label}} | (
             {"scaleanchor": x} if panel.equal else {}
         )
-        if self.spec.level and self.y_axes[r][0] != y:
-            self.axes[_long(y)]["matches"] = self.y_axes[r][0]
+        if self.spec.level and beside:
+            self.axes[_long(y)]["matches"] = beside[0]
         if panel.title:
             corner = {"xanchor": "left", "yanchor": "bottom"}
             self._words(f"{x} domain", f"{y} domain", 0.0, 1.0, f"<b>{panel.title}</b>", **corner)

@@ -92,8 +92,16 @@ class ReportedResult(Generic[Question, Outcome]):
 
     @cached_property
     def answers(self) -> pd.DataFrame:
-        """The numbers of the answer, a row each, in SI units: the column "unit", and columns of numbers."""
-        return answers_table(self._answer_rows())
+        """The numbers of the answer, a row each, in SI units: the column "unit", and columns of numbers, NaN for one
+        that is none."""
+        import pandas as pd
+
+        table = {}
+        for name, row in self._answer_rows().items():
+            unit = next(iter(row.values()))["unit"]
+            values = {column: entry["value"] for column, entry in row.items()}
+            table[name] = {"unit": unit} | {k: float("nan") if x is None else x for k, x in values.items()}
+        return pd.DataFrame.from_dict(table, orient="index")
 
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """By row and column, the entries of result.json that `answers` has; by default all of its single numbers."""
@@ -158,19 +166,6 @@ class ReportedResult(Generic[Question, Outcome]):
     def _repr_html_(self) -> str:
         """The same as HTML, for notebooks."""
         return html.fragment(self._shown)
-
-
-def answers_table(rows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """A table with a row for each entry: its unit, and its numbers by column. A number is one of result.json, with
-    value and unit; one that is None is NaN."""
-    import pandas as pd
-
-    table = {}
-    for name, row in rows.items():
-        unit = next(iter(row.values()))["unit"]
-        values = {column: entry["value"] for column, entry in row.items()}
-        table[name] = {"unit": unit} | {k: float("nan") if x is None else x for k, x in values.items()}
-    return pd.DataFrame.from_dict(table, orient="index")
 
 
 def _single_numbers(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
