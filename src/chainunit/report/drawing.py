@@ -32,7 +32,7 @@ _LETTER, _LINE = 7.2, 15.0
 _DISC = 60.0
 """Radius of a driver that has one point [px]."""
 _DASHED = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
-_DIMENSION = {"fill": "#c1440e", "font_style": "italic"}
+_DIMENSION: dict[str, Any] = {"fill": "#c1440e", "font_style": "italic"}
 _LOOKS = {"crank": ("#c1440e", 7), "heavy": ("#3d3d3d", 7), "light": ("#0b6fa4", 5)}
 
 Point = tuple[float, float]

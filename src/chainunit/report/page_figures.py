@@ -268,15 +268,9 @@ class _Drawing:
                     )  # fmt: skip
             case Shade():
                 colour = FILLS[item.look]
-                fill: dict[str, Any] = {"type": "rect", "fillcolor": colour, "opacity": 0.6}
-                self.shapes.append(
-                    {
-                        **fill,
-                        "line": {"width": 0},
-                        "layer": "below",
-                        **_across(item.axis, item.low, item.high, x, y),
-                    }
-                )
+                edge = {"line": {"width": 0}, "layer": "below"}
+                area = {"type": "rect", "fillcolor": colour, "opacity": 0.6, **edge}
+                self.shapes.append(area | _across(item.axis, item.low, item.high, x, y))
                 self._sample(item.name, place, mode="markers", marker=_square(colour))
             case Mark():
                 self._mark(item, place)
