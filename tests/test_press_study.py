@@ -21,7 +21,7 @@ from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import figures as study_figures
 from chainunit.report import page_figures, study_motion
 from chainunit.report.figure import Between, Curve
-from chainunit.report.linkage import loads_on_slides
+from chainunit.report.machine_picture import loads_on_slides
 from chainunit.report.study_motion import machine_state
 from chainunit.study import config
 from chainunit.study.readings import crank_motion, crank_torque

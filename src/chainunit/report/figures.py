@@ -21,7 +21,7 @@ from ..study.record import StudyRecord
 from ..study.result import assumed_ranges
 from ..study.window import mean
 from . import figure as fig
-from . import linkage, run_names
+from . import machine_picture, run_names
 from .analyses import angle_axis, last_turn
 from .cited import cited, number
 from .given_numbers import asked_speed
@@ -207,7 +207,7 @@ def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
     names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
     parts = {"steady": study.steady} | {name: run_names.from_event(study, name) for name in names}
     runs = ((run_names.title(study, name), machine_state(study, part)) for name, part in parts.items())
-    return linkage.force_over_stroke(runs)
+    return machine_picture.force_over_stroke(runs)
 
 
 @PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")

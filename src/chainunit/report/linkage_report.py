@@ -19,7 +19,7 @@ from ..study.linkage_result import LinkageData, linkage_data
 from ..study.linkage_turn import LinkageFindings, Stroke, Swing, linkage_findings
 from . import blocks as b
 from . import figure as fig
-from . import linkage, linkage_rest
+from . import linkage, linkage_rest, machine_picture
 from .cited import cited, exact, number, quantity_rows, table
 from .drawing import drawing
 from .lines import Line, Name, Number, Strong, capital, filled, join, line
@@ -187,7 +187,7 @@ def _animation(f: LinkageFindings) -> Animation:
         return x, y
 
     state = _state(f, q, speed)
-    effort, unit = capital(linkage.driver_nouns(machine)[0]), machine.model.driver_port.unit
+    effort, unit = capital(machine_picture.driver_nouns(machine)[0]), machine.model.driver_port.unit
     readings = (
         Reading("Place of the driver", q, unit("rad")),
         Reading(f"{effort} at the driver", over(lambda g: g.outputs["tau"]) * machine.ratio, unit("N.m")),
@@ -198,11 +198,13 @@ def _animation(f: LinkageFindings) -> Animation:
         time,
         linkage.places(state.m),
         readings,
-        (*linkage.arrows(machine, force), *linkage.load_arrows(state)),
+        (*machine_picture.arrows(machine, force), *machine_picture.load_arrows(state)),
         blocks=linkage.blocks(state.m),
     )
     caption = "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads."
-    return replace(linkage.picture(machine, state.m), runs=(clip,), turn=float(time[-1]), caption=caption)
+    return replace(
+        machine_picture.picture(machine, state.m), runs=(clip,), turn=float(time[-1]), caption=caption
+    )
 
 
 def _state(f: LinkageFindings, q: Any, speed: Any) -> MachineState:
@@ -221,7 +223,7 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     there = ", there and back over its range" if f.back else ""
     lead = f"Inverse dynamics at {{}} of the driver{there}, with the loads of normal running."
     yield b.Text(filled(lead, exact(x.speed, 4)), "lead", central=True)
-    effort, inertia = linkage.driver_nouns(f.machine)
+    effort, inertia = machine_picture.driver_nouns(f.machine)
     for way, forces in {"forth": x.forces, "back": x.back.forces}.items() if x.back else (("", x.forces),):
         on = f", on the way {way}" if way else ""
         title = f"{capital(effort)}, power and {inertia} at the driver{on}"
@@ -241,13 +243,13 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
 
 def _figures(f: LinkageFindings) -> Iterator[b.Block]:
     """The figures over the way of the driver, with a curve, or of reactions a panel, for each direction."""
-    place, ways = linkage.driver_axis(f.machine), _ways(f)
+    place, ways = machine_picture.driver_axis(f.machine), _ways(f)
     yield _turn_figure(f, place)
     states = (
         (f"on the way {way}" if way else "a turn at constant speed", _state(f, f.q, findings.speed))
         for way, findings in ways.items()
     )
-    yield from linkage.force_over_stroke(states, PICTURES[3])
+    yield from machine_picture.force_over_stroke(states, PICTURES[3])
     yield fig.Figure(
         "linkage-reactions",
         "Reactions over the way of the driver",
@@ -259,7 +261,7 @@ def _figures(f: LinkageFindings) -> Iterator[b.Block]:
 
 def _turn_figure(f: LinkageFindings, place: fig.Axis) -> fig.Figure:
     """Effort, power and inertia at the driver."""
-    effort, inertia = linkage.driver_nouns(f.machine)
+    effort, inertia = machine_picture.driver_nouns(f.machine)
     unit, ratio, ways = f.machine.model.driver_port.unit, f.machine.ratio, _ways(f)
     readers: dict[fig.Axis, Callable[[LinkageFindings], Any]] = {
         fig.Axis(f"{effort} at the driver", unit("N.m")): lambda g: g.outputs["tau"] * ratio,

@@ -12,7 +12,7 @@ from ..study.linkage_result import LinkageAtRest
 from ..study.linkage_turn import LinkageFindings
 from . import blocks as b
 from . import figure as fig
-from . import linkage
+from . import machine_picture
 from .cited import as_name, number, quantity_rows, table
 from .lines import Line, filled, join, line
 
@@ -29,7 +29,7 @@ _MARKERS = {STABLE: "o", STOP: "s", UNSTABLE: "x", SADDLE: "+"}
 def at_rest(f: LinkageFindings, x: LinkageAtRest, file: str) -> Iterator[b.Block]:
     """The section of the report; `file` is the name of its picture."""
     equilibria = f.rest
-    effort, _ = linkage.driver_nouns(f.machine)
+    effort, _ = machine_picture.driver_nouns(f.machine)
     if equilibria.indifferent:
         yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
         return
@@ -56,7 +56,7 @@ def _table(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Tabl
         is_range = equilibrium.kind == INDIFFERENT
         return filled("{} to {}", begin, number(equilibrium.end)) if is_range else begin
 
-    _, inertia = linkage.driver_nouns(f.machine)
+    _, inertia = machine_picture.driver_nouns(f.machine)
     return table(
         enumerate(x.equilibria, 1),
         ("equilibrium", lambda row: f"{row[0]}: {_KINDS[row[1].kind]}"),
@@ -127,7 +127,7 @@ def _notes(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Bloc
 
 def _figure(f: LinkageFindings, effort: str, file: str) -> fig.Figure:
     unit, rest = f.machine.model.driver_port.unit, f.rest.rest
-    place = linkage.driver_axis(f.machine, float(rest.q[0]), float(rest.q[-1]))
+    place = machine_picture.driver_axis(f.machine, float(rest.q[0]), float(rest.q[-1]))
     panels = [(fig.Axis(f"holding {effort}", unit("N.m")), rest.holding)]
     if rest.potential is not None:
         panels.append((fig.Axis("potential", "J"), rest.potential))

@@ -13,7 +13,7 @@ from ..mechanism.machine import MachineState
 from ..mechanism.models import CrankMotion, names_of
 from ..study.readings import crank_motion, crank_torque
 from ..study.record import StudyRecord
-from . import linkage, run_names
+from . import linkage, machine_picture, run_names
 from .capability import Supplement, capabilities
 from .lines import capital
 from .motion import Animation, Clip, DrawnLink, Reading
@@ -36,8 +36,8 @@ def motion(study: StudyRecord) -> Animation:
     supplements = (part.supplement(study) for part in capabilities())
     supplement = next((candidate for candidate in supplements if candidate is not None), Supplement(study))
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
-    parts = linkage.picture(machine, whole := machine.drive(angles * machine.ratio))
-    loads = _LOADS if linkage.has_loads(whole.linkage) else ""
+    parts = machine_picture.picture(machine, whole := machine.drive(angles * machine.ratio))
+    loads = _LOADS if machine_picture.has_loads(whole) else ""
     thin = f"; a thin line is the {', the '.join(parts.paths)}" if parts.paths else ""
     return replace(
         parts,
@@ -88,7 +88,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
     loads = _loads(study, part)
     state = machine_state(study, part)
     details = supplement.details(part, state)
-    forces = linkage.arrows(
+    forces = machine_picture.arrows(
         drive.machine,
         lambda output: (part[f"machine.{output}.fx"].values, part[f"machine.{output}.fy"].values),
         supplement.groups,
@@ -112,7 +112,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         part["time"].values - (event or 0.0),
         {**linkage.places(state.m), **details.joints},
         readings,
-        (*forces, *linkage.load_arrows(state), *details.arrows),
+        (*forces, *machine_picture.load_arrows(state), *details.arrows),
         details.loads,
         linkage.blocks(state.m),
         event is not None,

@@ -16,7 +16,7 @@ from ...mechanism.sketch import places
 from ...reading.text import Units
 from ...study.cycle_quantities import ANGLES
 from ...study.verdict import TOPICS
-from .. import linkage
+from .. import machine_picture
 from ..lines import capital
 from .quantities import shown_in_unit
 
@@ -51,7 +51,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
             *(name for pull in _pulls(model_columns) for name in pull["columns"]),
         ]
     )
-    picture = linkage.picture(machine, whole)
+    picture = machine_picture.picture(machine, whole)
     data = {
         "parameters": machine.by_name,
         "turns": bool(model.turns),
@@ -59,7 +59,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         "places": ANGLES if model.turns else _ON_THE_WAY,
         "speed": speed,
         "driver": model.driver_noun,
-        "effort": linkage.driver_nouns(machine)[0],
+        "effort": machine_picture.driver_nouns(machine)[0],
         "place": shown_in_unit("m" if model.slides else "rad", "", units),
         "results": results,
         "pulls": list(_pulls(model_columns)),
@@ -82,7 +82,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
 
 def _forces(machine: Machine) -> Iterator[dict[str, str]]:
     """The reactions: title, output, joint at which it acts, and name in the picture."""
-    for output, title, joint, short in linkage.reactions(machine):
+    for output, title, joint, short in machine_picture.reactions(machine):
         yield {"title": title, "of": output, "at": joint, "short": short}
 
 
@@ -92,7 +92,11 @@ def _results(
     """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
     the factors ``by``: the speed of the driver, or the square of the ratio."""
     model = machine.model
-    port, driver, (effort, _) = model.driver_port.unit, model.driver_noun, linkage.driver_nouns(machine)
+    port, driver, (effort, _) = (
+        model.driver_port.unit,
+        model.driver_noun,
+        machine_picture.driver_nouns(machine),
+    )
     unit, inertia = port("N.m"), port("kg.m2")
     rows: list[tuple[str, str, str, str, str]] = [
         (f"{driver} {effort}, peak", "peak", "crank_torque", unit, ""),
@@ -137,7 +141,11 @@ def _pulls(model_columns: Any) -> Iterator[dict[str, Any]]:
 def _curves(machine: Machine, model_columns: Any, units: Units) -> Iterator[dict[str, Any]]:
     """The plots over the turn: each has curves of one unit."""
     model = machine.model
-    port, driver, (effort, _) = model.driver_port.unit, model.driver_noun, linkage.driver_nouns(machine)
+    port, driver, (effort, _) = (
+        model.driver_port.unit,
+        model.driver_noun,
+        machine_picture.driver_nouns(machine),
+    )
     curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
     if "rocker.tau" in model_columns:
         curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
