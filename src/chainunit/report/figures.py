@@ -45,44 +45,46 @@ _LOAD_CLASSES = 40
 )
 def _torque_speed(study: StudyRecord) -> fig.Figure:
     """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
-    names, panels = run_names.motor_runs(study), []
+    names = run_names.motor_runs(study)
     # an event that is a start of its own would squeeze the loops of the others
     starts = [name for name in names if run_names.event_time(study, name) is None]
     overloads = run_names.groups(study, [name for name in names if name not in starts])
-    for group in [starts, *overloads]:
-        # an overload is drawn from its event on: before, it is the steady running of the first panel
-        runs = {name: run_names.from_event(study, name) for name in group}
-        curves = [
-            fig.Curve(
-                run_names.title(study, name),
-                run["motor.w"].values,
-                run["motor.air_gap_tau"].values,
-                names.index(name),
-            )
-            for name, run in runs.items()
-        ]
-        slowest, fastest = (
-            float(extreme([extreme(curve.x) for curve in curves])) for extreme in (np.min, np.max)
-        )
-        room = 0.15 * (fastest - slowest)
-        low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
-        w = np.linspace(low, fastest + room, 301)
-        most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
-        # beyond the synchronous speed the limit falls far below the torques of all runs
-        most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
-        x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
-        limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
-        items = (*curves, limit, *_duty(study))
-        panels.append(fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group)))
     return fig.Figure(
         "torque-speed",
         "Torque-speed plane: the start, and the overloads from their event on",
         "Air-gap torque of the motor over its speed, a line for each run, with the largest torque that the drive "
         "gives in steady running.",
-        (tuple(panels),),
+        (tuple(_torque_speed_panel(study, group, names) for group in (starts, *overloads)),),
         "Steady running is a closed loop. Grey: the largest torque that the drive gives in steady running.",
         heights=(1.6,),
     )
+
+
+def _torque_speed_panel(study: StudyRecord, group: list[str], names: list[str]) -> fig.Panel:
+    """The panel of a group of runs; a run has the look of its place among all `names`."""
+    # an overload is drawn from its event on: before, it is the steady running of the first panel
+    runs = {name: run_names.from_event(study, name) for name in group}
+    curves = [
+        fig.Curve(
+            run_names.title(study, name),
+            run["motor.w"].values,
+            run["motor.air_gap_tau"].values,
+            names.index(name),
+        )
+        for name, run in runs.items()
+    ]
+    speeds = np.concatenate([curve.x for curve in curves])
+    slowest, fastest = float(np.min(speeds)), float(np.max(speeds))
+    room = 0.15 * (fastest - slowest)
+    low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
+    w = np.linspace(low, fastest + room, 301)
+    most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
+    # beyond the synchronous speed the limit falls far below the torques of all runs
+    most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
+    x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
+    limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
+    items = (*curves, limit, *_duty(study))
+    return fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group))
 
 
 def _duty(study: StudyRecord) -> Iterator[fig.Item]:
@@ -311,13 +313,9 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         speed.append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
     coasting = study.runs.get(name + run_names.COASTING)
     if coasting is not None:
-        after = coasting["time"].values - (event or 0.0)
-        of_crank = crank_speed(drive, coasting)
-        speed.append(fig.Curve(f"{driver} behind the open coupling", after, of_crank, 1))
-        # until the crank stands: the rest of the run shows nothing
-        turning = np.flatnonzero(np.abs(of_crank) > 0.02 * study.config.run.crank_speed)
-        stands = float(after[turning[-1]]) if turning.size else high
-        high = min(float(after[-1]), 1.3 * max(high, stands))
+        behind, stands = _coasting(study, coasting, event or 0.0)
+        speed.append(behind)
+        high = min(float(behind.x[-1]), 1.3 * max(high, high if stands is None else stands))
     if event is not None:
         # a quarter turn before the event shows enough of steady running
         before = 0.5 * math.pi / study.config.run.crank_speed
@@ -335,6 +333,14 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         _after(study, name) if event is not None else (),
         half=True,
     )
+
+
+def _coasting(study: StudyRecord, run: xr.Dataset, event: float) -> tuple[fig.Curve, float | None]:
+    """The speed of the machine behind the open coupling, and the time from which on it stands [s], if it ever turns."""
+    time, speed = run["time"].values - event, crank_speed(study.drive, run)
+    turning = np.flatnonzero(np.abs(speed) > 0.02 * study.config.run.crank_speed)
+    curve = fig.Curve(f"{study.driver_noun} behind the open coupling", time, speed, 1)
+    return curve, float(time[turning[-1]]) if turning.size else None
 
 
 def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]]:
