@@ -336,7 +336,8 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
 
 
 def _coasting(study: StudyRecord, run: xr.Dataset, event: float) -> tuple[fig.Curve, float | None]:
-    """The speed of the machine behind the open coupling, and the time from which on it stands [s], if it ever turns."""
+    """The speed of the machine behind the open coupling, and the time from which on it stands [s]; None if it never
+    turns."""
     time, speed = run["time"].values - event, crank_speed(study.drive, run)
     turning = np.flatnonzero(np.abs(speed) > 0.02 * study.config.run.crank_speed)
     curve = fig.Curve(f"{study.driver_noun} behind the open coupling", time, speed, 1)
