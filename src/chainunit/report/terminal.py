@@ -7,7 +7,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from textwrap import shorten
 
 from rich.console import Console
@@ -160,6 +160,7 @@ def _first_rows(
     """A table as the console prints it, with as many of its first rows as have room: the `size` of the text is up to
     `room`, and a row adds 1 to it at least. Empty if less than `fewest` rows, or than all, have room."""
 
+    @cache
     def printed(count: int) -> str:
         part = replace(table, rows=table.rows[:count])
         text = _printed(console, partial(_show_table, part, console, units))
