@@ -312,7 +312,7 @@
   const baseTurn = model.turn(study), base = model.results(baseTurn);
   const placeUnit = data.turn.place;
   // one of so many values as shown, and of a turn its `end`: the begin of the next one
-  const every = (count, column, by, offset, end) => {
+  const thinned = (count, column, by, offset, end) => {
     const list = Array.from({ length: Math.ceil(column.length / count) }, (_, k) => by * column[count * k] + offset);
     return data.turn.turns ? [...list, end ?? list[0]] : list;
   };
@@ -321,9 +321,9 @@
   const curvesOf = (c, turn, behind) => {
     const list = c.curves === "forces" ? ofPins.map((r) => ({ title: r.title, of: r.of, by: "" })) : c.curves;
     const count = list.length > 2 ? 3 : 1;
-    const x = every(count, turn.place, placeUnit.factor, placeUnit.offset, 2 * Math.PI * placeUnit.factor);
+    const x = thinned(count, turn.place, placeUnit.factor, placeUnit.offset, 2 * Math.PI * placeUnit.factor);
     return list.map((each, look) => {
-      const y = every(count, turn.columns[each.of], c.factor * model.factorOf(each.by, turn), c.offset);
+      const y = thinned(count, turn.columns[each.of], c.factor * model.factorOf(each.by, turn), c.offset);
       return { title: behind ? "" : each.title, look, x, y, behind };
     });
   };
