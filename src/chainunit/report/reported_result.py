@@ -52,29 +52,23 @@ class ReportedResult(Generic[Question, Outcome]):
             for a file that cannot be written; the others are written.
         """
         check_kind("folder", folder, str | Path | None, "the path of a folder")
-        with shown_progress(progress) as shown:
-            return cls._made(question, folder, shown, **options)
-
-    @classmethod
-    def _made(
-        cls, question: Question, folder: str | Path | None, progress: TaskProgress, **options: Any
-    ) -> Self:
         task = cls._task
-        compute = partial(task.outcome, question, progress=progress, **options)
-        if folder is not None:
-            with task.claimed(question, Path(folder)) as place:
-                result = cls(question, compute(folder=place), place)
-                result._write(place)
-        elif task.kept is None:
-            result = cls(question, compute(folder=None), None)
-        else:
-            place = Path(tempfile.mkdtemp(prefix="chainunit_"))
-            try:
-                result = cls(question, compute(folder=place), place)
-            except BaseException:
-                shutil.rmtree(place, ignore_errors=True)
-                raise
-            weakref.finalize(result, shutil.rmtree, place, ignore_errors=True)
+        with shown_progress(progress) as shown:
+            compute = partial(task.outcome, question, progress=shown, **options)
+            if folder is not None:
+                with task.claimed(question, Path(folder)) as place:
+                    result = cls(question, compute(folder=place), place)
+                    result._write(place)
+            elif task.kept is None:
+                result = cls(question, compute(folder=None), None)
+            else:
+                place = Path(tempfile.mkdtemp(prefix="chainunit_"))
+                try:
+                    result = cls(question, compute(folder=place), place)
+                except BaseException:
+                    shutil.rmtree(place, ignore_errors=True)
+                    raise
+                weakref.finalize(result, shutil.rmtree, place, ignore_errors=True)
         failure = task.failure(result._outcome)
         if failure is not None:
             failure.partial = result
