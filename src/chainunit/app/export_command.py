@@ -10,6 +10,7 @@ import typer
 import typer.core
 
 from ..core.errors import InputError
+from ..core.inputs import TOML, file_text
 from ..report.console import Backend, BackendOption, study_file, terminal_console
 
 
@@ -82,6 +83,7 @@ def export(
     """Write a model as an FMU; of a study file its whole system as one FMU, or as an SSP package of FMUs."""
     from ..fmu.backends import export as write
     from ..models import is_study_file, model_named
+    from ..reading.tables import toml
 
     file = output
     whole = is_study_file(name)
@@ -93,6 +95,8 @@ def export(
         _export_package(Path(name), file, backend, all_inputs, names)
         return
     if file and file.suffix != ".fmu":
+        if not whole and name.lower().endswith(".toml"):
+            toml(file_text(Path(name), TOML))  # of two faults, that of the file that is read comes first
         of_study = " or .ssp" if whole else ""
         raise InputError(f"-o {file}: must be a file name that ends in .fmu{of_study}")
     if whole and (config or direct):
