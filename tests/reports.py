@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import io
 import json
 import re
+from itertools import accumulate
 
 import numpy as np
 import plotly.graph_objects as go
@@ -15,7 +17,6 @@ from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import files, html, motion, page_figures, series, terminal
 from chainunit.report import study as study_report
 from chainunit.report.blocks import found_at
-from chainunit.report.packing import unpacked
 from chainunit.study.result import as_dict
 
 
@@ -80,3 +81,19 @@ def packed_in(page, name):
 
 def pictures(moving):
     return motion.pictures(moving, DEFAULT_UNITS)
+
+
+def unpacked(text):
+    """The data that a page holds packed, as the page reads it."""
+    return _restored(json.loads(gzip.decompress(base64.b64decode(text))))
+
+
+def _restored(data):
+    if isinstance(data, list):
+        return [_restored(x) for x in data]
+    if not isinstance(data, dict):
+        return data
+    if "+" not in data:
+        return {name: _restored(x) for name, x in data.items()}
+    digits, *differences = data["+"]
+    return [whole / 10**digits for whole in accumulate(differences)]

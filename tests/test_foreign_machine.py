@@ -372,9 +372,7 @@ def test_a_cardan_line_before_it(place, folder):
 def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
     """In other tools the system runs as in the own master: names, values and connections are those of the FMUs."""
     (folder / "both.toml").write_text(f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}")
-    process = chainunit(
-        "export-ssp", "both.toml", "--all-inputs", "-o", str(tmp_path / "both.ssp"), cwd=folder
-    )
+    process = chainunit("export", "both.toml", "--all-inputs", "-o", str(tmp_path / "both.ssp"), cwd=folder)
     assert process.returncode == 0, process.stderr
     assert "machine (ForeignMachine), gear (Gear), motor (ForeignMotor)" in process.stdout
     assert "ForeignMachine.fmu as it is" in process.stdout

@@ -287,7 +287,7 @@ def test_the_help_has_at_most_fourteen_commands_by_group_each_with_an_example(tm
     shown = [name for name in group.list_commands(typer.Context(group)) if not group.commands[name].hidden]
     assert len(shown) <= 14 and "Others:" not in text
     slip = chainunit("exprot", cwd=tmp_path).stderr
-    assert "Did you mean 'export'?" in slip and "export-ssp" not in slip
+    assert "Did you mean 'export'?" in slip and "export-ssp" not in group.commands
     for name in shown:
         (example,) = re.findall(rf"^ +(chainunit {name} .+)$", text, re.MULTILINE)
         words = example.split()[1:]

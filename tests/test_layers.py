@@ -97,12 +97,10 @@ def _is_own(entry):
 def test_no_renderer_names_a_study_or_a_machine():
     """Blocks, figures and lines, and the modules that draw and print them, serve any study."""
     renderers = [
-        *"blocks figure files html lines live_block markdown motion packing".split(),
+        *"blocks figure files html lines markdown motion".split(),
         *"page_figures print_figures style terminal".split(),
     ]
-    assert {f"report.{name}" for name in renderers} <= {a for a, _ in HOUSE.imports()} | {
-        f"report.{name}" for name in ("lines", "live_block", "packing")
-    }
+    assert {f"report.{name}" for name in renderers} <= {a for a, _ in HOUSE.imports()} | {"report.lines"}
     results = {(a, b) for a, b in HOUSE.imports() if a.startswith("report.") and a.split(".")[1] in renderers}
     assert {HOUSE.layer(b) for _, b in results} == {"core", "reading", "report"}
     assert {b.split(".")[1] for _, b in results if HOUSE.layer(b) == "report"} <= set(renderers)

@@ -23,7 +23,7 @@ from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.report import html
 from chainunit.report.live.formulas import event_signals, varied_names
-from chainunit.report.live.linkage import of_linkage
+from chainunit.report.live.machine import of_linkage
 from chainunit.report.live.page import live_page
 from chainunit.report.live.study import of_study
 from chainunit.study import config as study_files

@@ -17,7 +17,7 @@ from chainunit.report import blocks as b
 from chainunit.report import figure as fig
 from chainunit.report import html
 from chainunit.report.console import Forecast
-from chainunit.report.packing import packed_bytes
+from chainunit.report.html import packed_bytes
 
 TEXTS = ["", "a", "abc" * 2000, "".join(random.Random(1).choices("abcdef ", k=70_000)), "é € " * 30]
 

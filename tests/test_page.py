@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from event_tables import event_line
 from plotly.offline import get_plotlyjs
-from reports import at, page_of, pictures, plotly_figure, report_of, said_of, write
+from reports import at, page_of, pictures, plotly_figure, report_of, said_of, unpacked, write
 
 from chainunit import EMPTY, InputError, RunError
 from chainunit.capabilities.chains.analysis import rest_forces
@@ -36,10 +36,8 @@ from chainunit.reading.results import InUnit
 from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.reading.text import number as told_as
 from chainunit.report import html, study_motion
-from chainunit.report.blocks import Report, Section, found_at
+from chainunit.report.blocks import Live, Report, Section, found_at
 from chainunit.report.figure import Label, Mark, Shade
-from chainunit.report.live_block import Live
-from chainunit.report.packing import unpacked
 from chainunit.study import config, judgement
 from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check

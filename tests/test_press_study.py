@@ -18,9 +18,10 @@ from reports import page_of, pictures, report_of
 from chainunit.capabilities.sizing.coupling import effects
 from chainunit.capabilities.sizing.protection import CouplingEffect, spares
 from chainunit.reading.text import DEFAULT_UNITS
-from chainunit.report import load_figures, page_figures, study_motion
+from chainunit.report import figures as study_figures
+from chainunit.report import page_figures, study_motion
 from chainunit.report.figure import Between, Curve
-from chainunit.report.linkage_loads import loads_on_slides
+from chainunit.report.machine_picture import loads_on_slides
 from chainunit.report.study_motion import machine_state
 from chainunit.study import config
 from chainunit.study.readings import crank_motion, crank_torque
@@ -174,7 +175,9 @@ def test_power_over_the_turn_and_histogram(study, figures):
     panels = [panel for *_, panel in figures["load-histogram"].all_panels()]
     both = [item for panel in panels for item in panel.items if isinstance(item, Between)]
     for bars in both:
-        assert np.trapezoid(bars.high, bars.x) / np.ptp(bars.x) * load_figures._CLASSES == pytest.approx(1.0)
+        assert np.trapezoid(bars.high, bars.x) / np.ptp(
+            bars.x
+        ) * study_figures._LOAD_CLASSES == pytest.approx(1.0)
     # the motor has another torque than the crank, not the same divided by the ratio
     left, right = (bars.x / np.max(np.abs(bars.x)) for bars in both)
     assert len(left) != len(right) or np.max(np.abs(left - right)) > 0.05
@@ -182,7 +185,7 @@ def test_power_over_the_turn_and_histogram(study, figures):
 
 def test_the_histogram_of_a_sine_is_the_arcsine_distribution():
     time = np.linspace(0.0, 1.0, 40001)
-    edges, shares = load_figures.histogram(time, 7.0 * np.sin(2.0 * math.pi * time))
+    edges, shares = study_figures.histogram(time, 7.0 * np.sin(2.0 * math.pi * time))
     wanted = np.diff(np.arcsin(np.clip(edges / 7.0, -1.0, 1.0))) / math.pi
     assert shares == pytest.approx(wanted, abs=2e-4) and np.sum(shares) == pytest.approx(1.0)
 

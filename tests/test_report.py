@@ -24,7 +24,7 @@ from chainunit.report import html, print_figures, runs, terminal
 from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
-from chainunit.report.result_figures import ResultFigure
+from chainunit.report.reported_result import ResultFigure
 
 RESULT = {
     "speed": {"value": 314.159, "unit": "rad/s", "kind": "speed"},
@@ -319,7 +319,7 @@ def test_lines():
 
 
 RENDERERS = (
-    "blocks figure files html lines linkage live_block markdown motion packing".split()
+    "blocks figure files html lines linkage markdown motion".split()
     + "page_figures print_figures style terminal".split()
 )
 
@@ -469,3 +469,28 @@ def test_the_worst_overload_is_without_a_limiter_only_if_there_is_none(monkeypat
     title = runs._beside_the_worst(study, table).title
     bare = " (without torque limiter)" if coupling is None else ""
     assert title == f"Steady running beside the worst overload{bare}: rock rises"
+
+
+def test_a_table_is_cut_to_a_form_and_to_columns():
+    """Rows and columns of other forms go, and the places of groups follow the columns that stay."""
+    columns = (
+        b.Column("pin"),
+        b.Column("peak"),
+        b.Column("in", form="short"),
+        b.Column("in the run", form="long"),
+    )
+    rows = (
+        b.TableRow(("A", "1 N", "jam", "a jam on the left")),
+        b.TableRow(("B", "2 N", "stop", "a stop"), form="long"),
+    )
+    table = b.Table(rows, columns, groups=((1, 2), (3,)))
+    short, long = (table.of_form(form) for form in ("short", "long"))
+    assert [row.cells for row in short.rows] == [("A", "1 N", "jam")] and short.groups == ((1, 2), ())
+    assert [row.cells[0] for row in long.rows] == ["A", "B"] and long.groups == ((1,), (2,))
+    assert [column.title for column in long.columns] == ["pin", "peak", "in the run"]
+    assert table.of_columns([0, 3]).rows[1].cells == ("B", "a stop") and table.width == 4
+    report = b.Report("", "report", {}, (table,), (b.Section("pins", "Pins", (b.Tables((table,)),)),))
+    assert report.blocks("short") == [short]
+    assert report.blocks("long") == [long, b.Tables((long,))]
+    text = markdown(report, [])
+    assert "jam |" not in text and text.count("a stop") == 2

@@ -29,6 +29,7 @@ from chainunit.models import MODELS
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.package import export_study, start_of
+from chainunit.study.parts import example
 from chainunit.system import CoSimulation, System, fmu_component, shaft_joints, ssp
 
 pytestmark = pytest.mark.second
@@ -512,35 +513,39 @@ def test_whole_or_not_at_all(tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["x.ssp"] and file.read_text() == "before"
 
 
-def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys):
+def test_what_the_command_writes_and_refuses(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
 
     def command(*arguments):
-        monkeypatch.setattr(sys, "argv", ["chainunit", "export-ssp", *arguments])
+        monkeypatch.setattr(sys, "argv", ["chainunit", "export", *arguments])
         with pytest.raises(SystemExit) as ended:
             cli.main()
         return ended.value.code, *capsys.readouterr()
 
-    status, out, _ = command("--backend", "python")
-    assert not status and out.startswith("ChainUnitDrive.ssp: SSP 1.0, ")
+    Path("study.toml").write_text(example())
+    status, out, _ = command("study.toml", "-o", "drive.ssp", "--backend", "python")
+    assert not status and out.startswith("drive.ssp: SSP 1.0, ")
     assert out.count("\n") == 3 and "\nNot in it: the events " in out
     assert (
         "\nRocker torque of two bars: 10 % up to a crank speed of 2.03 rad/s. This study turns at 3.00 rad/s."
         in out
     )
-    before = Path("ChainUnitDrive.ssp").read_bytes()
+    before = Path("drive.ssp").read_bytes()
     Path("wrong.toml").write_text("[machine]\nr = 0.9")
     for arguments, messages in (
-        (["-o", "x.fmu"], "-o x.fmu: must be a file name that ends in .ssp"),
-        (["none.toml"], "none.toml: cannot be read"),
-        (["wrong.toml"], "wrong.toml:2: machine: r = 0.9 m: the crank cannot turn"),
-        (["--backend", "fortran"], "'fortran' is not one of"),
-        (["--backend", "python", "-o", "wrong.toml/x.ssp"], "wrong.toml: is a file; must be a folder"),
+        (["study.toml", "-o", "x.sps"], "-o x.sps: must be a file name that ends in .fmu or .ssp"),
+        (["none.toml", "-o", "x.ssp"], "none.toml: cannot be read"),
+        (["wrong.toml", "-o", "x.ssp"], "wrong.toml:2: machine: r = 0.9 m: the crank cannot turn"),
+        (["study.toml", "--backend", "fortran"], "'fortran' is not one of"),
+        (
+            ["study.toml", "--backend", "python", "-o", "wrong.toml/x.ssp"],
+            "wrong.toml: is a file; must be a folder",
+        ),
     ):
         status, out, error = command(*arguments)
         assert (status, out, error.count("\n")) == (2, "", 1) and messages in error
-    assert {p.name for p in tmp_path.iterdir()} == {"ChainUnitDrive.ssp", "wrong.toml"}
-    assert Path("ChainUnitDrive.ssp").read_bytes() == before
+    assert {p.name for p in tmp_path.iterdir()} == {"drive.ssp", "study.toml", "wrong.toml"}
+    assert Path("drive.ssp").read_bytes() == before
 
 
 @pytest.mark.parametrize(

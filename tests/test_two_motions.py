@@ -21,9 +21,8 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of, linkage_from
 from chainunit.machines.machine import Machine
 from chainunit.reading.tables import toml
-from chainunit.report.live.linkage import of_linkage
-from chainunit.study.linkage_turn import linkage_data
-from chainunit.study.linkage_turn import linkage_findings
+from chainunit.report.live.machine import of_linkage
+from chainunit.study.linkage_turn import linkage_data, linkage_findings
 
 FIVE_BAR = """
 [ground]

@@ -30,15 +30,15 @@ def catalogue(
 
     Each fault is a line with file, line, column, value and allowed range. A study file names the files by
     catalogue = [...]."""
-    from ..report import catalogue as report
-    from ..report import terminal
+    from ..report import reference, terminal
 
     if template and files:
         raise InputError("--template writes new files and checks none; leave the names of files out")
     if template:
         _write_templates(output)
     else:
-        terminal.show(report.checked(files) if files else report.columns(), terminal_console())
+        report = reference.checked_catalogues(files) if files else reference.catalogue_tables()
+        terminal.show(report, terminal_console())
 
 
 def _write_templates(folder: Path) -> None:

@@ -20,11 +20,20 @@ import typer.main
 
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
-from ..report.command_options import AllOption, BackendOption, OutputFolder, PicturesOption
-from ..report.console import carry_out, exit_status, show_slips, study_file, terminal_console
+from ..report.console import (
+    AllOption,
+    BackendOption,
+    OutputFolder,
+    PicturesOption,
+    carry_out,
+    exit_status,
+    show_slips,
+    study_file,
+    terminal_console,
+)
 from ..work import interrupts
 from .catalogue_command import catalogue
-from .export_command import ExportCommand, export, export_ssp
+from .export_command import ExportCommand, export
 
 
 class Example(StrEnum):
@@ -240,7 +249,6 @@ def _commands_of_capabilities() -> dict[str, Any]:
 
 
 app.command(cls=ExportCommand)(export)
-app.command("export-ssp", hidden=True)(export_ssp)
 app.command()(catalogue)
 
 

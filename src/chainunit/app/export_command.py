@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 import typer
 import typer.core
 
 from ..core.errors import InputError
-from ..report.command_options import BackendOption
-from ..report.console import study_file, terminal_console
+from ..core.inputs import TOML, file_text
+from ..report.console import Backend, BackendOption, study_file, terminal_console
 
 
 class VariableNames(Enum):
@@ -19,23 +19,6 @@ class VariableNames(Enum):
 
     structured = "structured"
     flat = "flat"
-
-
-NamesOption: TypeAlias = Annotated[
-    VariableNames,
-    typer.Option(
-        "--names", help="left.material_mass (structured), or left_material_mass (flat), as for Simulink."
-    ),
-]
-
-
-InputsOption: TypeAlias = Annotated[
-    bool,
-    typer.Option(
-        "--all-inputs",
-        help="Of a package: connectors for inputs without connection, too; fmpy cannot run it then.",
-    ),
-]
 
 
 class ExportCommand(typer.core.TyperCommand):
@@ -83,12 +66,24 @@ def export(
     direct: Annotated[
         bool, typer.Option("--direct", help="Of a linkage file: torque in and motion out.")
     ] = False,
-    names: NamesOption = VariableNames.structured,
-    all_inputs: InputsOption = False,
+    names: Annotated[
+        VariableNames,
+        typer.Option(
+            "--names", help="left.material_mass (structured), or left_material_mass (flat), as for Simulink."
+        ),
+    ] = VariableNames.structured,
+    all_inputs: Annotated[
+        bool,
+        typer.Option(
+            "--all-inputs",
+            help="Of a package: connectors for inputs without connection, too; fmpy cannot run it then.",
+        ),
+    ] = False,
 ) -> None:
     """Write a model as an FMU; of a study file its whole system as one FMU, or as an SSP package of FMUs."""
     from ..fmu.backends import export as write
     from ..models import linkage_named, model_named
+    from ..reading.tables import toml
 
     file = output
     linkage = linkage_named(name)
@@ -98,9 +93,11 @@ def export(
             raise InputError(
                 f"-o {file}: a package has FMUs 2.0 for this machine; leave the options of one FMU out"
             )
-        export_ssp(Path(name), file, backend, all_inputs, names)
+        _export_package(Path(name), file, backend, all_inputs, names)
         return
     if file and file.suffix != ".fmu":
+        if whole:
+            toml(file_text(Path(name), TOML))  # of two faults, that of the file that is read comes first
         of_study = " or .ssp" if whole else ""
         raise InputError(f"-o {file}: must be a file name that ends in .fmu{of_study}")
     if whole and (config or direct):
@@ -140,20 +137,12 @@ def export(
         _show_remarks(loaded)
 
 
-def export_ssp(
-    config: Annotated[
-        Path | None, typer.Argument(help="Study file (TOML); without one, the packaged example.")
-    ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="SSP file.")] = Path("ChainUnitDrive.ssp"),
-    backend: BackendOption = None,
-    all_inputs: InputsOption = False,
-    names: NamesOption = VariableNames.structured,
+def _export_package(
+    config: Path, output: Path, backend: Backend | None, all_inputs: bool, names: VariableNames
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
     from ..study.package import export_study
 
-    if output.suffix != ".ssp":
-        raise InputError(f"-o {output}: must be a file name that ends in .ssp")
     loaded = study_file(config)
     with terminal_console(stderr=True).status("exporting") as status:
         summary = export_study(

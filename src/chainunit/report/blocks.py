@@ -8,19 +8,20 @@ of the form ``screen``; if there are none, all of the short form.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from ..reading.result_entries import PARTS
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
 from .lines import Line, Number, Words
-from .live_block import Live
 from .motion import Animation
 
 Form = Literal["both", "short", "long", "sheet", "screen"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
+VERDICTS = ("good", "partly", "bad", "alarm")
+"""Severities of the judgements that are a verdict."""
 Content: TypeAlias = "Number | str"
 """The content of a given value: a number, or the text of a choice, a switch or a list."""
 
@@ -38,11 +39,10 @@ class Text:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A sentence that judges the study, or its run `run`; `items` are the entries of a list below it."""
+    """A sentence that judges the study; `items` are the entries of a list below it."""
 
     severity: Severity
     line: Line
-    run: str = ""
     items: tuple[Line, ...] = ()
     form: Form = "both"
 
@@ -115,6 +115,28 @@ class Table:
     form: Form = "both"
     central: bool = False
 
+    @property
+    def width(self) -> int:
+        """The number of columns."""
+        return len(self.columns) or max((len(row.cells) for row in self.rows), default=0)
+
+    def of_columns(self, places: Iterable[int]) -> Table:
+        """The table with its columns at these places; a group keeps those of its columns that are there."""
+        new_places = {old: new for new, old in enumerate(places)}
+        return replace(
+            self,
+            rows=tuple(replace(row, cells=tuple(row.cells[k] for k in new_places)) for row in self.rows),
+            columns=tuple(self.columns[k] for k in new_places) if self.columns else (),
+            groups=tuple(tuple(new_places[k] for k in group if k in new_places) for group in self.groups),
+        )
+
+    def of_form(self, form: Form) -> Table:
+        """The table with its rows and columns of the form `form`."""
+        table = replace(self, rows=tuple(of_form(self.rows, form)))
+        if not self.columns:
+            return table
+        return table.of_columns(k for k, column in enumerate(self.columns) if column.form in ("both", form))
+
 
 @dataclass(frozen=True)
 class Tables:
@@ -122,6 +144,10 @@ class Tables:
 
     tables: tuple[Table, ...]
     form: Form = "long"
+
+    def of_form(self, form: Form) -> Tables:
+        """The tables with their rows and columns of the form `form`."""
+        return replace(self, tables=tuple(table.of_form(form) for table in self.tables))
 
 
 @dataclass(frozen=True)
@@ -156,12 +182,49 @@ class Drawing:
     form: Form = "long"
 
 
+@dataclass(frozen=True)
+class LiveMachine:
+    """A live machine: the `data` of the page as JSON has it, and its `equations` as an expression of JavaScript
+    (`chainunit.core.printing.javascript.program`)."""
+
+    data: Mapping[str, Any]
+    equations: str
+
+
+@dataclass(frozen=True)
+class Live:
+    """A live machine: its reader changes numbers, and the page computes what follows. A terminal and Markdown have
+    none. `make` makes it; `beside` is the noun of the thing whose values the reader changes.
+
+    Raises
+    ------
+    InputError
+        by `make`, for an equation with a function that has not the same bits in each browser.
+    """
+
+    make: Callable[[], LiveMachine]
+    beside: str
+    form: ClassVar[str] = "long"
+
+    @property
+    def lead(self) -> str:
+        """The text before the machine."""
+        return (
+            "The equations of this machine run in this page. Move a slider, or type a number: the new results stand "
+            f"beside those of {self.beside}, whose value a small mark above each slider shows."
+        )
+
+
 Block: TypeAlias = "Text | Judgement | Cards | Table | Tables | Given | Drawing | Figure | Animation | Live"
 
 
-def of_form(blocks: Iterable[Block], form: Form) -> list[Block]:
-    """The blocks of the form `form` of a report."""
-    return [block for block in blocks if block.form in ("both", form)]
+def of_form(parts: Iterable[Any], form: Form) -> list[Any]:
+    """The blocks, or the rows of a table, of the form `form` of a report."""
+    return [
+        part.of_form(form) if isinstance(part, Table | Tables) else part
+        for part in parts
+        if part.form in ("both", form)
+    ]
 
 
 def _is_central(block: Block) -> bool:
@@ -207,7 +270,11 @@ class Report:
         blocks = [*self.opening, *(block for s in self.sections for block in s.blocks)]
         if not any(_is_central(block) for block in blocks):
             return self.blocks("short")
-        return [block for block in blocks if not isinstance(block, Text | Table) or _is_central(block)]
+        return [
+            block.of_form("short") if isinstance(block, Table) else block
+            for block in blocks
+            if not isinstance(block, Text | Table) or _is_central(block)
+        ]
 
     @property
     def drawings(self) -> list[Drawing]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, Self
 
+from ..mechanism.machine import MachineState
 from ..study.capability import StudyCapability
 from ..study.config import Config
 from ..study.record import StudyRecord
@@ -13,8 +14,8 @@ from ..study.registry import capabilities as registered
 from ..work.progress import TaskProgress
 from .blocks import Block
 from .lines import Line
+from .motion import Arrow
 from .reported_result import ReportedResult
-from .supplement import Supplement
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,36 @@ class AnswerBlocks:
     """beside the warnings of the study"""
     validity: Iterable[Block] = ()
     """on the sheet, at the head of basis and validity"""
+
+
+@dataclass(frozen=True)
+class Details:
+    """Additions to a run: places of further joints [m], arrows, and the load on each link."""
+
+    joints: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
+    arrows: tuple[Arrow, ...] = ()
+    loads: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Supplement:
+    """Additions to the pictures of all runs; most machines have none."""
+
+    study: StudyRecord
+    caption: Line = ()
+    links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """the joints of links that are drawn otherwise, or in addition to the links of the linkage"""
+    looks: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, str] = field(default_factory=dict)
+    """the labels of joints that differ from the names in the linkage"""
+    groups: Mapping[str, str] = field(default_factory=dict)
+    """the group of the reaction of each output; each group has a colour"""
+    hidden: tuple[str, ...] = ()
+    """outputs whose reactions are not drawn, as they would hide others"""
+
+    def details(self, part: Any, state: MachineState) -> Details:
+        """The additions to a run; `part` has the samples of the run that are drawn, `state` the machine at these."""
+        return Details()
 
 
 class AnyStudy(Protocol):

@@ -1,4 +1,5 @@
-"""What commands show on the terminal: the report, the written files, and the progress of long work."""
+"""What commands share: options, and what they show on the terminal: the report, the written files, and the progress
+of long work."""
 
 from __future__ import annotations
 
@@ -6,9 +7,10 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -20,6 +22,26 @@ from ..work import interrupts
 if TYPE_CHECKING:
     from ..reading.tables import UnusualValue
     from .task import Outcome, Question, Task
+
+
+class Backend(StrEnum):
+    """How an FMU computes."""
+
+    native = "native"
+    python = "python"
+
+
+BackendOption = Annotated[
+    Backend | None,
+    typer.Option("--backend", help="FMUs in native code or in Python; native where a C compiler is found."),
+]
+PicturesOption = Annotated[
+    bool, typer.Option("--png", help="Also write the figures of the page as PNG files.")
+]
+AllOption = Annotated[
+    bool, typer.Option("--all", help="Print all tables, warnings and notes, in place of one screen.")
+]
+OutputFolder = Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")]
 
 
 def terminal_console(**options: Any) -> Console:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 from xml.sax.saxutils import escape
 
@@ -31,9 +31,12 @@ _LETTER, _LINE = 7.2, 15.0
 """Width of a letter and height of a line of text [px]."""
 _DISC = 60.0
 """Radius of a driver that has one point [px]."""
+_DASHED = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
+_DIMENSION: dict[str, Any] = {"fill": "#c1440e", "font_style": "italic"}
 _LOOKS = {"crank": ("#c1440e", 7), "heavy": ("#3d3d3d", 7), "light": ("#0b6fa4", 5)}
 
 Point = tuple[float, float]
+Side = tuple[Point, Point]
 
 
 @dataclass(frozen=True)
@@ -53,45 +56,48 @@ class _Canvas:
     label_boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
 
     def add(self, tag: str, text: str = "", **attributes: Any) -> None:
-        attribute_text = "".join(
-            f' {name.replace("_", "-")}="{_svg_value(x)}"' for name, x in attributes.items()
+        """Add an element. An underscore in the name of an attribute stands for a hyphen."""
+        attribute_texts = (
+            f' {name.replace("_", "-")}="{f"{x:.2f}" if isinstance(x, float) else x}"'
+            for name, x in attributes.items()
         )
         self.pieces.append(
-            f"<{tag}{attribute_text}>{escape(text)}</{tag}>" if text else f"<{tag}{attribute_text}/>"
+            f"<{tag}{''.join(attribute_texts)}" + (f">{escape(text)}</{tag}>" if text else "/>")
         )
+
+    def line(self, begin: Point, end: Point, **look: Any) -> None:
+        """Add a line."""
+        self.add("line", x1=begin[0], y1=begin[1], x2=end[0], y2=end[1], **look)
+
+    def outline(self, tag: str, points: Iterable[Point], **look: Any) -> None:
+        """Add a polyline or a polygon."""
+        self.add(tag, points=" ".join(f"{x:.2f},{y:.2f}" for x, y in points), **look)
 
     def label(
         self,
         text: str,
         places: list[Point],
-        lines: list[tuple[Point, Point]],
-        own_lines: Collection[tuple[Point, Point]] = (),
+        lines: list[Side] | None = None,
+        own_lines: Collection[Side] = (),
         **look: Any,
     ) -> None:
-        """Draw a label. `places` are the candidates for its middle; it gets the first one that is clear of other
-        labels and of the `lines`, before others one that is nearest to its `own_lines`."""
+        """Add a label. `places` are the candidates for its middle: it gets the first one that is clear of other
+        labels and of the `lines`, before others one that is nearest to its `own_lines`, else the one with most
+        room."""
         boxes = [_box(text, place) for place in places]
-        nearest, nearest_own = _from_lines(boxes, lines), _from_lines(boxes, own_lines)
+        nearest, nearest_own = _from_lines(boxes, lines or ()), _from_lines(boxes, own_lines)
         clear = [
             min(
-                *[_gap(box, other) for other in self.label_boxes],
-                from_lines,
-                box[0] - 4.0,
-                WIDTH + COLUMN - box[2],
+                *(_gap(box, other) for other in self.label_boxes), room, box[0] - 4.0, WIDTH + COLUMN - box[2]
             )
-            for box, from_lines in zip(boxes, nearest, strict=True)
+            for box, room in zip(boxes, nearest, strict=True)
         ]
         free = [k for k, room in enumerate(clear) if room >= 3.0]
         beside = (k for k in free if own_lines and nearest_own[k] <= nearest[k])
-        # the first of the places that has room enough, else the one with most
         best = next(beside, free[0] if free else int(np.argmax(clear)))
         self.label_boxes.append(boxes[best])
         x, y = places[best]
         self.add("text", text, x=x, y=y + 4.5, text_anchor="middle", **look)
-
-
-def _svg_value(value: Any) -> str:
-    return f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
 def _box(text: str, middle: Point) -> tuple[float, float, float, float]:
@@ -104,7 +110,7 @@ def _gap(box: tuple[float, ...], other: tuple[float, ...]) -> float:
     return max(box[0] - other[2], other[0] - box[2], box[1] - other[3], other[1] - box[3])
 
 
-def _from_lines(boxes: Sequence[tuple[float, ...]], lines: Collection[tuple[Point, Point]]) -> list[float]:
+def _from_lines(boxes: Sequence[tuple[float, ...]], lines: Collection[Side]) -> list[float]:
     """The distance of the nearest line from each box, from 25 points of each line [px]; infinite without lines."""
     if not lines:
         return [math.inf] * len(boxes)
@@ -152,85 +158,96 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     """
     low, high = machine.model.span
     phi = low + (high - low) / (2.0 * math.pi) if phi is None else phi
-    whole = machine.state(machine.inputs({"phi": phi * machine.ratio})).m
-    turns = np.linspace(low, high, 73)
-    orbit = machine.state(machine.inputs({"phi": turns * machine.ratio})).m
-    places = {name: (float(x), float(y)) for name, (x, y) in linkage.places(whole).items()}
-    crank, canvas = whole.linkage.driver, _Canvas()
-    ways = linkage.rails(orbit)
-    ends = [end for way in ways.values() for end in way]
-    circles = [
-        (places[centre], math.dist(places[centre], places[rim])) for centre, rim in whole.linkage.circles
-    ]
-    rims = [(x + side * r, y + side * r) for (x, y), r in circles for side in (-1.0, 1.0)]
-    to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end]), *ends, *rims])
-    page_points = {name: to_page(place) for name, place in places.items()}
-    links = [_straightened(link, page_points) for link in linkage.links(whole.linkage, {})]
-    sizes = dimensions(machine)
+    whole = machine.drive(phi * machine.ratio)
+    orbit = machine.drive(np.linspace(low, high, 73) * machine.ratio)
+    crank, canvas, rails = whole.linkage.driver, _Canvas(), linkage.rails(orbit).values()
+    course = [*_curve(linkage.places(orbit)[crank.end])]
+    to_page = _scale(
+        [*_positions(whole).values(), *course, *(end for rail in rails for end in rail), *_rims(whole)]
+    )
+    page_points = {name: to_page(place) for name, place in _positions(whole).items()}
+    links = [_straightened(link, page_points) for link in linkage.links(whole.linkage)]
     canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
-    for way in ways.values():
-        _rail(canvas, *map(to_page, way))
-    dashed = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
-    for (x, y), rim in ((page_points[centre], page_points[rim]) for centre, rim in whole.linkage.circles):
-        canvas.add("circle", cx=x, cy=y, r=math.dist((x, y), rim), **dashed)
+    for rail in rails:
+        _rail(canvas, *map(to_page, rail))
+    for centre, rim in whole.linkage.circles:
+        _circle(canvas, page_points[centre], math.dist(page_points[centre], page_points[rim]))
     if isinstance(crank, Crank):
-        # the circle of the crank pin, or its arc
+        bearing = page_points[crank.bar.pin]
         # a link with its bearing alone, such as a drum or a fan, is a disc of any size
-        radius = math.dist(page_points[crank.bar.pin], page_points[crank.end]) or _DISC
-        x, y = page_points[crank.bar.pin]
+        radius = math.dist(bearing, page_points[crank.end]) or _DISC
         if machine.model.turns:
-            canvas.add("circle", cx=x, cy=y, r=radius, **dashed)
+            _circle(canvas, bearing, radius)
         else:
-            arc = map(to_page, _curve(linkage.places(orbit)[crank.end]))
-            canvas.add("polyline", points=" ".join(f"{x:.2f},{y:.2f}" for x, y in arc), **dashed)
+            canvas.outline("polyline", map(to_page, course), **_DASHED)
     hanging = linkage.hanging(orbit)
     for pin in linkage.supports(whole.linkage):
         _support(canvas, page_points[pin], -1.0 if pin in hanging else 1.0)
-    lines = [(page_points[a], page_points[b]) for link in links for a, b in _sides(link)]
     for link in links:
         colour, weight = _LOOKS[link.look]
-        tag, more = ("polygon", {"fill": "#dfe8ee"}) if link.closed else ("polyline", {"fill": "none"})
-        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in (page_points[joint] for joint in link.joints))
-        canvas.add(tag, points=points, stroke=colour, stroke_width=weight, stroke_linejoin="round",
-                   stroke_linecap="round", **more)  # fmt: skip
-    for name, place in page_points.items():
+        tag, fill = ("polygon", {"fill": "#dfe8ee"}) if link.closed else ("polyline", {"fill": "none"})
+        look = {
+            "stroke": colour,
+            "stroke_width": weight,
+            "stroke_linejoin": "round",
+            "stroke_linecap": "round",
+        }
+        canvas.outline(tag, (page_points[joint] for joint in link.joints), **look, **fill)
+    for name, (x, y) in page_points.items():
         if any(name in link.joints for link in links):
-            canvas.add(
-                "circle", cx=place[0], cy=place[1], r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2
-            )
-            canvas.label_boxes.append((place[0] - 6, place[1] - 6, place[0] + 6, place[1] + 6))
+            canvas.add("circle", cx=x, cy=y, r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2)
+            canvas.label_boxes.append((x - 6, y - 6, x + 6, y + 6))
     for (pin, _), slide in whole.slides.items():
         _block(canvas, page_points[pin], math.atan2(-slide.d.y, slide.d.x))
     if isinstance(crank, Crank):
-        _angle(
-            canvas,
-            page_points[crank.bar.pin],
-            phi,
-            radius,
-            math.atan2(crank.start.y, crank.start.x),
-            crank.sense,
-        )
+        _angle(canvas, bearing, phi, radius, math.atan2(crank.start.y, crank.start.x), crank.sense)
     drawn_links = {link.name: link for link in links}
     for symbol, link_name in machine.model.angles.items():
         _swing(canvas, page_points, drawn_links[link_name], symbol)
+    sizes = dimensions(machine)
+    lines = [side for link in links for side in _sides(link, page_points)]
     lines += _sizes(canvas, sizes, page_points, to_page((0.0, 0.0)), whole, hanging)
-    for name, place in page_points.items():
-        if "." in name:  # another name stands at the same place
-            continue
-        around = [
-            (place[0] + 19 * math.cos(t), place[1] + 17 * math.sin(t)) for t in np.arange(-0.8, 5.5, 0.4)
-        ]
-        canvas.label(_short(name), around, lines, font_weight="bold", fill="#1b1b1b")
-    for link in links:
-        if len(link.joints) < 2:
-            continue
-        size = sizes.get(("link", link.name))
-        text = f"{_short(link.name)} {size.name}" if size else _short(link.name)
-        sides = [(page_points[a], page_points[b]) for a, b in _sides(link)]
-        canvas.label(text, _beside(link, page_points), lines, sides, fill=_LOOKS[link.look][0])
+    _names(canvas, links, sizes, page_points, lines)
     _frame(canvas)
     _column(canvas, sizes, whole.linkage.ground)
     return _svg(canvas, f"{machine.model.noun}: pins, links and dimensions")
+
+
+def _positions(whole: Mechanism) -> dict[str, Point]:
+    """The places of pins and points [m]."""
+    return {name: (float(x), float(y)) for name, (x, y) in linkage.places(whole).items()}
+
+
+def _rims(whole: Mechanism) -> Iterator[Point]:
+    """Two corners of the square around each circle [m]."""
+    positions = _positions(whole)
+    for centre, rim in whole.linkage.circles:
+        (x, y), r = positions[centre], math.dist(positions[centre], positions[rim])
+        yield from ((x - r, y - r), (x + r, y + r))
+
+
+def _circle(canvas: _Canvas, centre: Point, radius: float) -> None:
+    canvas.add("circle", cx=centre[0], cy=centre[1], r=radius, **_DASHED)
+
+
+def _names(
+    canvas: _Canvas,
+    links: list[DrawnLink],
+    sizes: Mapping[tuple[str, ...], Dimension],
+    page_points: Mapping[str, Point],
+    lines: list[Side],
+) -> None:
+    """Write the names of pins around them, and those of links, with the symbol of their length, beside them."""
+    for name, (x, y) in page_points.items():
+        if "." not in name:  # else another name stands at the same place
+            around = [(x + 19 * math.cos(t), y + 17 * math.sin(t)) for t in np.arange(-0.8, 5.5, 0.4)]
+            canvas.label(_short(name), around, lines, font_weight="bold", fill="#1b1b1b")
+    for link in links:
+        if len(link.joints) > 1:
+            size = sizes.get(("link", link.name))
+            text = f"{_short(link.name)} {size.name}" if size else _short(link.name)
+            sides = [*_sides(link, page_points)]
+            canvas.label(text, [*_beside(link, page_points)], lines, sides, fill=_LOOKS[link.look][0])
 
 
 def _short(name: str) -> str:
@@ -252,33 +269,33 @@ def _scale(points: list[Point]) -> Any:
     return lambda p: (left + factor * (p[0] - min(xs)), top + factor * (max(ys) - p[1]))
 
 
-def _sides(link: DrawnLink) -> Iterator[tuple[str, str]]:
-    joints = [*link.joints, link.joints[0]] if link.closed else [*link.joints]
-    yield from pairwise(joints)
+def _sides(link: DrawnLink, page_points: Mapping[str, Point]) -> Iterator[Side]:
+    """The lines between neighbouring joints of a link."""
+    joints = (*link.joints, link.joints[0]) if link.closed else link.joints
+    yield from pairwise(page_points[joint] for joint in joints)
 
 
-def _beside(link: DrawnLink, page_points: Mapping[str, Point]) -> list[Point]:
-    """Candidate places for the name of a link: first its middle, in it or beside it, then beside its sides."""
-    places = []
+def _beside(link: DrawnLink, page_points: Mapping[str, Point]) -> Iterator[Point]:
+    """Candidate places for the name of a link: the middle of an area, and then places beside the sides, first near
+    their middles and close to them."""
     if link.closed:
-        corners = [page_points[joint] for joint in link.joints]
-        places = [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
-    for t in (0.5, 0.4, 0.6, 0.3, 0.7):
-        for away in (18.0, 26.0, 40.0):
-            for a, b in _sides(link):
-                (x0, y0), (x1, y1) = page_points[a], page_points[b]
-                length = math.hypot(x1 - x0, y1 - y0)
-                # a block has no length, and stands free in any direction
-                turns = (0.5, 0.0, 0.25, 0.75) if length < 1.0 else ()
-                ways = [(math.cos(math.pi * x), math.sin(math.pi * x)) for x in turns] or [
-                    ((y0 - y1) / length, (x1 - x0) / length)
-                ]
-                x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
-                for across in ways:
-                    # a name is wide: beside an upright link it stands further off
-                    off = away * (1.0 + 1.3 * abs(across[0]))
-                    places += [(x + s * off * across[0], y + s * off * across[1]) for s in (1.0, -1.0)]
-    return places
+        x, y = zip(*(page_points[joint] for joint in link.joints), strict=True)
+        yield sum(x) / len(x), sum(y) / len(y)
+    sides = [*_sides(link, page_points)]
+    for share, distance, ((x0, y0), (x1, y1)) in product(
+        (0.5, 0.4, 0.6, 0.3, 0.7), (18.0, 26.0, 40.0), sides
+    ):
+        length = math.hypot(x1 - x0, y1 - y0)
+        normals = [((y0 - y1) / length, (x1 - x0) / length)] if length >= 1.0 else _ALL_ROUND
+        x_side, y_side = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+        for normal in normals:
+            # a name is wide: beside an upright link it stands further off
+            off = distance * (1.0 + 1.3 * abs(normal[0]))
+            yield from ((x_side + s * off * normal[0], y_side + s * off * normal[1]) for s in (1.0, -1.0))
+
+
+_ALL_ROUND = [(math.cos(math.pi * x), math.sin(math.pi * x)) for x in (0.5, 0.0, 0.25, 0.75)]
+"""Normals beside a block, which has no length, and stands free in any direction."""
 
 
 def _support(canvas: _Canvas, point: Point, down: float) -> None:
@@ -286,11 +303,10 @@ def _support(canvas: _Canvas, point: Point, down: float) -> None:
     x, y = point
     canvas.add("polygon", points=f"{x:.2f},{y:.2f} {x - 11:.1f},{y + 17 * down:.1f} {x + 11:.1f},{y + 17 * down:.1f}",
                fill="#ffffff", stroke="#777777", stroke_width=1.5)  # fmt: skip
+    foot = y + 17 * down
     for k in range(-14, 14, 6):
-        canvas.add("line", x1=x + k + 5, y1=y + 17 * down, x2=x + k, y2=y + 23 * down, stroke="#777777")
-    canvas.add(
-        "line", x1=x - 15, y1=y + 17 * down, x2=x + 15, y2=y + 17 * down, stroke="#777777", stroke_width=1.5
-    )
+        canvas.line((x + k + 5, foot), (x + k, y + 23 * down), stroke="#777777")
+    canvas.line((x - 15, foot), (x + 15, foot), stroke="#777777", stroke_width=1.5)
     canvas.label_boxes.append((x - 15, min(y, y + 23 * down), x + 15, max(y, y + 23 * down)))
 
 
@@ -302,14 +318,14 @@ def _angle(canvas: _Canvas, centre: Point, phi: float, radius: float, zero: floa
         return centre[0] + r * math.cos(zero + sense * angle), centre[1] - r * math.sin(zero + sense * angle)
 
     r = min(radius + 14.0, 70.0)
-    (x0, y0), (x1, y1), (x2, y2) = on_arc(0.0, r), on_arc(phi, r), on_arc(0.0, r + 8.0)
-    canvas.add("line", x1=centre[0], y1=centre[1], x2=x2, y2=y2, stroke="#999999", stroke_dasharray="2 3")
+    (x0, y0), (x1, y1) = on_arc(0.0, r), on_arc(phi, r)
+    canvas.line(centre, on_arc(0.0, r + 8.0), stroke="#999999", stroke_dasharray="2 3")
     canvas.add("path", d=f"M {x0:.1f} {y0:.1f} A {r:.1f} {r:.1f} 0 0 {int(sense < 0.0)} {x1:.1f} {y1:.1f}",
                fill="none", stroke="#c1440e", stroke_width=1.5, marker_end="url(#drawing-tip)")  # fmt: skip
     for k in range(4):
         x, y = on_arc(phi * k / 3.0, r)
         canvas.label_boxes.append((x - 5, y - 5, x + 5, y + 5))
-    canvas.label("φ", [on_arc(0.5 * phi, r + 12.0)], [], fill="#c1440e", font_style="italic")
+    canvas.label("φ", [on_arc(0.5 * phi, r + 12.0)], **_DIMENSION)
 
 
 def _rail(canvas: _Canvas, a: Point, b: Point) -> None:
@@ -318,14 +334,13 @@ def _rail(canvas: _Canvas, a: Point, b: Point) -> None:
     along = ((b[0] - a[0]) / length, (b[1] - a[1]) / length)
     across = (-along[1], along[0])
     for side in (9.0, -9.0):
-        ends = [(p[0] + side * across[0], p[1] + side * across[1]) for p in (a, b)]
-        (x1, y1), (x2, y2) = ends
-        canvas.add("line", x1=x1, y1=y1, x2=x2, y2=y2, stroke="#777777", stroke_width=1.5)
+        begin, end = ((p[0] + side * across[0], p[1] + side * across[1]) for p in (a, b))
+        canvas.line(begin, end, stroke="#777777", stroke_width=1.5)
+        out = math.copysign(6.0, side)
         for k in range(6, int(length), 10):
-            x, y = x1 + k * along[0], y1 + k * along[1]
-            out = math.copysign(6.0, side)
-            canvas.add("line", x1=x, y1=y, x2=x + out * across[0] - 5 * along[0],
-                       y2=y + out * across[1] - 5 * along[1], stroke="#777777")  # fmt: skip
+            x, y = begin[0] + k * along[0], begin[1] + k * along[1]
+            tip = x + out * across[0] - 5 * along[0], y + out * across[1] - 5 * along[1]
+            canvas.line((x, y), tip, stroke="#777777")
 
 
 def _block(canvas: _Canvas, centre: Point, angle: float) -> None:
@@ -335,9 +350,8 @@ def _block(canvas: _Canvas, centre: Point, angle: float) -> None:
         (centre[0] + c * x - s * y, centre[1] + s * x + c * y)
         for x, y in ((-13, -7), (13, -7), (13, 7), (-13, 7))
     ]
-    points = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
-    canvas.add("polygon", points=points, fill="none", stroke="#1b1b1b", stroke_width=1.5)
-    xs, ys = [x for x, _ in corners], [y for _, y in corners]
+    canvas.outline("polygon", corners, fill="none", stroke="#1b1b1b", stroke_width=1.5)
+    xs, ys = zip(*corners, strict=True)
     canvas.label_boxes.append((min(xs), min(ys), max(xs), max(ys)))
 
 
@@ -345,9 +359,7 @@ def _frame(canvas: _Canvas) -> None:
     """Draw the axes of the frame in a corner of the picture."""
     x, y = 26.0, HEIGHT - 26.0
     for dx, dy, name in ((34.0, 0.0, "x"), (0.0, -34.0, "y")):
-        canvas.add(
-            "line", x1=x, y1=y, x2=x + dx, y2=y + dy, stroke="#555555", marker_end="url(#drawing-axis)"
-        )
+        canvas.line((x, y), (x + dx, y + dy), stroke="#555555", marker_end="url(#drawing-axis)")
         canvas.add("text", name, x=x + 1.35 * dx, y=y + 1.35 * dy + 4, fill="#555555", text_anchor="middle")
 
 
@@ -370,13 +382,13 @@ def _swing(canvas: _Canvas, page_points: Mapping[str, Point], link: DrawnLink, n
     end = page_points[link.joints[-1]]
     r = 0.45 * math.dist((x, y), end)
     angle = math.atan2(end[0] - x, end[1] - y)
-    canvas.add("line", x1=x, y1=y, x2=x, y2=y + r + 14, stroke="#999999", stroke_dasharray="2 3")
+    canvas.line((x, y), (x, y + r + 14), stroke="#999999", stroke_dasharray="2 3")
     tip = (x + r * math.sin(angle), y + r * math.cos(angle))
     clockwise = 0 if angle > 0 else 1
     canvas.add("path", d=f"M {x:.1f} {y + r:.1f} A {r:.1f} {r:.1f} 0 0 {clockwise} {tip[0]:.1f} {tip[1]:.1f}",
                fill="none", stroke="#c1440e", stroke_width=1.5)  # fmt: skip
     side = -1.0 if angle > 0 else 1.0
-    canvas.label(name, [(x + 10 * side, y + r)], [], fill="#c1440e", font_style="italic")
+    canvas.label(name, [(x + 10 * side, y + r)], **_DIMENSION)
 
 
 def _sizes(
@@ -386,10 +398,10 @@ def _sizes(
     origin: Point,
     whole: Mechanism,
     hanging: Collection[str],
-) -> list[tuple[Point, Point]]:
+) -> list[Side]:
     """Draw the dimensions that are not the length of a link: places of ground pins from the origin of the frame, and
     places of points along a link. Returns their lines."""
-    lines: list[tuple[Point, Point]] = []
+    lines: list[Side] = []
     for (kind, *names), size in sizes.items():
         if "." in size.name or kind == "link" or names[-1] not in page_points:
             continue
@@ -413,13 +425,13 @@ def _sizes(
 
 def _line(canvas: _Canvas, a: Point, b: Point, name: str) -> None:
     """Draw a dimension: a thin line with an arrow at each end, and its symbol."""
-    canvas.add("line", x1=a[0], y1=a[1], x2=b[0], y2=b[1], stroke="#777777", stroke_width=0.9,
-               marker_start="url(#drawing-begin)", marker_end="url(#drawing-end)")  # fmt: skip
+    arrows = {"marker_start": "url(#drawing-begin)", "marker_end": "url(#drawing-end)"}
+    canvas.line(a, b, stroke="#777777", stroke_width=0.9, **arrows)
     length = math.dist(a, b) or 1.0
     across = ((b[1] - a[1]) / length * 10.0, (a[0] - b[0]) / length * 10.0)
     middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
     places = [(middle[0] + sign * across[0], middle[1] + sign * across[1]) for sign in (1.0, -1.0)]
-    canvas.label(name, places, [], fill="#555555", font_style="italic")
+    canvas.label(name, places, fill="#555555", font_style="italic")
 
 
 def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground: Mapping[str, Any]) -> None:

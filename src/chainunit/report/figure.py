@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias
 
@@ -166,6 +166,26 @@ class Figure:
     on_page: bool = True
     form: ClassVar[str] = "long"
 
+    @property
+    def row_heights(self) -> tuple[float, ...]:
+        """The height of each row over the usual one."""
+        return self.heights or (1.0,) * len(self.panels)
+
+    @property
+    def column_widths(self) -> tuple[float, ...]:
+        """The width of each column over that of the others."""
+        return self.widths or (1.0,) * len(self.panels[0])
+
+    @property
+    def has_titles(self) -> bool:
+        """Whether a panel has a title."""
+        return any(panel.title for _, _, panel in self.all_panels())
+
+    @property
+    def has_names(self) -> bool:
+        """Whether an upright axis has names in place of numbers."""
+        return any(panel.y.names for _, _, panel in self.all_panels())
+
     def sharing(self, row: int, column: int) -> list[int]:
         """The unbroken rows around `row` in which the panel of this column has the same x axis as that of `row`."""
         panels = [panel_row[column] for panel_row in self.panels]
@@ -239,38 +259,31 @@ def hatch_lines(hatch: Hatch) -> tuple[Any, Any]:
 def in_units(figure: Figure, units: Units) -> Figure:
     """The figure with all values in the units in which they are shown; the labels of its axes name these units. An
     axis has one unit, that of its largest value."""
-    cache: dict[tuple[int, float, float], Any] = {}
     sizes = _sizes(figure)
+    shown_arrays: dict[tuple[int, float, float], tuple[Any, Any]] = {}
 
-    def values(axis: Axis, x: Any, size: float) -> Any:
-        """Values on an axis. The same array gives the same array again, so that curves over one x still share it."""
-        _, factor, offset = scales_of_size(size, axis.unit, axis.kind, units)[0]
-        key = (id(x), factor, offset)
-        if key not in cache:
-            result = factor * np.asarray(x, float) + offset
-            # the cache keeps x alive, so that no other object gets its identity
-            cache[key] = float(result) if result.ndim == 0 else result, x
-        return cache[key][0]
+    def shown(x: Any, factor: float, offset: float) -> Any:
+        """Values as shown. The same array gives the same array again, so that curves over one x still share it."""
+        # with the result stays x, so that no other object gets its identity
+        result, _ = shown_arrays.setdefault(
+            (id(x), factor, offset), (factor * np.asarray(x, float) + offset, x)
+        )
+        return float(result) if result.ndim == 0 else result
 
     def panel(original: Panel, row: int) -> Panel:
         axes = {"x": original.x, "y": original.y}
-        size = {on: sizes[_shared(figure, on, axis, row)] for on, axis in axes.items()}
+        scales = {
+            on: scales_of_size(sizes[_shared(figure, on, axis, row)], axis.unit, axis.kind, units)
+            for on, axis in axes.items()
+        }
         items = (
             replace(
                 item,
-                **{name: values(axes[on], getattr(item, name), size[on]) for name, on in along(item).items()},
+                **{name: shown(getattr(item, name), *scales[on][0][1:]) for name, on in along(item).items()},
             )
             for item in original.items
         )
-        ends = {
-            on: replace(
-                axis,
-                low=axis.low and values(axis, axis.low, size[on]),
-                high=axis.high and values(axis, axis.high, size[on]),
-            )
-            for on, axis in axes.items()
-        }
-        x, y = (_with_unit(axis, units, size[on]) for on, axis in ends.items())
+        x, y = (_with_unit(axis, scales[on]) for on, axis in axes.items())
         return replace(original, x=x, y=y, items=tuple(items))
 
     rows = enumerate(figure.panels)
@@ -300,11 +313,17 @@ def _sizes(figure: Figure) -> dict[tuple[Any, ...], float]:
     return sizes
 
 
-def _with_unit(axis: Axis, units: Units, size: float) -> Axis:
-    """The axis with its unit in its label."""
+def _with_unit(axis: Axis, scales: Sequence[tuple[str, float, float]]) -> Axis:
+    """The axis with its ends in the unit that is shown, the first of the `scales`, and with the unit in its label."""
     if axis.names:
         return axis
-    (unit, factor, _), *others = scales_of_size(size, axis.unit, axis.kind, units)
+    (unit, factor, offset), *others = scales
     word = plain(unit_text(unit))
-    second = (f"{axis.label} [{others[0][0]}]", others[0][1] / factor) if others else None
-    return replace(axis, label=f"{axis.label} [{word or '1'}]", unit=word, second=second)
+    return replace(
+        axis,
+        label=f"{axis.label} [{word or '1'}]",
+        unit=word,
+        low=axis.low and factor * axis.low + offset,
+        high=axis.high and factor * axis.high + offset,
+        second=(f"{axis.label} [{others[0][0]}]", others[0][1] / factor) if others else None,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,22 +16,28 @@ from ..reading.text import number as number_words
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
-from ..study.readings import crank_speed, crank_torque, has_turn
+from ..study.readings import crank_motion, crank_speed, crank_torque, shaft_power
 from ..study.record import StudyRecord
 from ..study.result import assumed_ranges
+from ..study.window import mean
 from . import figure as fig
-from . import linkage_loads, load_figures, run_names
+from . import machine_picture, run_names
+from .analyses import angle_axis, last_turn
 from .cited import cited, number
 from .given_numbers import asked_speed
 from .lines import Line, capital, filled, join, line
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
 from .study_motion import machine_state
-from .turn import angle_axis
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 PICTURES = Pictures()
 _MOTION = ("phi", "w", "a")
 _CURRENT = fig.Axis("motor current", "A")
+_LOAD_CLASSES = 40
+"""Classes of the histogram of the load."""
 
 
 @PICTURES.declare(
@@ -39,46 +45,46 @@ _CURRENT = fig.Axis("motor current", "A")
 )
 def _torque_speed(study: StudyRecord) -> fig.Figure:
     """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
-    names, panels = run_names.motor_runs(study), []
+    names = run_names.motor_runs(study)
     # an event that is a start of its own would squeeze the loops of the others
     starts = [name for name in names if run_names.event_time(study, name) is None]
     overloads = run_names.groups(study, [name for name in names if name not in starts])
-    for group in [starts, *overloads]:
-        # an overload is drawn from its event on: before, it is the steady running of the first panel
-        runs = {
-            name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in group
-        }
-        curves = [
-            fig.Curve(
-                run_names.title(study, name),
-                run["motor.w"].values,
-                run["motor.air_gap_tau"].values,
-                names.index(name),
-            )
-            for name, run in runs.items()
-        ]
-        slowest, fastest = (
-            float(extreme([extreme(curve.x) for curve in curves])) for extreme in (np.min, np.max)
-        )
-        room = 0.15 * (fastest - slowest)
-        low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
-        w = np.linspace(low, fastest + room, 301)
-        most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
-        # beyond the synchronous speed the limit falls far below the torques of all runs
-        most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
-        x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
-        limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
-        items = (*curves, limit, *_duty(study))
-        panels.append(fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group)))
     return fig.Figure(
         "torque-speed",
         "Torque-speed plane: the start, and the overloads from their event on",
         "Air-gap torque of the motor over its speed, a line for each run, with the largest torque that the drive "
         "gives in steady running.",
-        (tuple(panels),),
+        (tuple(_torque_speed_panel(study, group, names) for group in (starts, *overloads)),),
         "Steady running is a closed loop. Grey: the largest torque that the drive gives in steady running.",
         heights=(1.6,),
     )
+
+
+def _torque_speed_panel(study: StudyRecord, group: list[str], names: list[str]) -> fig.Panel:
+    """The panel of a group of runs; a run has the look of its place among all `names`."""
+    # an overload is drawn from its event on: before, it is the steady running of the first panel
+    runs = {name: run_names.from_event(study, name) for name in group}
+    curves = [
+        fig.Curve(
+            run_names.title(study, name),
+            run["motor.w"].values,
+            run["motor.air_gap_tau"].values,
+            names.index(name),
+        )
+        for name, run in runs.items()
+    ]
+    speeds = np.concatenate([curve.x for curve in curves])
+    slowest, fastest = float(np.min(speeds)), float(np.max(speeds))
+    room = 0.15 * (fastest - slowest)
+    low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
+    w = np.linspace(low, fastest + room, 301)
+    most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
+    # beyond the synchronous speed the limit falls far below the torques of all runs
+    most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
+    x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
+    limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
+    items = (*curves, limit, *_duty(study))
+    return fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group))
 
 
 def _duty(study: StudyRecord) -> Iterator[fig.Item]:
@@ -127,30 +133,83 @@ def _turn(study: StudyRecord) -> fig.Figure:
     )
 
 
-def _is_steady(study: StudyRecord) -> bool:
-    return "steady" in study.answers and has_turn(study.drive, study.steady)
-
-
-@PICTURES.declare(_is_steady, "power_turn.png")
+@PICTURES.declare(run_names.has_steady_turns, "power_turn.png")
 def _power(study: StudyRecord) -> fig.Figure:
-    return load_figures.power_over_turn(study.drive, study.steady, angle_axis(study))
+    """The power at crank and motor over the last turn of steady running."""
+    drive, steady, driver = study.drive, study.steady, study.driver_noun
+    phi, speed = crank_motion(drive, steady)
+    powers = {driver: crank_torque(drive, steady) * speed, "shaft of the motor": shaft_power(drive, steady)}
+    if "motor.supply_power" in steady:
+        powers["supply of the motor"] = steady["motor.supply_power"].values
+    curves = [
+        fig.Curve(name, *last_turn(phi, power), look) for look, (name, power) in enumerate(powers.items())
+    ]
+    return fig.Figure(
+        "power-turn",
+        "Power over a turn in steady running",
+        f"The power at {', '.join(powers)} over the {driver} angle in the last turn of steady running.",
+        (
+            (
+                fig.Panel(
+                    angle_axis(study), fig.Axis("power", "W"), (*curves, fig.Mark(0.0, axis="y", look="thin"))
+                ),
+            ),
+        ),
+        "Below zero the machine gives power back.",
+    )
 
 
-@PICTURES.declare(_is_steady, "load_histogram.png")
-def _histogram(study: StudyRecord) -> fig.Figure:
-    return load_figures.load_histogram(study.drive, study.steady)
+@PICTURES.declare(run_names.has_steady_turns, "load_histogram.png")
+def _load_histogram(study: StudyRecord) -> fig.Figure:
+    """The share of the time in which the torque lies in each class: at the crank and, where it is known, in the air
+    gap of the motor, which the inertia of its rotor and a flywheel make smoother."""
+    steady, driver = study.steady, study.driver_noun
+    torques = {f"{driver} torque": crank_torque(study.drive, steady)}
+    if "motor.air_gap_tau" in steady:
+        torques["air-gap torque of the motor"] = steady["motor.air_gap_tau"].values
+    panels = []
+    for name, torque in torques.items():
+        edges, shares = histogram(steady["time"].values, torque)
+        values = tuple(_averages(steady, torque))
+        bars = fig.Between(
+            "", np.repeat(edges, 2)[1:-1], np.zeros(2 * len(shares)), np.repeat(shares, 2), "band"
+        )
+        y = fig.Axis("share of the time", "1", "percent", low=0.0, high=1.08 * float(np.max(shares)))
+        panels.append(fig.Panel(fig.Axis(name, "N.m"), y, (bars, *values)))
+    return fig.Figure(
+        "load-histogram",
+        "Histogram of the load in steady running",
+        f"The share of the time in which the {' and the '.join(torques)} lies in each class.",
+        (tuple(panels),),
+        f"Classes of equal width, over whole turns of the {driver}. Between the {driver} and the air gap, rotor and "
+        "flywheel store energy.",
+    )
+
+
+def histogram(time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The edges of the classes [N m], shape (classes + 1,), and the share of the time in each; between two instants
+    the torque counts as their mean."""
+    middle, spans = 0.5 * (torque[1:] + torque[:-1]), np.diff(time)
+    low, high = float(np.min(middle)), float(np.max(middle))
+    wide = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
+    counts, edges = np.histogram(middle, _LOAD_CLASSES, (low, low + wide), weights=spans)
+    return edges, counts / np.sum(counts)
+
+
+def _averages(steady: xr.Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
+    yield fig.Mark(mean(steady, torque), "mean", look="mark")
+    yield fig.Mark(math.sqrt(mean(steady, torque**2)), "RMS", look="reference")
 
 
 @PICTURES.declare(
-    lambda study: _is_steady(study) and not study.drive.foreign_machine, "force_over_stroke.png"
+    lambda study: run_names.has_steady_turns(study) and not study.drive.foreign_machine,
+    "force_over_stroke.png",
 )
 def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
     names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
-    parts = {"steady": study.steady} | {
-        name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in names
-    }
-    states = {name: machine_state(study, part) for name, part in parts.items()}
-    return linkage_loads.force_over_stroke(states, {name: run_names.title(study, name) for name in parts})
+    parts = {"steady": study.steady} | {name: run_names.from_event(study, name) for name in names}
+    runs = ((run_names.title(study, name), machine_state(study, part)) for name, part in parts.items())
+    return machine_picture.force_over_stroke(runs)
 
 
 @PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")
@@ -254,13 +313,9 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         speed.append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
     coasting = study.runs.get(name + run_names.COASTING)
     if coasting is not None:
-        after = coasting["time"].values - (event or 0.0)
-        of_crank = crank_speed(drive, coasting)
-        speed.append(fig.Curve(f"{driver} behind the open coupling", after, of_crank, 1))
-        # until the crank stands: the rest of the run shows nothing
-        turning = np.flatnonzero(np.abs(of_crank) > 0.02 * study.config.run.crank_speed)
-        stands = float(after[turning[-1]]) if turning.size else high
-        high = min(float(after[-1]), 1.3 * max(high, stands))
+        behind, stands = _coasting(study, coasting, event or 0.0)
+        speed.append(behind)
+        high = min(float(behind.x[-1]), 1.3 * max(high, high if stands is None else stands))
     if event is not None:
         # a quarter turn before the event shows enough of steady running
         before = 0.5 * math.pi / study.config.run.crank_speed
@@ -278,6 +333,15 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         _after(study, name) if event is not None else (),
         half=True,
     )
+
+
+def _coasting(study: StudyRecord, run: xr.Dataset, event: float) -> tuple[fig.Curve, float | None]:
+    """The speed of the machine behind the open coupling, and the time from which on it stands [s]; None if it never
+    turns."""
+    time, speed = run["time"].values - event, crank_speed(study.drive, run)
+    turning = np.flatnonzero(np.abs(speed) > 0.02 * study.config.run.crank_speed)
+    curve = fig.Curve(f"{study.driver_noun} behind the open coupling", time, speed, 1)
+    return curve, float(time[turning[-1]]) if turning.size else None
 
 
 def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]]:

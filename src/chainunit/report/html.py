@@ -6,6 +6,8 @@ result (``<script id="result">``). Its curves and its animation come from the ti
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -23,14 +25,21 @@ from . import blocks as b
 from . import motion
 from .figure import Figure
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
-from .live_block import Live, LiveMachine
-from .packing import packed, packed_bytes
 
 NAME = "report.html"
+WARNINGS, FIGURES = "warnings", "figures"
+"""Groups of neighbouring blocks."""
 
 _SPACE = "\u00a0"  # before a unit
 _SHORT = 16
 """Rows of a table that does not break across printed pages."""
+_SHORTEST_SERIES = 8
+"""Least number of numbers of a series."""
+_MOST_DIGITS, _LARGEST = 12, 2**53
+"""Most digits behind the point, and largest whole number, with which a page has the same number."""
+_SERIES = "+"
+"""Key of a series: its digits behind the point, and the differences of its numbers as whole numbers of the last
+digit, from 0 on."""
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
     "font-src data:"
@@ -134,12 +143,45 @@ def _packed_plotly() -> str:
     return packed_bytes((resources.files("plotly") / "package_data" / "plotly.min.js").read_bytes())
 
 
+def packed_bytes(content: bytes) -> str:
+    """Bytes, packed."""
+    return base64.b64encode(gzip.compress(content, 6, mtime=0)).decode()
+
+
+def packed(data: Any) -> str:
+    """Data as JSON has it, packed."""
+    text = json.dumps(_shortened(data), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    return packed_bytes(text.encode())
+
+
+def _shortened(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _shortened(x) for name, x in data.items()}
+    if isinstance(data, list | tuple):
+        series = _series(data)
+        return [_shortened(x) for x in data] if series is None else {_SERIES: series}
+    return data
+
+
+def _series(values: Any) -> list[int] | None:
+    """A list of numbers as a series; None where it is none, or would not come back the same."""
+    if len(values) < _SHORTEST_SERIES or any(type(x) not in (int, float) for x in values):
+        return None
+    digits = max(len(repr(x).partition(".")[2]) if type(x) is float else 0 for x in values)
+    if digits > _MOST_DIGITS or any("e" in repr(x) for x in values):
+        return None
+    whole = [round(x * 10**digits) for x in values]
+    if any(abs(n) > _LARGEST or n / 10**digits != x for n, x in zip(whole, values, strict=True)):
+        return None
+    return [digits, *(n - before for n, before in zip(whole, [0, *whole], strict=False))]
+
+
 def fragment(report: b.Report) -> str:
     """Title and blocks as a piece of another page, such as a notebook; without style, and without the blocks that the
     scripts of the page draw: figures, motion, live machine."""
     page = Page(report.units)
     failure = f"<p>The run stopped early: {page.line(report.failure)}.</p>" if report.failure else ""
-    drawn = (Figure, motion.Animation, Live)
+    drawn = (Figure, motion.Animation, b.Live)
     still = [block for block in report.blocks("long") if not isinstance(block, drawn)]
     return f"<h3>{escape(report.title or report.kind)}</h3>\n{failure}{page.blocks(still)}"
 
@@ -173,11 +215,11 @@ def marks(block: b.Given) -> str:
     return f'<p class="hint marks">Not in the study file: {"; ".join(entries)}.</p>' if origins else ""
 
 
-def _kind(block: b.Block) -> str:
+def group_of(block: b.Block) -> str:
     """The name of the group that a block forms with its neighbours; empty for a block that stands alone."""
     if isinstance(block, b.Judgement) and block.severity == "warning":
-        return "warnings"
-    return "figures" if isinstance(block, Figure) else ""
+        return WARNINGS
+    return FIGURES if isinstance(block, Figure) else ""
 
 
 class Page:
@@ -185,7 +227,7 @@ class Page:
 
     def __init__(self, units: Units) -> None:
         self.units = units
-        self.live: LiveMachine | None = None
+        self.live: b.LiveMachine | None = None
         """the live machine among the blocks so far"""
 
     # -- pieces
@@ -234,11 +276,11 @@ class Page:
     def blocks(self, blocks: Sequence[b.Block]) -> str:
         """Blocks in order; consecutive warnings form one list, consecutive figures one grid."""
         parts = []
-        for kind, together in groupby(blocks, _kind):
+        for kind, together in groupby(blocks, group_of):
             html = [self.block(block) for block in together]
-            if kind == "warnings":
+            if kind == WARNINGS:
                 html = [f'<ul class="verdicts">{"".join(html)}</ul>']
-            elif kind == "figures" and any(html):
+            elif kind == FIGURES and any(html):
                 html = [_PLOTS.format("".join(html))]
             parts += [text for text in html if text]
         return "\n".join(parts)
@@ -267,10 +309,10 @@ class Page:
                 return self._figure(block) if block.on_page else ""
             case motion.Animation():
                 return resource("motion.html").replace("<!-- caption -->", self.line(block.caption))
-            case Live():
+            case b.Live():
                 return self._live(block)
 
-    def _live(self, block: Live) -> str:
+    def _live(self, block: b.Live) -> str:
         try:
             self.live = block.make()
         except InputError as error:
@@ -300,36 +342,33 @@ class Page:
         )
 
     def _table(self, table: b.Table) -> str:
-        columns = [i for i, c in enumerate(table.columns) if c.form != "short"] or range(
-            len(table.rows[0].cells)
-        )
-        marks = [' class="text"' if table.columns and table.columns[i].of_text else "" for i in columns]
+        marks = [' class="text"' if column.of_text else "" for column in table.columns] or [""] * table.width
         heads = "".join(
-            f'<th scope="col"{mark}>{self.line(table.columns[i].title)}</th>'
-            for i, mark in zip(columns, marks, strict=True)
-            if table.columns
+            f'<th scope="col"{mark}>{self.line(column.title)}</th>'
+            for column, mark in zip(table.columns, marks, strict=False)
         )
-        noted = any(row.note for row in table.rows)
-        rows = [self._row(row, columns, marks) for row in table.rows if row.form != "short"]
-        body = "".join(rows) if noted else f"<tbody>{''.join(rows)}</tbody>"
-        css = "candidates" if noted else "numbers" if table.numeric else "words"
+        is_noted = any(row.note for row in table.rows)
+        body = "".join(self._row(row, marks) for row in table.rows)
+        css = "candidates" if is_noted else "numbers" if table.numeric else "words"
         # on paper a short table stays on one page
-        whole = " data-short" if len(rows) <= _SHORT else ""
+        whole = " data-short" if len(table.rows) <= _SHORT else ""
         return (
             f'<div class="wide"><table class="{css}"{whole}>'
             + (f"<caption>{self.line(table.title)}</caption>" if table.title else "")
             + (f"<thead><tr>{heads}</tr></thead>" if heads else "")
-            + f"{body}</table></div>"
+            + (body if is_noted else f"<tbody>{body}</tbody>")
+            + "</table></div>"
         )
 
-    def _row(self, row: b.TableRow, columns: Iterable[int], marks: Sequence[str]) -> str:
-        first, *rest = (row.cells[i] for i in columns)
+    def _row(self, row: b.TableRow, marks: Sequence[str]) -> str:
+        first, *others = row.cells
         span = ' rowspan="2"' if row.note else ""
-        others = "".join(map(self._cell, rest, marks[1:]))
-        cells = f'<th scope="row"{span}>{self._inside(first)}</th>{others}'
+        cells = (
+            f'<th scope="row"{span}>{self._inside(first)}</th>{"".join(map(self._cell, others, marks[1:]))}'
+        )
         if not row.note:
             return f"<tr>{cells}</tr>"
-        note = f'<tr><td class="why" colspan="{len(rest)}">{self.line(row.note)}</td></tr>'
+        note = f'<tr><td class="why" colspan="{len(others)}">{self.line(row.note)}</td></tr>'
         return f'<tbody class="{row.severity or "plain"}"><tr>{cells}</tr>{note}</tbody>'
 
     def _cell(self, cell: b.Cell, mark: str) -> str:
@@ -350,7 +389,7 @@ class Page:
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
         rows = "".join(
             f'<tr><th scope="row" title="{escape(_named(value))}">{escape(value.description)}</th>'
-            f"<td>{self.line((value.value,))}{self.origin(value)}</td></tr>"
+            f"<td>{self.line(value.value)}{self.origin(value)}</td></tr>"
             for value in values
         )
         return (

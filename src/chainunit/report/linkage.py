@@ -1,9 +1,8 @@
-"""The parts of the picture of a linkage: links through pins, places, paths, supports, guides with their blocks, and
-reactions as arrows."""
+"""The parts of the picture of a linkage: links through pins, paths, supports, guides with their blocks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,18 +12,18 @@ from ..mechanism.machine import Mechanism
 from ..mechanism.sketch import places as places
 from ..mechanism.sketch import shown_pins as shown_pins
 from ..mechanism.sketch import supports as supports
-from .motion import Arrow, DrawnLink
+from .motion import DrawnLink
 
 
-def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
+def links(linkage: Linkage) -> Iterator[DrawnLink]:
     """The links as they are drawn, the crank first. Links with a pin in the ground are heavier than the others; a
-    link with more than two pins is an area. `looks` has the looks of links that differ from this rule."""
+    link with more than two pins is an area."""
     shown = shown_pins(linkage)
     for name, carried in linkage.topology.links.items():
         pins = tuple(pin for pin in carried if pin in shown)
         crank, grounded = name == linkage.driver.bar.name, any(pin in linkage.ground for pin in pins)
-        usual = "crank" if crank else "heavy" if grounded else "light"
-        yield DrawnLink(name, pins, looks.get(name, usual), closed=len(pins) > 2)
+        look = "crank" if crank else "heavy" if grounded else "light"
+        yield DrawnLink(name, pins, look, closed=len(pins) > 2)
 
 
 def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
@@ -82,19 +81,3 @@ def labels(linkage: Linkage) -> dict[str, str]:
     """The labels of pins that differ from their names: a further point of a link at a pin of its name has none."""
     shown = shown_pins(linkage)
     return {pin: "" for pin in shown if "." in pin and pin.rpartition(".")[2] in shown}
-
-
-def arrows(
-    titles: Mapping[str, str],
-    joints: Mapping[str, str],
-    force: Callable[[str], tuple[Any, Any]],
-    groups: Mapping[str, str] | None = None,
-    named: bool = False,
-) -> Iterator[Arrow]:
-    """An arrow for each output with a joint. `titles` gives the output of each title, `joints` its joint, `groups`
-    its group, `force` the components of its reaction [N]. An arrow bears the name of its joint or, where it is
-    `named`, its title."""
-    for title, output in titles.items():
-        if output in joints:
-            group = (groups or {}).get(output, "")
-            yield Arrow(title, joints[output], *force(output), short=title if named else "", group=group)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -16,11 +18,10 @@ from ..reading.tables import UnusualValue
 from ..study.linkage_turn import LinkageData, LinkageFindings, Stroke, Swing, linkage_data, linkage_findings
 from . import blocks as b
 from . import figure as fig
-from . import linkage, linkage_loads, linkage_rest
+from . import linkage, linkage_rest, machine_picture
 from .cited import cited, exact, number, quantity_rows, table
 from .drawing import drawing
 from .lines import Line, Name, Number, Strong, capital, filled, join, line
-from .live_block import Live, LiveMachine
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
@@ -73,13 +74,13 @@ def linkage_report(
 
 
 def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
-    def make() -> LiveMachine:
+    def make() -> b.LiveMachine:
         # a page alone needs it
-        from .live.linkage import of_linkage
+        from .live.machine import of_linkage
 
         return of_linkage(f.machine, f.speed, Path(source).name)
 
-    yield Live(make, "the file")
+    yield b.Live(make, "the file")
 
 
 def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
@@ -189,7 +190,7 @@ def _reversals(f: LinkageFindings, x: LinkageData, variables: Mapping[str, str])
 
 
 def _animation(f: LinkageFindings) -> Animation:
-    machine, model = f.machine, f.machine.model
+    machine = f.machine
     low, _ = f.description.span
     step = (2 if f.back else 1) * (len(f.q) - 1) // _PICTURES
     q, speed = f.q[::step], np.full(_PICTURES // (2 if f.back else 1) + 1, f.speed)
@@ -203,35 +204,28 @@ def _animation(f: LinkageFindings) -> Animation:
         forth = values(f)[::step]
         return np.concatenate([forth, values(f.back)[::-1][::step][1:]]) if f.back else forth
 
-    state = _state(f, q, speed)
-    effort, unit = ("Force" if model.slides else "Torque"), model.driver_port.unit
-    driver = state.m.linkage.driver
-    joints = {variable: pin for variable, (pin, _) in model.joints.items()}
-
     def force(output: str) -> tuple[Any, Any]:
         x, y = (over(lambda g, axis=axis: g.outputs[f"{output}.{axis}"]) for axis in ("fx", "fy"))  # type: ignore[misc]
         return x, y
 
+    state = _state(f, q, speed)
+    effort, unit = capital(machine_picture.driver_nouns(machine)[0]), machine.model.driver_port.unit
     readings = (
         Reading("Place of the driver", q, unit("rad")),
         Reading(f"{effort} at the driver", over(lambda g: g.outputs["tau"]) * machine.ratio, unit("N.m")),
     )
     clip = Clip(
-        "turn", f"{'There and back at' if f.back else 'At'} constant speed", time, linkage.places(state.m), readings,
-        (*linkage.arrows(model.pins, joints, force, named=True), *linkage_loads.load_arrows(state)),
+        "turn",
+        f"{'There and back at' if f.back else 'At'} constant speed",
+        time,
+        linkage.places(state.m),
+        readings,
+        (*machine_picture.arrows(machine, force), *machine_picture.load_arrows(state)),
         blocks=linkage.blocks(state.m),
-    )  # fmt: skip
-    return Animation(
-        tuple(linkage.links(state.m.linkage, {})),
-        linkage.supports(state.m.linkage),
-        (clip,),
-        float(time[-1]),
-        "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads.",
-        hanging=linkage.hanging(state.m),
-        circles=(*[(driver.bar.pin, driver.end)] * model.turns, *state.m.linkage.circles),
-        names=linkage.labels(state.m.linkage),
-        paths=linkage.paths(state.m, driver.end if f.back else ""),
-        rails=linkage.rails(state.m),
+    )
+    caption = "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads."
+    return replace(
+        machine_picture.picture(machine, state.m), runs=(clip,), turn=float(time[-1]), caption=caption
     )
 
 
@@ -251,11 +245,10 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     there = ", there and back over its range" if f.back else ""
     lead = f"Inverse dynamics at {{}} of the driver{there}, with the loads of normal running."
     yield b.Text(filled(lead, exact(x.speed, 4)), "lead", central=True)
-    slides = f.machine.model.slides
-    effort, inertia_word = ("force", "mass") if slides else ("torque", "inertia")
+    effort, inertia = machine_picture.driver_nouns(f.machine)
     for way, forces in {"forth": x.forces, "back": x.back.forces}.items() if x.back else (("", x.forces),):
         on = f", on the way {way}" if way else ""
-        title = f"{capital(effort)}, power and {inertia_word} at the driver{on}"
+        title = f"{capital(effort)}, power and {inertia} at the driver{on}"
         yield b.Table(quantity_rows(forces.turn), title=title, central=True)
         yield from table(
             forces.joints.items(),
@@ -275,72 +268,64 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
         title="Drivers besides the first one",
         central=True,
     )
-    yield from _figures(f, effort, inertia_word)
+    yield from _figures(f)
 
 
-def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.Block]:
+def _figures(f: LinkageFindings) -> Iterator[b.Block]:
     """The figures over the way of the driver, with a curve, or of reactions a panel, for each direction."""
-    model, unit, ratio, ways = f.machine.model, f.machine.model.driver_port.unit, f.machine.ratio, _ways(f)
-    angle = fig.Axis(
-        "way of the driver" if model.slides else "angle of the driver",
-        unit("rad"),
-        step=45.0 if model.turns else None,
+    place, ways = machine_picture.driver_axis(f.machine), _ways(f)
+    yield _turn_figure(f, place)
+    states = (
+        (f"on the way {way}" if way else "a turn at constant speed", _state(f, f.q, findings.speed))
+        for way, findings in ways.items()
     )
-    panels: tuple[tuple[fig.Axis, Callable[[LinkageFindings], Any]], ...] = (
-        (fig.Axis(f"{effort} at the driver", unit("N.m")), lambda g: g.outputs["tau"] * ratio),
-        (fig.Axis("power at the driver", "W"), lambda g: g.outputs["tau"] * ratio * g.speed),
-        (fig.Axis(f"reflected {inertia_word}", unit("kg.m2"), low=0.0), lambda g: g.outputs["J"] * ratio**2),
-    )
-    title = f"{capital(effort)}, power and {inertia_word}"
+    yield from machine_picture.force_over_stroke(states, PICTURES[3])
     yield fig.Figure(
+        "linkage-reactions",
+        "Reactions over the way of the driver",
+        "The force in each joint over the way of the driver.",
+        tuple((_reactions(f, place, way, findings),) for way, findings in ways.items()),
+        file=PICTURES[2],
+    )
+
+
+def _turn_figure(f: LinkageFindings, place: fig.Axis) -> fig.Figure:
+    """Effort, power and inertia at the driver."""
+    effort, inertia = machine_picture.driver_nouns(f.machine)
+    unit, ratio, ways = f.machine.model.driver_port.unit, f.machine.ratio, _ways(f)
+    readers: dict[fig.Axis, Callable[[LinkageFindings], Any]] = {
+        fig.Axis(f"{effort} at the driver", unit("N.m")): lambda g: g.outputs["tau"] * ratio,
+        fig.Axis("power at the driver", "W"): lambda g: g.outputs["tau"] * ratio * g.speed,
+        fig.Axis(f"reflected {inertia}", unit("kg.m2"), low=0.0): lambda g: g.outputs["J"] * ratio**2,
+    }
+    curves: dict[fig.Axis, list[fig.Curve]] = {axis: [] for axis in readers}
+    for (k, (axis, reader)), (look, (way, findings)) in product(
+        enumerate(readers.items()), enumerate(ways.items())
+    ):
+        is_named = bool(way) and k == 0
+        curve = fig.Curve(way or axis.label, f.q, reader(findings), look, in_legend=is_named)
+        curves[axis].append(curve)
+    title = f"{capital(effort)}, power and {inertia}"
+    return fig.Figure(
         "linkage-turn",
         f"{title} over the way of the driver",
         f"{title} at the driver over its way.",
-        fig.stacked(
-            angle,
-            (
-                (
-                    axis,
-                    tuple(
-                        fig.Curve(
-                            way or axis.label, f.q, reader(findings), look, in_legend=bool(way) and k == 0
-                        )
-                        for look, (way, findings) in enumerate(ways.items())
-                    ),
-                )
-                for k, (axis, reader) in enumerate(panels)
-            ),
-        ),
+        fig.stacked(place, curves.items()),
         file=PICTURES[1],
     )
-    yield from linkage_loads.force_over_stroke(
-        {way: _state(f, f.q, findings.speed) for way, findings in ways.items()},
-        {way: f"on the way {way}" if way else "a turn at constant speed" for way in ways},
-        PICTURES[3],
+
+
+def _reactions(f: LinkageFindings, place: fig.Axis, way: str, findings: LinkageFindings) -> fig.Panel:
+    """The force in each joint on one way."""
+
+    def force(name: str) -> Any:
+        variable = f.description.variable("joint", name)
+        return np.hypot(findings.outputs[f"{variable}.fx"], findings.outputs[f"{variable}.fy"])
+
+    curves = (
+        fig.Curve(name, f.q, force(name), k, in_legend=way != "back") for k, name in enumerate(f.joints)
     )
-    forces = {
-        way: tuple(
-            fig.Curve(
-                name,
-                f.q,
-                np.hypot(findings.outputs[f"{v}.fx"], findings.outputs[f"{v}.fy"]),
-                look=k,
-                in_legend=way != "back",
-            )
-            for k, name in enumerate(f.joints)
-            for v in [f.description.variable("joint", name)]
-        )
-        for way, findings in ways.items()
-    }
-    yield fig.Figure(
-        "linkage-reactions", "Reactions over the way of the driver",
-        "The force in each joint over the way of the driver.",
-        tuple(
-            (fig.Panel(angle, fig.Axis(f"force{', ' * bool(way)}{way}", "N", low=0.0), curves),)
-            for way, curves in forces.items()
-        ),
-        file=PICTURES[2],
-    )  # fmt: skip
+    return fig.Panel(place, fig.Axis(f"force{', ' * bool(way)}{way}", "N", low=0.0), tuple(curves))
 
 
 def _title(f: LinkageFindings, name: str) -> Line:

@@ -11,6 +11,7 @@ from ..machines.equilibria import INDIFFERENT, SADDLE, STABLE, STOP, UNSTABLE, E
 from ..study.linkage_turn import LinkageAtRest, LinkageFindings
 from . import blocks as b
 from . import figure as fig
+from . import machine_picture
 from .cited import as_name, number, quantity_rows, table
 from .lines import Line, filled, join, line
 
@@ -27,7 +28,7 @@ _MARKERS = {STABLE: "o", STOP: "s", UNSTABLE: "x", SADDLE: "+"}
 def at_rest(f: LinkageFindings, x: LinkageAtRest, file: str) -> Iterator[b.Block]:
     """The section of the report; `file` is the name of its picture."""
     equilibria = f.rest
-    effort = "force" if f.machine.model.slides else "torque"
+    effort, _ = machine_picture.driver_nouns(f.machine)
     if equilibria.indifferent:
         yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
         return
@@ -54,7 +55,7 @@ def _table(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Tabl
         is_range = equilibrium.kind == INDIFFERENT
         return filled("{} to {}", begin, number(equilibrium.end)) if is_range else begin
 
-    inertia = "mass" if f.machine.model.slides else "inertia"
+    _, inertia = machine_picture.driver_nouns(f.machine)
     return table(
         enumerate(x.equilibria, 1),
         ("equilibrium", lambda row: f"{row[0]}: {_KINDS[row[1].kind]}"),
@@ -124,14 +125,8 @@ def _notes(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Bloc
 
 
 def _figure(f: LinkageFindings, effort: str, file: str) -> fig.Figure:
-    model, unit, rest = f.machine.model, f.machine.model.driver_port.unit, f.rest.rest
-    place = fig.Axis(
-        "way of the driver" if model.slides else "angle of the driver",
-        unit("rad"),
-        low=float(rest.q[0]),
-        high=float(rest.q[-1]),
-        step=45.0 if model.turns else None,
-    )
+    unit, rest = f.machine.model.driver_port.unit, f.rest.rest
+    place = machine_picture.driver_axis(f.machine, float(rest.q[0]), float(rest.q[-1]))
     panels = [(fig.Axis(f"holding {effort}", unit("N.m")), rest.holding)]
     if rest.potential is not None:
         panels.append((fig.Axis("potential", "J"), rest.potential))

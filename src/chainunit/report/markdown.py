@@ -27,16 +27,10 @@ def markdown(report: Report, pictures: Collection[str]) -> str:
         lines += [f"The run stopped early: {_line(report.failure, units)}.", ""]
     if report.source:
         lines += [_line(report.source, units), ""]
-    for block in report.opening:
-        lines += block_lines(block, units, pictures)
-    for section in report.sections:
-        inside = [
-            text
-            for long_block in of_form(section.blocks, "long")
-            for text in block_lines(long_block, units, pictures)
-        ]
-        if inside:
-            lines += [f"## {section.heading}", "", *inside]
+    for heading, blocks in (("", report.opening), *((s.heading, s.blocks) for s in report.sections)):
+        inside = [text for block in of_form(blocks, "long") for text in block_lines(block, units, pictures)]
+        lines += [f"## {heading}", ""] if heading and inside else []
+        lines += inside
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -82,7 +76,7 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
             entries = [
                 (
                     value.name,
-                    _line((value.value,), units),
+                    _line(value.value, units),
                     markdown_text(value.description),
                     value.place or value.origin,
                 )
@@ -90,25 +84,20 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
                 for value in values
             ]
             return list(_grid(entries, ("name", "value", "meaning", "from")))
-        case Drawing():
-            return [f"![{block.alt}]({block.file})", ""] if block.file in pictures else []
-        case Figure():
-            return [f"![{block.title}]({block.file})", ""] if block.file in pictures else []
+        case Drawing(alt=text, file=file) | Figure(title=text, file=file) if file in pictures:
+            return [f"![{text}]({file})", ""]
         case _:
             return []
 
 
 def _table(table: Table, units: Units) -> list[str]:
-    count = len(table.columns) or len(table.rows[0].cells)
-    places = [i for i, column in enumerate(table.columns) if column.form != "short"] or range(count)
-    heads = [_line(table.columns[i].title, units) for i in places if table.columns]
-    heads = heads or ["quantity", *[""] * (count - 1)]
-    notes = any(row.note for row in table.rows)
-    rows = [
-        [markdown_text(plain_cell(cell, units)) for cell in (row.cells[i] for i in places)]
-        + ([_line(row.note, units)] if notes else [])
-        for row in table.rows
-        if row.form != "short"
+    heads = [_line(column.title, units) for column in table.columns] or [
+        "quantity",
+        *[""] * (table.width - 1),
     ]
+    rows = [[markdown_text(plain_cell(cell, units)) for cell in row.cells] for row in table.rows]
+    if any(row.note for row in table.rows):
+        heads.append(table.note_title)
+        rows = [[*cells, _line(row.note, units)] for cells, row in zip(rows, table.rows, strict=True)]
     title = [f"**{_line(table.title, units)}**", ""] if table.title else []
-    return [*title, *_grid(rows, heads + ([table.note_title] if notes else []))]
+    return [*title, *_grid(rows, heads)]

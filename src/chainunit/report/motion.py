@@ -76,8 +76,8 @@ class Animation:
 
     links: tuple[DrawnLink, ...]
     grounds: tuple[str, ...]
-    runs: tuple[Clip, ...]
-    turn: float
+    runs: tuple[Clip, ...] = ()
+    turn: float = 1.0
     caption: Line = ()
     hanging: tuple[str, ...] = ()
     circles: tuple[tuple[str, str], ...] = ()

@@ -1,5 +1,5 @@
 "use strict";
-/* Data of the page, which stands in it packed, see chainunit.report.packing. It is unpacked at once, not by the stream
+/* Data of the page, which stands in it packed, see chainunit.report.html. It is unpacked at once, not by the stream
    of the browser, so that a page that is printed as soon as it is loaded has its plots. */
 const LENGTHS = [3, 4, 5, 6, 7, 8, 9, 10, 11, 13, 15, 17, 19, 23, 27, 31, 35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258];
 const LENGTH_BITS = [0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 0];

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable
+from functools import reduce
 from itertools import pairwise
+from operator import getitem
 from textwrap import wrap
 from typing import Any
 
@@ -87,9 +89,17 @@ _PHONE = 340
 
 def height(figure: Figure) -> int:
     """Height on the page [px]."""
-    row = _HALF_ROW if figure.half else _ROW
-    heights = figure.heights or (1.0,) * len(figure.panels)
-    return round(_ENDS + _above(figure) + _legend_rows(figure) + row * sum(heights))
+    return round(_ENDS + _above(figure) + _legend_rows(figure) + _row(figure) * sum(figure.row_heights))
+
+
+def _row(figure: Figure) -> int:
+    """Usual height of a row of panels [px]."""
+    return _HALF_ROW if figure.half else _ROW
+
+
+def _gap(figure: Figure, joined: bool) -> float:
+    """Room between two panels of a column [px], which is small if they are `joined` by one axis."""
+    return (22.0 if joined else 66.0) + (22.0 if figure.has_titles else 0.0)
 
 
 def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
@@ -111,20 +121,11 @@ def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
     }
     layout |= {"annotations": drawing.annotations} if drawing.annotations else {}
     layout |= {"shapes": drawing.shapes} if drawing.shapes else {}
-    embedded: dict[str, Any] = {"data": drawing.traces, "layout": layout}
-    embedded["rows"] = len(spec.panels)
-    embedded["tall"] = any(panel.y.names for _, _, panel in spec.all_panels())
-    narrow = drawing.narrow()
-    if narrow:
-        wide = {key: _at(embedded["layout"], key) for key in narrow}
-        embedded |= {"narrow": narrow, "wide": wide, "below": max(_LEAST, _COLUMN * len(spec.panels[0]))}
-    return embedded
-
-
-def _at(layout: Any, key: str) -> Any:
-    for name in key.split("."):
-        layout = layout[name]
-    return layout
+    shown = {"data": drawing.traces, "layout": layout, "rows": len(spec.panels), "tall": spec.has_names}
+    if not (narrow := drawing.narrow()):
+        return shown
+    wide = {key: reduce(getitem, key.split("."), layout) for key in narrow}
+    return shown | {"narrow": narrow, "wide": wide, "below": max(_LEAST, _COLUMN * len(spec.panels[0]))}
 
 
 def _hovers_by_point(panel: Panel) -> bool:
@@ -139,7 +140,7 @@ def _above(figure: Figure) -> int:
     panels = [panel for _, _, panel in figure.all_panels()]
     marks = [item for panel in panels for item in panel.items if isinstance(item, Mark) and item.words]
     room = 82 if any(mark.upright for mark in marks) else 18 if marks else 0
-    return room + (18 if any(panel.title for panel in panels) else 0)
+    return room + (18 if figure.has_titles else 0)
 
 
 def _legend_rows(figure: Figure, width: float = 0.0) -> int:
@@ -175,15 +176,12 @@ class _Drawing:
         self.shapes: list[dict[str, Any]] = []
         self.annotations: list[dict[str, Any]] = []
         rows, columns = len(spec.panels), len(spec.panels[0])
-        panels = list(spec.all_panels())
-        one_axis = all(len(spec.sharing(r, c)) == rows for r, c, _ in panels)
-        gap = (22.0 if one_axis else 66.0) + (22.0 if any(panel.title for _, _, panel in panels) else 0.0)
-        self.columns = _domains(spec.widths or (1.0,) * columns, 0.12 if columns > 2 else 0.1)
-        domains = _domains(spec.heights or (1.0,) * rows, gap / (height(spec) - _ENDS))
+        one_axis = all(len(spec.sharing(r, c)) == rows for r, c, _ in spec.all_panels())
+        self.columns = _domains(spec.column_widths, 0.12 if columns > 2 else 0.1)
+        domains = _domains(spec.row_heights, _gap(spec, one_axis) / (height(spec) - _ENDS))
         self.rows = [(1.0 - last, 1.0 - first) for first, last in domains]
         self.samples = _thin_groups(spec)
         self.x_axes: dict[tuple[int, int], str] = {}
-        self.y_axes: dict[int, list[str]] = {}
         self.axes: dict[str, dict[str, Any]] = {}
         self.legend_names: set[str] = set()
         self.places: dict[tuple[int, int], tuple[str, str]] = {}
@@ -204,14 +202,8 @@ class _Drawing:
             bottom = {"margin.b": 52 + _legend_rows(spec) + more} if more else {}
             return (changes or bottom) and {"height": height(spec) + more, **bottom, **changes}
         places = sorted(self.places, key=lambda place: (place[1], place[0]))
-        heights = spec.heights or (1.0,) * len(spec.panels)
-        row = _HALF_ROW if spec.half else _ROW
-        sizes = [row * min(heights[r], 1.1) for r, _ in places]
-        titled = 22.0 if any(panel.title for _, _, panel in spec.all_panels()) else 0.0
-        gaps = [
-            (22.0 if self.places[a][0] == self.places[b][0] else 66.0) + titled
-            for a, b in pairwise(places)
-        ]  # fmt: skip
+        sizes = [_row(spec) * min(spec.row_heights[r], 1.1) for r, _ in places]
+        gaps = [_gap(spec, self.places[a][0] == self.places[b][0]) for a, b in pairwise(places)]
         room, begin = sum(sizes) + sum(gaps), 0.0
         changes["height"] = round(room + _ENDS + _above(spec) + legend)
         changes["margin.b"] = 52 + legend
@@ -225,9 +217,8 @@ class _Drawing:
 
     def panel(self, r: int, c: int, panel: Panel) -> None:
         """Draw a panel into its place."""
-        count = sum(map(len, self.y_axes.values())) + 1
-        y = f"y{count if count > 1 else ''}"
-        self.y_axes.setdefault(r, []).append(y)
+        beside = [y for (row, _), (_, y) in self.places.items() if row == r]
+        y = f"y{len(self.places) + 1 if self.places else ''}"
         x = self.x_axes.setdefault(
             (c, self.spec.sharing(r, c)[0]), f"x{len(self.x_axes) + 1 if self.x_axes else ''}"
         )
@@ -239,8 +230,8 @@ class _Drawing:
         self.axes[_long(y)] |= {"title": {"text": panel.y.label}} | (
             {"scaleanchor": x} if panel.equal else {}
         )
-        if self.spec.level and self.y_axes[r][0] != y:
-            self.axes[_long(y)]["matches"] = self.y_axes[r][0]
+        if self.spec.level and beside:
+            self.axes[_long(y)]["matches"] = beside[0]
         if panel.title:
             corner = {"xanchor": "left", "yanchor": "bottom"}
             self._words(f"{x} domain", f"{y} domain", 0.0, 1.0, f"<b>{panel.title}</b>", **corner)
@@ -277,14 +268,9 @@ class _Drawing:
                     )  # fmt: skip
             case Shade():
                 colour = FILLS[item.look]
-                style = {
-                    "type": "rect",
-                    "fillcolor": colour,
-                    "opacity": 0.6,
-                    "line": {"width": 0},
-                    "layer": "below",
-                }
-                self.shapes.append({**style, **_across(item.axis, item.low, item.high, x, y)})
+                edge = {"line": {"width": 0}, "layer": "below"}
+                area = {"type": "rect", "fillcolor": colour, "opacity": 0.6, **edge}
+                self.shapes.append(area | _across(item.axis, item.low, item.high, x, y))
                 self._sample(item.name, place, mode="markers", marker=_square(colour))
             case Mark():
                 self._mark(item, place)
@@ -367,16 +353,8 @@ class _Drawing:
     def _hatch(self, hatch: Hatch, place: dict[str, Any]) -> None:
         x, y = hatch_lines(hatch)
         line = {"color": HATCHES[hatch.look % len(HATCHES)], "width": 1.0}
-        self._trace(
-            "scatter",
-            x=_small(x),
-            y=_small(y),
-            mode="lines",
-            line=line,
-            hoverinfo="skip",
-            **self._legend(hatch.name),
-            **place,
-        )
+        curve = {"x": _small(x), "y": _small(y), "mode": "lines", "line": line, "hoverinfo": "skip"}
+        self._trace("scatter", **curve, **self._legend(hatch.name), **place)
 
 
 def _axis(axis: Axis) -> dict[str, Any]:

@@ -21,8 +21,7 @@ from ..core.errors import InputError
 from ..reading.text import Units
 from . import blocks as b
 from .figure import Figure
-from .html import Page, marks, resource
-from .live_block import Live
+from .html import FIGURES, WARNINGS, Page, group_of, marks, resource
 from .motion import Animation
 
 NAME = "sheet.pdf"
@@ -62,7 +61,7 @@ class _PrintedPage(Page):
 
     def block(self, block: b.Block) -> str:
         """One block; nothing for one that moves, and for a figure that has no file. Given values run on."""
-        if isinstance(block, Animation | Live) or (isinstance(block, b.Text) and block.role == "hint"):
+        if isinstance(block, Animation | b.Live) or (isinstance(block, b.Text) and block.role == "hint"):
             return ""
         if isinstance(block, b.Given):
             groups = "".join(
@@ -79,14 +78,14 @@ class _PrintedPage(Page):
         """Blocks in order, with capitals where a line begins; consecutive warnings form one list, and of consecutive
         figures the narrow ones stand in two columns after the others."""
         parts = []
-        for kind, together in groupby(blocks, _group):
+        for kind, together in groupby(blocks, group_of):
             group = list(together)
-            wide = [block for block in group if kind != _FIGURES or _is_wide(block)]
-            if kind == _FIGURES:
+            wide = [block for block in group if kind != FIGURES or _is_wide(block)]
+            if kind == FIGURES:
                 # the flattest first: it fits on the page that has begun
                 wide.sort(key=self._height)
             texts = list(filter(None, map(self.block, wide)))
-            parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == _WARNINGS and texts else texts
+            parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == WARNINGS and texts else texts
             if narrow := "".join(self.block(block) for block in group if block not in wide):
                 parts.append(f'<div class="prints">{narrow}</div>')
         return _BEGIN.sub(lambda match: match[1] + match[2].upper(), "\n".join(parts))
@@ -94,12 +93,15 @@ class _PrintedPage(Page):
     def _value(self, value: b.GivenValue) -> str:
         """A given value in running text."""
         name = escape(value.description)
-        return f'<span title="{escape(value.name)}">{name}</span> {self.line((value.value,))}{self.origin(value)}'
+        return (
+            f'<span title="{escape(value.name)}">{name}</span> {self.line(value.value)}{self.origin(value)}'
+        )
 
     def _table(self, table: b.Table) -> str:
         """A table; one with many shares has the numbers alone, as paper has no room for their bars."""
         # the page has the rows that a terminal leaves out
-        table = replace(table, rows=tuple(row for row in table.rows if row.form != "long") or table.rows)
+        rows = tuple(row for row in table.rows if row.form != "long")
+        table = replace(table, rows=rows or table.rows).of_form("long")
         if sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) > _BARS:
             table = replace(table, rows=tuple(map(_without_bars, table.rows)))
         return super()._table(table)
@@ -128,15 +130,6 @@ class _PrintedPage(Page):
 
 _FLAT = 0.5
 """Height over width below which two figures stand beside each other in a long annex."""
-
-_WARNINGS, _FIGURES = "warnings", "figures"
-
-
-def _group(block: b.Block) -> str:
-    """The name of the group that a block forms with its neighbours; empty for a block that stands alone."""
-    if isinstance(block, Figure):
-        return _FIGURES
-    return _WARNINGS if getattr(block, "severity", "") == "warning" else ""
 
 
 def _is_wide(block: b.Block) -> bool:

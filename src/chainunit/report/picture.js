@@ -27,9 +27,8 @@ const machinePicture = (stage, motion, tables) => {
     return [5, 2, 1].map((m) => m * power).find((y) => y <= x * 1.0001) || power;
   };
 
-  function build() {
-    stage.replaceChildren();
-    // joints, paths and the tips of arrows of all runs, with room for names
+  // scale and origin that fit the joints, paths and tips of arrows of all runs, with room for names
+  function fit() {
     const x = [], y = [];
     const reach = (list, all) => all.push(list.reduce((a, b) => Math.min(a, b)), list.reduce((a, b) => Math.max(a, b)));
     for (const r of [...motion.runs, { joints: motion.paths }])
@@ -51,17 +50,17 @@ const machinePicture = (stage, motion, tables) => {
           reach(Array.from({ length: count }, (_, i) => of(list, i) + (arrow * of(component, i)) / r.largest), all);
         }
     const [x0, x1] = [Math.min(...x), Math.max(...x)], [y0, y1] = [Math.min(...y), Math.max(...y)];
-    const left = 0.1 * size, right = left, above = left, below = left;
+    const margin = 0.1 * size, width = x1 - x0 + 2 * margin, depth = y1 - y0 + 2 * margin;
     // an upright linkage is not higher than four fifths of the width
-    scale = Math.min(WIDTH / (x1 - x0 + left + right), (0.8 * WIDTH) / (y1 - y0 + above + below));
-    height = Math.round(scale * (y1 - y0 + above + below));
-    const beside = 0.5 * (WIDTH - scale * (x1 - x0 + left + right));
-    origin = [beside + scale * (left - x0), scale * (y1 + above)];
+    scale = Math.min(WIDTH / width, (0.8 * WIDTH) / depth);
+    height = Math.round(scale * depth);
+    origin = [0.5 * (WIDTH - scale * width) + scale * (margin - x0), scale * (y1 + margin)];
     stage.setAttribute("viewBox", `0 0 ${WIDTH} ${height}`);
     parts = { arrow: arrow * scale };
+  }
 
+  function drawSupports() {
     const ground = drawn(stage, "g");
-    frame = 0;
     for (const name of motion.grounds) {
       const [px, py] = at(name);
       // a joint from which links hang has its support above it, another one below
@@ -72,7 +71,9 @@ const machinePicture = (stage, motion, tables) => {
         d: `M${px - 22} ${py + 22 * up} h44` + [-18, -8, 2, 12].map((s) => `M${px + s} ${py + 22 * up} l8 ${8 * up}`).join(""),
       });
     }
-    parts.circles = motion.circles.map((ends) => [ends, drawn(stage, "circle", { class: "orbit" })]);
+  }
+
+  function drawRails() {
     for (const ends of motion.rails) {
       const [ax, ay, bx, by] = ends.map((v, i) => origin[i % 2] + (i % 2 ? -scale : scale) * v);
       const length = Math.hypot(bx - ax, by - ay) || 1, ux = (bx - ax) / length, uy = (by - ay) / length;
@@ -85,6 +86,10 @@ const machinePicture = (stage, motion, tables) => {
         drawn(stage, "path", { class: "rail", d: strokes.join("") });
       }
     }
+  }
+
+  // what moves, in the order in which one covers the other; names come last: no arrow covers them
+  function drawMoving() {
     parts.loads = motion.links
       .filter((link) => link.name in run.loads)
       .map((link) => [link, drawn(stage, "polyline", { class: "material" })]);
@@ -109,7 +114,6 @@ const machinePicture = (stage, motion, tables) => {
         name: drawn(group, "text", { "text-anchor": "middle" }),
       };
     });
-    // names come last: no arrow covers them
     for (const [name, part] of Object.entries(parts.joints)) {
       part.push(drawn(stage, "text", { "text-anchor": "middle", class: "joint-name" }, labelOf(name)), null);
     }
@@ -118,7 +122,9 @@ const machinePicture = (stage, motion, tables) => {
     parts.legendHead = drawn(parts.legend, "path", { class: "head" });
     parts.legendText = drawn(parts.legend, "text", {});
     parts.caption = drawn(stage, "text", { x: 16, y: 28, class: "where" });
+  }
 
+  function buildTables() {
     while (tables.values.rows.length > tables.kept) tables.values.deleteRow(tables.kept);
     parts.readings = run.readings.map((reading) => {
       const row = tables.values.insertRow(), name = document.createElement("th");
@@ -141,6 +147,17 @@ const machinePicture = (stage, motion, tables) => {
       row.appendChild(head);
       return row.insertCell();
     });
+  }
+
+  function build() {
+    stage.replaceChildren();
+    frame = 0;
+    fit();
+    drawSupports();
+    parts.circles = motion.circles.map((ends) => [ends, drawn(stage, "circle", { class: "orbit" })]);
+    drawRails();
+    drawMoving();
+    buildTables();
   }
 
   function head(x, y, dx, dy) {

@@ -77,12 +77,10 @@ def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
 def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
     figure = in_units(spec, units)
     rows, columns = len(figure.panels), len(figure.panels[0])
-    heights, widths = figure.heights or (1.0,) * rows, figure.widths or (1.0,) * columns
-    has_titles = any(panel.title for _, _, panel in figure.all_panels())
+    heights, widths = figure.row_heights, figure.column_widths
     width = size * 8.2 if columns == 1 else 1.0 + _COLUMN * columns
-    tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if has_titles else 0.0)
-    is_named = any(panel.y.names for _, _, panel in figure.all_panels())
-    height = tall * (max(size, _NAMED) if is_named else size)
+    height = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if figure.has_titles else 0.0)
+    height *= max(size, _NAMED) if figure.has_names else size
     drawing = canvas(figsize=(width, height))
     axes = drawing.subplots(rows, columns, squeeze=False, height_ratios=heights, width_ratios=widths)
     places = {(r, c) for r, c, _ in figure.all_panels()}

@@ -5,17 +5,21 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, get_type_hints
 
 from ..core.descriptions import of_driver
 from ..core.errors import InputError, near_name
 from ..core.messages import unit_behind
 from ..core.model import Model
-from ..core.quantities import written
+from ..core.quantities import Variable, written
+from ..drives.catalogue import KINDS, check_own
+from ..drives.catalogue_rows import TEXTS, CatalogueKind
 from ..fmu.description import Interface
 from ..models import MODELS
 from ..reading.results import documented, results_in
+from ..reading.text import number
 from ..study.analyses import all_analyses
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
 from ..study.remark import SEVERITIES
@@ -104,10 +108,10 @@ def _key_names() -> Iterator[str]:
 
 
 def _block(table: KeyTable, title: str = "") -> Table:
-    return Table(*key_rows(table), title=title, numeric=False)
+    return Table(*_key_rows(table), title=title, numeric=False)
 
 
-def key_rows(table: KeyTable) -> tuple[tuple[TableRow, ...], tuple[Column, ...]]:
+def _key_rows(table: KeyTable) -> tuple[tuple[TableRow, ...], tuple[Column, ...]]:
     """A row for each key of a table, and the heads of the columns."""
     return tuple(map(_row, table.keys)), _KEY_COLUMNS
 
@@ -214,3 +218,56 @@ def _variables(model: Model) -> Iterator[Block]:
         heads("variable", "causality", "unit or type", "start", "allowed", "meaning"),
         numeric=False,
     )
+
+
+# -- catalogues of the user
+
+
+def checked_catalogues(files: Sequence[Path]) -> Report:
+    """The contents of catalogues (CSV or TOML) whose every row is right.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault of all files; see `chainunit.drives.catalogue.check_own`.
+    """
+    rows = check_own(files)
+    of_kinds = zip(KINDS, (rows.motors, rows.gears, rows.couplings, rows.flexible), strict=True)
+    tables = [_catalogue(kind, items) for kind, items in of_kinds if items]
+    names = ", ".join(str(file) for file in files)
+    more = "Name the files in a study file: catalogue = [...]."
+    return Report("", "catalogue", {}, (Text(f"{names}: every row is right."), *tables, Text(more)), ())
+
+
+def _catalogue(kind: CatalogueKind, items: Sequence[Any]) -> Table:
+    """The ranges of the columns of one kind, and the columns that some rows leave open."""
+    data = [item.nameplate if kind.name == "motor" else item.data for item in items]
+    name = "order_number"
+    unknown = sum(not item.order_number for item in items)
+    rows = [TableRow((name, "-", str(unknown or "-"), TEXTS[name]))]
+    for name, variable in kind.variables.items():
+        values = [float(getattr(entry, name)) for entry in data]
+        # of a column that may be left out, the start value 0 stands for a value that is not known
+        unknown = values.count(0.0) if variable.quantity.start == 0.0 else 0
+        sizes = [x for x in values if x or variable.quantity.start != 0.0]
+        rows.append(TableRow((name, _range(variable, sizes), str(unknown or "-"), variable.description)))
+    title = f"{len(items)} {kind.plural if len(items) > 1 else kind.plural.removesuffix('s')}"
+    return Table(tuple(rows), heads("column", "from, to", "rows without", "meaning"), title, numeric=False)
+
+
+def _range(variable: Variable, values: Iterable[float]) -> str:
+    sizes = sorted(values)
+    if not sizes:
+        return "-"
+    ends = dict.fromkeys(number(x, variable.unit, variable.kind) for x in (sizes[0], sizes[-1]))
+    return " to ".join(ends)
+
+
+def catalogue_tables() -> Report:
+    """The columns of catalogues of every kind: unit, allowed range, meaning."""
+    tables = (Table(*_key_rows(table), table.title, numeric=False) for table in catalogue_columns())
+    hint = Text(
+        "A column without a default must be there. chainunit catalogue --template writes "
+        "a file of each kind to be filled, chainunit catalogue FILE checks one."
+    )
+    return Report("Columns of a catalogue", "catalogue", {}, (*tables, hint), ())

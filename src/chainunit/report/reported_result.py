@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import tempfile
 import weakref
@@ -11,13 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self
 
 from ..core.errors import WriteError, check_kind
-from ..core.files import atomic_file
+from ..core.files import atomic_file, named_file
 from ..core.named import Named
+from ..reading.text import Units
 from ..work.progress import TaskProgress
-from . import files, html, terminal
+from . import files, html, print_figures, terminal
 from .blocks import Report
+from .figure import Figure
 from .notebook import shown_progress
-from .result_figures import ResultFigure
+from .style import styled
 from .task import Outcome, Question, Task
 
 if TYPE_CHECKING:
@@ -49,29 +52,23 @@ class ReportedResult(Generic[Question, Outcome]):
             for a file that cannot be written; the others are written.
         """
         check_kind("folder", folder, str | Path | None, "the path of a folder")
-        with shown_progress(progress) as shown:
-            return cls._made(question, folder, shown, **options)
-
-    @classmethod
-    def _made(
-        cls, question: Question, folder: str | Path | None, progress: TaskProgress, **options: Any
-    ) -> Self:
         task = cls._task
-        compute = partial(task.outcome, question, progress=progress, **options)
-        if folder is not None:
-            with task.claimed(question, Path(folder)) as place:
-                result = cls(question, compute(folder=place), place)
-                result._write(place)
-        elif task.kept is None:
-            result = cls(question, compute(folder=None), None)
-        else:
-            place = Path(tempfile.mkdtemp(prefix="chainunit_"))
-            try:
-                result = cls(question, compute(folder=place), place)
-            except BaseException:
-                shutil.rmtree(place, ignore_errors=True)
-                raise
-            weakref.finalize(result, shutil.rmtree, place, ignore_errors=True)
+        with shown_progress(progress) as shown:
+            compute = partial(task.outcome, question, progress=shown, **options)
+            if folder is not None:
+                with task.claimed(question, Path(folder)) as place:
+                    result = cls(question, compute(folder=place), place)
+                    result._write(place)
+            elif task.kept is None:
+                result = cls(question, compute(folder=None), None)
+            else:
+                place = Path(tempfile.mkdtemp(prefix="chainunit_"))
+                try:
+                    result = cls(question, compute(folder=place), place)
+                except BaseException:
+                    shutil.rmtree(place, ignore_errors=True)
+                    raise
+                weakref.finalize(result, shutil.rmtree, place, ignore_errors=True)
         failure = task.failure(result._outcome)
         if failure is not None:
             failure.partial = result
@@ -89,8 +86,16 @@ class ReportedResult(Generic[Question, Outcome]):
 
     @cached_property
     def answers(self) -> pd.DataFrame:
-        """The numbers of the answer, a row each, in SI units: the column "unit", and columns of numbers."""
-        return answers_table(self._answer_rows())
+        """The numbers of the answer, a row each, in SI units: the column "unit", and columns of numbers, NaN for one
+        that is none."""
+        import pandas as pd
+
+        table = {}
+        for name, row in self._answer_rows().items():
+            unit = next(iter(row.values()))["unit"]
+            values = {column: entry["value"] for column, entry in row.items()}
+            table[name] = {"unit": unit} | {k: float("nan") if x is None else x for k, x in values.items()}
+        return pd.DataFrame.from_dict(table, orient="index")
 
     def _answer_rows(self) -> Mapping[str, Mapping[str, Any]]:
         """By row and column, the entries of result.json that `answers` has; by default all of its single numbers."""
@@ -157,19 +162,6 @@ class ReportedResult(Generic[Question, Outcome]):
         return html.fragment(self._shown)
 
 
-def answers_table(rows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """A table with a row for each entry: its unit, and its numbers by column. A number is one of result.json, with
-    value and unit; one that is None is NaN."""
-    import pandas as pd
-
-    table = {}
-    for name, row in rows.items():
-        unit = next(iter(row.values()))["unit"]
-        values = {column: entry["value"] for column, entry in row.items()}
-        table[name] = {"unit": unit} | {k: float("nan") if x is None else x for k, x in values.items()}
-    return pd.DataFrame.from_dict(table, orient="index")
-
-
 def _single_numbers(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     for name, below in node.items():
         if isinstance(below, Mapping) and "unit" in below and "value" in below:
@@ -183,3 +175,57 @@ def _copy(file: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(target) as part:
         shutil.copyfile(file, part)
+
+
+class ResultFigure:
+    """A figure of a result. A notebook shows it as PNG; `save` writes it into a file.
+
+    `title` and `alt` describe it. Its axes are in the units of the study.
+    """
+
+    def __init__(self, figure: Figure, units: Units) -> None:
+        self._figure, self._units = figure, units
+
+    @property
+    def title(self) -> str:
+        """What the figure shows, in a line."""
+        return self._figure.title
+
+    @property
+    def alt(self) -> str:
+        """A description for a reader who does not see the figure."""
+        return self._figure.alt
+
+    def to_matplotlib(self) -> Any:
+        """A new figure of matplotlib, to be changed by the caller."""
+        return print_figures.drawn(self._figure, self._units)
+
+    def save(self, file: str | Path) -> Path:
+        """Write the figure into a file whose name ends in .png, .svg or .pdf; returns the file.
+
+        Raises
+        ------
+        InputError
+            for another ending.
+        WriteError
+            for a file that cannot be written.
+        """
+        path = named_file(file, ".png", ".svg", ".pdf")
+        with atomic_file(path) as part:
+            part.write_bytes(self._bytes(path.suffix.lower().removeprefix(".")))
+        return path
+
+    def _bytes(self, kind: str) -> bytes:
+        out = io.BytesIO()
+        # without the date the same figure is the same file
+        metadata = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
+        drawn = self.to_matplotlib()
+        with styled({"svg.hashsalt": self._figure.name}):
+            drawn.savefig(out, format=kind, metadata=metadata)
+        return out.getvalue()
+
+    def _repr_png_(self) -> bytes:
+        return self._bytes("png")
+
+    def __repr__(self) -> str:
+        return f"<Figure {self._figure.name!r}: {self.title}>"

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 from ..study.event import in_groups
+from ..study.readings import has_turn
 from ..study.record import StudyRecord
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COASTING = "_coasting"
 """The end of the name of a run of the machine alone, after the torque limiter has opened; the name begins with that
@@ -43,6 +48,16 @@ def motor_runs(study: StudyRecord) -> list[str]:
 def in_order(study: StudyRecord) -> list[str]:
     """All runs; a run in which the coupling opens is followed by that of the machine behind the open coupling."""
     return [run for name in motor_runs(study) for run in (name, name + COASTING) if run in study.runs]
+
+
+def has_steady_turns(study: StudyRecord) -> bool:
+    """Whether the study has whole turns in steady running."""
+    return "steady" in study.answers and has_turn(study.drive, study.steady)
+
+
+def from_event(study: StudyRecord, run: str) -> xr.Dataset:
+    """A run from its overload on; the whole run without one."""
+    return study.runs[run].sel(time=slice(event_time(study, run), None))
 
 
 def event_time(study: StudyRecord, run: str) -> float | None:

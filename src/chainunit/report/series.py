@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..core.files import atomic_file, netcdf
-from ..study.readings import has_turn, load_inertia, motor_shaft
+from ..study.readings import load_inertia, motor_shaft
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..work.interrupts import stoppable
-from .run_names import title
+from .run_names import has_steady_turns, title
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,16 +46,12 @@ def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
     return file
 
 
-def _has_cycle(study: StudyRecord) -> bool:
-    return "steady" in study.answers and has_turn(study.drive, study.steady)
-
-
 def tree(study: StudyRecord) -> xr.DataTree:
     """The time series of all runs, a node for each run; each variable has its unit and description."""
     import xarray as xr
 
     runs = {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
-    if _has_cycle(study):
+    if has_steady_turns(study):
         start_up = runs["/start_up"]
         runs["/start_up"] = start_up.assign_attrs({STEADY_BEGIN: float(study.steady["time"][0])})
     whole_study = xr.DataTree.from_dict(runs)
@@ -69,7 +65,7 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
     ``result.nc`` is netCDF-4 with a group per run, the `tree`.
     """
     files = []
-    if _has_cycle(study):
+    if has_steady_turns(study):
         files.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         file = folder / SERIES

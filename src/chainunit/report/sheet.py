@@ -3,7 +3,7 @@ what was not checked; the rest of the report is its annex."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,31 +33,26 @@ _LABELS = ("project", "author", "date", "revision")
 def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     """The sheet of a study with this report."""
     report_sections = {section.name: section for section in report.sections}
-    sheets = [name for part in capabilities() for name in part.on_sheet() if name in report_sections]
-    sections = [
-        *(report_sections[name] for name in _FIRST if name in report_sections),
-        *(_on_sheet(report_sections[name]) for name in sheets),
+    checked = [name for part in capabilities() for name in part.on_sheet() if name in report_sections]
+    sections = (
+        *(report_sections[name] for name in _FIRST),
+        *(_on_sheet(report_sections[name]) for name in checked),
         b.Section(
             "assumptions", "Assumptions: values that no file gives", tuple(_assumed(report_sections, study))
         ),
-        *([_basis(study)] if "basis" in report_sections else []),
+        _basis(study),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
-    ]
-    # what was not checked, and what is assumed, stand on the sheet
-    shown = {*_FIRST, *sheets, "basis", "live", "motion", "not_checked", "plots", "given"}
-    annex = [_without_figures(section) for section in report.sections if section.name not in shown]
-    annex.append(b.Section("plots", "Plots", tuple(report.figures)))
-    if "given" in report_sections:
-        annex.append(_not_assumed(report_sections["given"], study))
-    if "basis" in report_sections:
-        annex.append(b.Section("software", "Models and software", (software(study),)))
-    return Sheet(
-        report.title or capital(report.kind),
-        _title_block(study, report),
-        tuple(sections),
-        tuple(annex),
-        report.units,
     )
+    # what was not checked, and what is assumed, stand on the sheet
+    shown = {*_FIRST, *checked, "basis", "live", "motion", "not_checked", "plots", "given"}
+    annex = (
+        *(_without_figures(section) for section in report.sections if section.name not in shown),
+        b.Section("plots", "Plots", tuple(report.figures)),
+        b.Section("given", "Other given values", tuple(_not_assumed(report_sections, study))),
+        b.Section("software", "Models and software", (software(study),)),
+    )
+    title = report.title or capital(report.kind)
+    return Sheet(title, _title_block(study, report), sections, annex, report.units)
 
 
 def _on_sheet(section: b.Section) -> b.Section:
@@ -110,50 +105,35 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
 def _assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
     """The values that the files leave out, without chosen ones, which are the answer, and without the values of
     a motor of a catalogue beside its surroundings."""
-    for block in report_sections["given"].blocks if "given" in report_sections else ():
-        if isinstance(block, b.Given):
-            yield _kept(block, study, are_assumed=True)
+    yield _given(report_sections, lambda value: _is_used(value, study) and _is_assumed(value, study))
     if study.plate is not None:
         text = 'Values of the motor and chosen values: section "Other given values" of the annex.'
         yield b.Text(text, "note", "long")
 
 
-def _not_assumed(section: b.Section, study: StudyRecord) -> b.Section:
-    """The section of given values without the assumptions, which the sheet lists; a value of an event that no file
-    gives stands at the first of the events that have it."""
-    blocks = (
-        _once(_kept(block, study, are_assumed=False)) if isinstance(block, b.Given) else block
-        for block in section.blocks
-    )
-    return replace(section, heading="Other given values", blocks=tuple(blocks))
+def _not_assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
+    """The other given values; a value of an event that no file gives stands at the first of the events that have
+    it."""
+    listed: set[tuple[str, Any]] = set()
+
+    def is_shown(value: b.GivenValue) -> bool:
+        if not _is_used(value, study) or _is_assumed(value, study):
+            return False
+        if not value.name.startswith("event.") or value.origin != "declared":
+            return True
+        key = value.description, value.value.value if isinstance(value.value, Number) else value.value
+        is_first = key not in listed
+        listed.add(key)
+        return is_first
+
+    yield _given(report_sections, is_shown)
 
 
-def _once(block: b.Given) -> b.Given:
-    """The values, each value of an event that no file gives at the first event that has it."""
-    earlier: set[tuple[str, Any]] = set()
-    sections = []
-    for title, values in block.sections:
-        kept = []
-        for value in values:
-            number = value.value.value if isinstance(value.value, Number) else value.value
-            key = value.description, number
-            is_default = value.name.startswith("event.") and value.origin == "declared"
-            if not is_default or key not in earlier:
-                kept.append(value)
-            if is_default:
-                earlier.add(key)
-        if kept:
-            sections.append((title, tuple(kept)))
-    return b.Given(tuple(sections))
-
-
-def _kept(block: b.Given, study: StudyRecord, are_assumed: bool) -> b.Given:
-    kept = (
-        (title, tuple(value for value in values if _is_assumed(value, study) == are_assumed))
-        for title, used in block.sections
-        if (values := [value for value in used if _is_used(value, study)])
-    )
-    return b.Given(tuple((title, values) for title, values in kept if values))
+def _given(report_sections: dict[str, b.Section], is_shown: Callable[[b.GivenValue], bool]) -> b.Given:
+    """The given values of the report that are shown."""
+    (block,) = (block for block in report_sections["given"].blocks if isinstance(block, b.Given))
+    sections = ((title, tuple(filter(is_shown, values))) for title, values in block.sections)
+    return b.Given(tuple(section for section in sections if section[1]))
 
 
 def _is_assumed(value: b.GivenValue, study: StudyRecord) -> bool:

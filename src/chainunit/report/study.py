@@ -30,7 +30,6 @@ from .given_numbers import asked_speed, motor_title, ratio, run_settings
 from .lines import Line, Number, capital, filled, join, line, spoken
 from .live.runs import stand_in, whole_of
 from .live.study import of_study
-from .live_block import Live
 from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
@@ -53,16 +52,8 @@ def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
             section for section in sections if section.blocks or section.name not in analysis_sections()
         ]
         given = b.Section("given", "Given values", tuple(_given(b.Source(result), study)))
-        return b.Report(
-            study.config.title,
-            study.kind,
-            result,
-            (),
-            (*sections, given),
-            source=source_line(cited(Heading.of(study.config.title, study.config.file))),
-            failure=_failure(study),
-            units=study.config.units,
-        )
+        source = source_line(cited(Heading.of(study.config.title, study.config.file)))
+        return _report(study, result, [*sections, given], source)
 
 
 def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
@@ -72,20 +63,20 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
         for block in answer.blocks(study):
             if isinstance(block, b.Text) and block.central:
                 blocks.append(block)
-            elif isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
+            elif isinstance(block, b.Judgement) and block.severity in b.VERDICTS:
                 blocks.append(replace(block, form="both"))
         if study.answers:
-            table = runs.table_of_runs(study)
-            blocks.append(replace(table, rows=tuple(row for row in table.rows if row.form != "long")))
-        return b.Report(
-            study.config.title,
-            study.kind,
-            result,
-            (),
-            (b.Section("summary", "Summary", tuple(blocks)),),
-            failure=_failure(study),
-            units=study.config.units,
-        )
+            blocks.append(runs.table_of_runs(study).of_form("short"))
+        return _report(study, result, [b.Section("summary", "Summary", tuple(blocks))])
+
+
+def _report(
+    study: StudyRecord, result: Mapping[str, Any], sections: Iterable[b.Section], source: Line = ()
+) -> b.Report:
+    config, failure = study.config, _failure(study)
+    return b.Report(
+        config.title, study.kind, result, (), tuple(sections), source, failure, units=config.units
+    )
 
 
 def _failure(study: StudyRecord) -> Line:
@@ -203,7 +194,7 @@ def _live(study: StudyRecord) -> Iterator[b.Block]:
     if study.drive.foreign_machine:
         return
     config = study.config
-    yield Live(
+    yield b.Live(
         lambda: of_study(config, study.drive, config.drive, study.proposal, study.verdict),
         whole_of(stand_in(study.drive)),
     )

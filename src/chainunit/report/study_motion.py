@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -13,11 +13,10 @@ from ..mechanism.machine import MachineState
 from ..mechanism.models import CrankMotion, names_of
 from ..study.readings import crank_motion, crank_torque
 from ..study.record import StudyRecord
-from . import linkage, linkage_loads, run_names
-from .capability import capabilities
+from . import linkage, machine_picture, run_names
+from .capability import Supplement, capabilities
 from .lines import capital
 from .motion import Animation, Clip, DrawnLink, Reading
-from .supplement import Supplement
 
 _PER_SECOND = 60
 _PER_TURN = 90
@@ -37,29 +36,26 @@ def motion(study: StudyRecord) -> Animation:
     supplements = (part.supplement(study) for part in capabilities())
     supplement = next((candidate for candidate in supplements if candidate is not None), Supplement(study))
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
-    whole = machine.state(machine.inputs({"phi": angles * machine.ratio})).m
-    paths, crank = linkage.paths(whole), whole.linkage.driver
-    loads = _LOADS if linkage_loads.has_loads(whole.linkage) else ""
-    thin = f"; a thin line is the {', the '.join(paths)}" if paths else ""
-    return Animation(
-        tuple(_links(whole, supplement)),
-        linkage.supports(whole.linkage),
-        tuple(_run(study, name, interval, supplement) for name in run_names.in_order(study)),
-        turn,
-        supplement.caption or _CAPTION.format(loads, thin),
-        hanging=linkage.hanging(whole),
-        circles=((crank.bar.pin, crank.end), *whole.linkage.circles),
+    parts = machine_picture.picture(machine, whole := machine.drive(angles * machine.ratio))
+    loads = _LOADS if machine_picture.has_loads(whole) else ""
+    thin = f"; a thin line is the {', the '.join(parts.paths)}" if parts.paths else ""
+    return replace(
+        parts,
+        links=tuple(_links(parts.links, supplement)),
+        runs=tuple(_run(study, name, interval, supplement) for name in run_names.in_order(study)),
+        turn=turn,
+        caption=supplement.caption or _CAPTION.format(loads, thin),
         groups=tuple(dict.fromkeys(supplement.groups.values())),
-        names=linkage.labels(whole.linkage) | dict(supplement.names),
-        paths=paths,
-        rails=linkage.rails(whole),
+        names={**parts.names, **supplement.names},
     )
 
 
-def _links(whole: Any, supplement: Supplement) -> Iterator[DrawnLink]:
+def _links(links: Iterable[DrawnLink], supplement: Supplement) -> Iterator[DrawnLink]:
+    """The links with the joints and looks of a supplement, and then its further links."""
     others = dict(supplement.links)
-    for link in linkage.links(whole.linkage, supplement.looks):
-        yield replace(link, joints=others.pop(link.name, link.joints))
+    for link in links:
+        look = supplement.looks.get(link.name, link.look)
+        yield replace(link, joints=others.pop(link.name, link.joints), look=look)
     yield from (
         DrawnLink(name, joints, supplement.looks.get(name, "heavy")) for name, joints in others.items()
     )
@@ -92,13 +88,11 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
     loads = _loads(study, part)
     state = machine_state(study, part)
     details = supplement.details(part, state)
-    joints = {output: pin for output, (pin, _) in model.joints.items() if output not in supplement.hidden}
-    forces = linkage.arrows(
-        model.pins,
-        joints,
+    forces = machine_picture.arrows(
+        drive.machine,
         lambda output: (part[f"machine.{output}.fx"].values, part[f"machine.{output}.fy"].values),
         supplement.groups,
-        named=hasattr(model, "described_by"),
+        supplement.hidden,
     )
     has_motor, driver = name in run_names.motor_runs(study), capital(study.driver_noun)
     readings = (
@@ -118,7 +112,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         part["time"].values - (event or 0.0),
         {**linkage.places(state.m), **details.joints},
         readings,
-        (*forces, *linkage_loads.load_arrows(state), *details.arrows),
+        (*forces, *machine_picture.load_arrows(state), *details.arrows),
         details.loads,
         linkage.blocks(state.m),
         event is not None,

@@ -18,7 +18,7 @@ from ..study import provenance
 from ..study.config import Config
 from ..study.registry import modules
 from ..work.progress import TaskProgress
-from . import files, html
+from . import files
 from .blocks import Report
 from .result_kind import ResultKind
 
@@ -98,13 +98,14 @@ class Task(Generic[Question, Outcome]):
             raise InputError(
                 f"{folder}: has the result of {other.words}, which would be lost; name another folder"
             )
-        names = [html.NAME, f"{self._stem}.json", f"{self._stem}.md"]
-        names += [name for name in self.files if "*" not in name]
-        names += [provenance.FILE, provenance.COPY] if isinstance(question, Config) else [provenance.FILE]
-        return claim(folder, *names, *self.replaced(question))
+        names = files.names(self._stem, tuple(name for name in self.files if "*" not in name))
+        of_study = [provenance.COPY] if isinstance(question, Config) else []
+        return claim(folder, *names, provenance.FILE, *of_study, *self.replaced(question))
 
-    def clear(self, folder: Path) -> None:
-        """Remove the files of an earlier result from a folder, see `chainunit.core.files.clear`."""
+    def clear(self, folder: Path | None) -> None:
+        """Remove the files of an earlier result from a folder, if there is one, see `chainunit.core.files.clear`."""
+        if folder is None:
+            return
         names: list[str] = [provenance.FILE, provenance.COPY]
         for name in self.files:
             names += sorted(file.name for file in folder.glob(name)) if "*" in name else [name]
@@ -126,15 +127,11 @@ class Task(Generic[Question, Outcome]):
         with question.file.refusals() if isinstance(question, Config) else nullcontext():
             if self.accept is not None:
                 self.accept(question, **options)
-                self._clear_if_any(folder)
+                self.clear(folder)
             outcome = self.compute(question, folder, progress, **options)
         if self.accept is None:
-            self._clear_if_any(folder)
-        return outcome
-
-    def _clear_if_any(self, folder: Path | None) -> None:
-        if folder is not None:
             self.clear(folder)
+        return outcome
 
     def write(
         self, question: Question, outcome: Outcome, report: Report, folder: Path, png: bool = False

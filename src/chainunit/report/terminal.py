@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from textwrap import shorten
 
 from rich.console import Console
@@ -15,7 +16,7 @@ from rich.text import Text as Styled
 
 from ..core.unit_table import UNITS
 from ..reading.text import DEFAULT_UNITS, Units, number
-from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
+from .blocks import VERDICTS, Block, Cell, Judgement, Report, Share, Table, Text
 from .lines import Aside, Line, Name, Number, Piece, Strong, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
@@ -56,7 +57,7 @@ def _plain(piece: Piece, units: Units) -> str:
 
 def plain_cell(cell: Cell, units: Units) -> str:
     """A cell of a table as plain text."""
-    return plain_line((cell.utilisation,) if isinstance(cell, Share) else cell, units)
+    return plain_line(cell.utilisation if isinstance(cell, Share) else cell, units)
 
 
 def show(report: Report, console: Console, *, remarks: bool = True) -> None:
@@ -64,15 +65,16 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
     title = report.title
     last: list[str] = []
     for block in report.blocks("short"):
+        role = _role(block)
         if isinstance(block, Table):
             if title:
                 console.print(title, style="bold", soft_wrap=True)
             _show_table(block, console, report.units)
             title = ""
-        elif (prefix := _LAST.get(_role(block))) is not None:
-            last += [prefix + sentence for sentence in _sentences(block, report.units)]
-        elif remarks or _role(block) != "remark":
-            prefix = "Remark: " if _role(block) == "remark" else ""
+        elif role in _LAST:
+            last += [_LAST[role] + sentence for sentence in _sentences(block, report.units)]
+        elif remarks or role != "remark":
+            prefix = "Remark: " if role == "remark" else ""
             for sentence in _sentences(block, report.units):
                 console.print(prefix + sentence, soft_wrap=True)
     for sentence in last:
@@ -157,31 +159,27 @@ def _first_rows(
 ) -> str:
     """A table as the console prints it, with as many of its first rows as have room: the `size` of the text is up to
     `room`, and a row adds 1 to it at least. Empty if less than `fewest` rows, or than all, have room."""
-    rows = [row for row in table.rows if row.form != "long"]
-    low, high, best = min(fewest, len(rows)) - 1, min(len(rows), room), ""
-    count = high
-    while low < high:
-        part = replace(table, rows=tuple(rows[:count]))
+
+    @cache
+    def printed(count: int) -> str:
+        part = replace(table, rows=table.rows[:count])
         text = _printed(console, partial(_show_table, part, console, units))
-        text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
-        if count < len(rows):
-            text += f"... and {len(rows) - count} more rows\n"
-        if size(text) <= room:
-            best, low = text, count
-        else:
-            high = count - 1
-        count = (low + high + 1) // 2
-    return best
+        lines = [line.rstrip() for line in text.splitlines()]
+        lines += [f"... and {len(table.rows) - count} more rows"] if count < len(table.rows) else []
+        return "".join(f"{line}\n" for line in lines)
 
-
-_GRADES = ("good", "partly", "bad", "alarm")
-"""Severities of the judgements that are a verdict."""
+    total = len(table.rows)
+    if total <= room and size(whole := printed(total)) <= room:
+        return whole
+    counts = range(min(fewest, total), min(total - 1, room) + 1)
+    fitting = bisect_right(counts, room, key=lambda count: size(printed(count)))
+    return printed(counts[fitting - 1]) if fitting else ""
 
 
 def judgements(report: Report) -> list[str]:
     """The judgements of the answer; of a report without one the first sentence."""
     blocks = report.blocks("short")
-    graded = [block for block in blocks if _role(block) in _GRADES]
+    graded = [block for block in blocks if _role(block) in VERDICTS]
     first = [block for block in blocks if _role(block) == "plain"][:1]
     return [sentence for block in graded or first for sentence in _sentences(block, report.units)]
 
@@ -196,13 +194,11 @@ _MOST_LETTERS = 1990
 """Largest length of the text for a screen of Python."""
 
 
-def brief(report: Report, count: int, width: int = 100) -> str:
+def brief(report: Report, count: int) -> str:
     """The judgements, the texts and the tables of the short form for which there is room, as plain text, and the
     number of the warnings, `count`. A table is cut to its first rows."""
     out = io.StringIO()
-    console = Console(
-        file=out, width=width, markup=False, highlight=False, force_jupyter=False, no_color=True
-    )
+    console = Console(file=out, width=100, markup=False, highlight=False, force_jupyter=False, no_color=True)
     end = f"Warnings: {count}. " if count else ""
     end += "All numbers: answers, to_json()."
     pieces = [f"The run stopped early: {plain_line(report.failure)}."] if report.failure else []
@@ -215,7 +211,7 @@ def brief(report: Report, count: int, width: int = 100) -> str:
             text, title = (f"{title}\n{text}".lstrip("\n"), "") if text else ("", title)
         else:
             text = "\n".join(_sentences(block, report.units))
-            if _role(block) in _GRADES:
+            if _role(block) in VERDICTS:
                 text = shorten(text, max(room - 1, 80), placeholder=" ...") if len(text) >= room else text
         if text.strip() and len(text) < room:
             pieces.append(text)
@@ -236,81 +232,67 @@ def _sentences(block: Block, units: Units) -> list[str]:
 def _show_table(table: Table, console: Console, units: Units) -> None:
     """Print a table. Where it is too wide, print a table for each group of columns, with the columns of no group; a
     group whose words do not fit is parted into further tables."""
+    grids = [_grid(table, units)]
     widest = console.options.update(width=10_000)
-    title = plain_line(table.title, units)
-    count = len(table.columns) or len(table.rows[0].cells)
-    whole = _grid(table, range(count), units)
-    if console.measure(whole, options=widest).maximum <= console.width:
-        _show_grid(console, title, whole)
+    if console.measure(grids[0], options=widest).maximum > console.width:
+        parts = (part for group in _grouped(table) for part in _parted(group, units, console.width))
+        grids = [_grid(part, units, console.width) for part in parts]
+    for grid in grids:
+        if table.title:
+            console.print(Styled(plain_line(table.title, units), "italic"))
+        console.print(grid)
+
+
+def _grouped(table: Table) -> Iterator[Table]:
+    """A table for each group of columns, with the columns of no group; the table itself if it has no two groups."""
+    if len(table.groups) < 2:
+        yield table
         return
-    group_columns = {i for group in table.groups for i in group}
-    for group in table.groups if len(table.groups) > 1 else [range(count)]:
-        places = [i for i in range(count) if i not in group_columns or i in group or len(table.groups) < 2]
-        for part in _parted(table, places, units, console.width):
-            _show_grid(console, title, _grid(table, part, units, console.width))
+    grouped = {k for group in table.groups for k in group}
+    for group in table.groups:
+        yield table.of_columns(k for k in range(table.width) if k in group or k not in grouped)
 
 
-def _show_grid(console: Console, title: str, grid: Grid) -> None:
-    if title:
-        console.print(Styled(title, "italic"))
-    console.print(grid)
+def _parted(table: Table, units: Units, room: int) -> list[Table]:
+    """The table in parts that fit into the width `room`, each with the first column, where the words of all columns
+    are too wide for it; a table with notes stays whole."""
+    columns = _columns(table)
+    word_sizes = sum(max(len(word) for cell in column for word in _words(cell, units)) for column in columns)
+    if (
+        table.note_title
+        or not table.columns
+        or not table.numeric
+        or word_sizes + 3 * len(columns) + 1 <= room
+    ):
+        return [table]
+    widths = [max(len(part) for cell in column for part in _parts(cell, units)) + 3 for column in columns]
+    parts = [[0]]
+    for k in range(1, len(columns)):
+        if len(parts[-1]) > 1 and sum(widths[place] for place in (*parts[-1], k)) + 1 > room:
+            parts.append([0])
+        parts[-1].append(k)
+    return [table.of_columns(part) for part in parts]
 
 
-def _parted(table: Table, places: Sequence[int], units: Units, room: int) -> list[list[int]]:
-    """The columns at `places` in parts that fit into the width `room`, each with the first column, where the words of
-    all are too wide for it; a table with notes stays whole."""
-    if table.columns:
-        places = [i for i in places if table.columns[i].form != "long"]
-    if table.note_title or not table.columns or not table.numeric:
-        return [list(places)]
-    first, *others = places
-    rows = [row for row in table.rows if row.form != "long"]
-
-    def cells(i: int) -> list[Cell]:
-        return [_head(table.columns[i], units), *(row.cells[i] for row in rows)]
-
-    def width(i: int) -> int:
-        return max(len(part) for cell in cells(i) for part in _parts(cell, units)) + 3
-
-    word_widths = {
-        i: max(len(word) for cell in cells(i) for word in plain_cell(cell, units).split() or [""])
-        for i in places
-    }
-    if sum(word_widths.values()) + 3 * len(word_widths) + 1 <= room:
-        return [list(places)]
-    parts: list[list[int]] = [[first]]
-    for i in others:
-        if len(parts[-1]) > 1 and sum(map(width, (*parts[-1], i))) + 1 > room:
-            parts.append([first])
-        parts[-1].append(i)
-    return parts
+def _columns(table: Table) -> list[list[Cell]]:
+    """The cells of each column, the first of which is its head, and after them those of the notes."""
+    heads: list[Cell] = [column.short or column.title for column in table.columns] or [""] * table.width
+    columns = [[head, *(row.cells[k] for row in table.rows)] for k, head in enumerate(heads)]
+    return [*columns, [table.note_title, *(row.note for row in table.rows)]] if table.note_title else columns
 
 
-def _grid(table: Table, places: Sequence[int], units: Units, room: int | None = None) -> Grid:
-    """The table with its columns at `places`, narrowed to the width `room` [letters] where this is given."""
-    if table.columns:
-        places = [i for i in places if table.columns[i].form != "long"]
-    rows = [row for row in table.rows if row.form != "long"]
-    heads = [_head(table.columns[i], units) if table.columns else "" for i in places]
-    columns: list[list[Cell]] = [
-        [head, *(row.cells[i] for row in rows)] for i, head in zip(places, heads, strict=True)
-    ]
-    if table.note_title:
-        heads.append(table.note_title)
-        columns.append([table.note_title, *(row.note for row in rows)])
+def _grid(table: Table, units: Units, room: int | None = None) -> Grid:
+    """The table, narrowed to the width `room` [letters] if there is one."""
+    columns = _columns(table)
     grid = Grid(show_header=bool(table.columns))
     widths = _widths(columns, units, room) if room else [None] * len(columns)
-    of_text = [bool(table.columns) and table.columns[i].of_text for i in places]
-    for k, (head, width) in enumerate(zip(heads, widths, strict=True)):
-        right = table.numeric and 0 < k < len(places) and not of_text[k]
-        grid.add_column(head, justify="right" if right else "left", width=width)
+    for k, (column, width) in enumerate(zip(columns, widths, strict=True)):
+        is_note = k == table.width
+        right = table.numeric and k > 0 and not is_note and not (table.columns and table.columns[k].of_text)
+        grid.add_column(plain_cell(column[0], units), justify="right" if right else "left", width=width)
     for cells in zip(*(column[1:] for column in columns), strict=True):
         grid.add_row(*(plain_cell(cell, units) for cell in cells))
     return grid
-
-
-def _head(column: Column, units: Units) -> str:
-    return column.short or plain_line(column.title, units)
 
 
 def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[int]:
@@ -320,10 +302,10 @@ def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[
     texts = [[plain_cell(cell, units) for cell in column] for column in columns]
     widths = [max(map(len, column)) for column in texts]
     whole = [max(len(part) for cell in column for part in _parts(cell, units)) for column in columns]
-    word_widths = [max(len(word) for text in column for word in text.split() or [""]) for column in texts]
+    word_sizes = [max(len(word) for cell in column for word in _words(cell, units)) for column in columns]
     heads = [max(len(piece) for piece in (*column[0].split(), *column[1:], "")) for column in texts]
     borders = 3 * len(columns) + 1
-    for least in (heads, whole, word_widths):
+    for least in (heads, whole, word_sizes):
         while sum(widths) + borders > room:
             wide = [k for k, width in enumerate(widths) if width > least[k]]
             if not wide:
@@ -332,10 +314,14 @@ def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[
     return widths
 
 
+def _words(cell: Cell, units: Units) -> list[str]:
+    return plain_cell(cell, units).split() or [""]
+
+
 def _parts(cell: Cell, units: Units) -> list[str]:
     """The parts of a cell that stay on one line: words, and numbers with their units."""
     parts = [""]
-    for piece in pieces((cell.utilisation,) if isinstance(cell, Share) else cell):
+    for piece in pieces(cell.utilisation if isinstance(cell, Share) else cell):
         if isinstance(piece, Number):
             parts += _plain(piece, units).replace(" (", "\n(").split("\n")
         elif isinstance(piece, Strong | Aside):

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chainunit.report.command_options import OutputFolder
-from chainunit.report.console import carry_out, study_file
+from chainunit.report.console import OutputFolder, carry_out, study_file
 from chainunit.report.result_kind import ResultKind
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from ...report.capability import Capability, Contents
-from ...report.supplement import Supplement
+from ...report.capability import Capability, Contents, Supplement
 from ...study.analysis import Analysis
 from ...study.record import StudyRecord
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...core.planar import Link
 from ...mechanism.machine import MachineState
-from ...report.supplement import Details, Supplement
+from ...report.capability import Details, Supplement
 from ...study.record import StudyRecord
 
 ENDS = ("first end of the edge", "last end of the edge")

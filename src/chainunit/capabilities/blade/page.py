@@ -13,9 +13,9 @@ from ...reading.text import number
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report import linkage
+from ...report.analyses import angle_axis
 from ...report.cited import cited, quantity_rows
 from ...report.motion import DrawnLink
-from ...report.turn import angle_axis
 from ...study.arrays import stretches
 from ...study.record import StudyRecord
 from .analysis import BladeFindings
@@ -95,7 +95,7 @@ def _positions(machine: Machine, findings: BladeFindings, fall: float) -> Iterat
         m = machine.drive(q * machine.ratio)
         places = linkage.places(m) | edge(machine.p, m.links)
         title = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
-        yield fig.Curve(title, *_polyline((*linkage.links(m.linkage, {}), _EDGE), places), look, "o")
+        yield fig.Curve(title, *_polyline((*linkage.links(m.linkage), _EDGE), places), look, "o")
     ends = sorted(float(places[name][0]) for name in ENDS)
     low, high = ([height, height] for height in (findings.stack.table, findings.stack.top))
     yield fig.Between("stack", ends, low, high, "hatched")

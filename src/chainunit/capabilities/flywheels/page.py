@@ -10,11 +10,11 @@ from ...core.quantities import Layout
 from ...reading.text import number as number_words
 from ...report import blocks as b
 from ...report import figure as fig
+from ...report.analyses import angle_axis, last_turn
 from ...report.cited import cited, exact, number
 from ...report.given_numbers import motor_title, rating, ratio
 from ...report.lines import capital, filled, join, line
 from ...report.style import LINES
-from ...report.turn import angle_axis, last_turn
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
 from .analysis import FlywheelFindings

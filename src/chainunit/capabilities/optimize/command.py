@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...report.command_options import AllOption, OutputFolder, PicturesOption
-from ...report.console import carry_out, study_file
+from ...report.console import AllOption, OutputFolder, PicturesOption, carry_out, study_file
 from ...report.result_kind import ResultKind
 
 

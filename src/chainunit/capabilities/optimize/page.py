@@ -16,7 +16,6 @@ from ...report import figure as fig
 from ...report.cited import cited, exact, number, source_line, table
 from ...report.lines import Aside, Line, Name, filled, join, line
 from ...report.live.page import live_of_config
-from ...report.live_block import Live, LiveMachine
 from ...report.task import Task, Writer
 from ...study.config import Config, FileContents, of_tables
 from ...study.provenance import Heading
@@ -78,10 +77,10 @@ class OptimizedStudy(NamedTuple):
     def report(self) -> b.Report:
         """The report on the search."""
         config = self.config
-        live = (Live(self._live, "the best machine"),) if self.best.met else ()
+        live = (b.Live(self._live, "the best machine"),) if self.best.met else ()
         return optimum_report(self.best, config.title, config.file, config.units, live)
 
-    def _live(self) -> LiveMachine:
+    def _live(self) -> b.LiveMachine:
         source, tables = self.as_file()
         with scratch() as folder:
             return live_of_config(of_tables(tables, str(source)), folder)

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from ...report.capability import AnswerBlocks, Capability, Contents
-from ...report.supplement import Supplement
+from ...report.capability import AnswerBlocks, Capability, Contents, Supplement
 from ...study.analysis import Analysis
 from ...study.record import StudyRecord
 

@@ -11,8 +11,8 @@ from ...groups.loads import Resistance
 from ...machines.api import ChainedUnit
 from ...machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
 from ...mechanism.machine import MachineState
+from ...report.capability import Details, Supplement
 from ...report.motion import Arrow
-from ...report.supplement import Details, Supplement
 from ...study.record import StudyRecord
 
 _CAPTION = (

@@ -311,23 +311,20 @@
     });
   const baseTurn = model.turn(study), base = model.results(baseTurn);
   const placeUnit = data.turn.place;
-  // one of so many places, and the begin of the next turn
-  const xs = (turn, every) => {
-    const x = Array.from({ length: Math.ceil(turn.count / every) }, (_, k) => placeUnit.factor * turn.place[every * k] + placeUnit.offset);
-    return data.turn.turns ? [...x, 2 * Math.PI * placeUnit.factor] : x;
-  };
-  const ys = (turn, every, column, by, offset) => {
-    const y = Array.from({ length: Math.ceil(turn.count / every) }, (_, k) => by * column[every * k] + offset);
-    return data.turn.turns ? [...y, y[0]] : y;
+  // one of so many values as shown, and of a turn its `end`: the begin of the next one
+  const thinned = (count, column, by, offset, end) => {
+    const list = Array.from({ length: Math.ceil(column.length / count) }, (_, k) => by * column[count * k] + offset);
+    return data.turn.turns ? [...list, end ?? list[0]] : list;
   };
   const angleTicks = (low, high) => (high - low > 350 ? [0, 45, 90, 135, 180, 225, 270, 315, 360] : nice(low, high, 7));
   const turnPlots = data.turn.curves.map((c) => new Plot(byId("live-turn-plots"), c.title, `${data.turn.driver} ${data.turn.effort === "force" ? "place" : "angle"} in ${placeUnit.unit}`, placeUnit.unit === "°" ? angleTicks : null));
   const curvesOf = (c, turn, behind) => {
     const list = c.curves === "forces" ? ofPins.map((r) => ({ title: r.title, of: r.of, by: "" })) : c.curves;
-    const every = list.length > 2 ? 3 : 1;
+    const count = list.length > 2 ? 3 : 1;
+    const x = thinned(count, turn.place, placeUnit.factor, placeUnit.offset, 2 * Math.PI * placeUnit.factor);
     return list.map((each, look) => {
-      const by = c.factor * model.factorOf(each.by, turn), column = turn.columns[each.of];
-      return { title: behind ? "" : each.title, look, x: xs(turn, every), y: ys(turn, every, column, by, c.offset), behind };
+      const y = thinned(count, turn.columns[each.of], c.factor * model.factorOf(each.by, turn), c.offset);
+      return { title: behind ? "" : each.title, look, x, y, behind };
     });
   };
   const showTurn = (turn, isStudy) => {
@@ -405,12 +402,16 @@
     if (jam >= 0) select.value = jam;
     const measures = [...data.runs.results, ...(data.runs.trip === null ? [] : [{ name: "coupling_trip_time", title: "coupling opens after", unit: "s", factor: 1, offset: 0 }])];
     const measureCells = tableOf("live-measures", [events.length ? "from the begin of the event on" : "in steady running", "now", "the study's", "change"], measures);
-    const runPlots = ["speed", "torque", "current"].map((name) => new Plot(byId("live-run-plots"), {
-      speed: `Speed of the ${data.turn.driver}`, torque: `Torque at the ${data.turn.driver}`, current: "Current of the motor" }[name], "time in s"));
+    const unit = Object.fromEntries(data.runs.results.map((r) => [r.name, r]));
+    const SERIES = [
+      ["speed", unit.speed_least, `Speed of the ${data.turn.driver}`],
+      ["torque", unit.crank_torque_peak, `Torque at the ${data.turn.driver}`],
+      ["current", unit.current_peak, "Current of the motor"],
+    ];
+    const runPlots = SERIES.map(([, , title]) => new Plot(byId("live-run-plots"), title, "time in s"));
     const startPlot = new Plot(byId("live-run-plots"), `Start-up: speed of the ${data.turn.driver}`, "time in s");
     const anglePlot = new Plot(byId("live-run-plots"), `Peak torque over the ${data.turn.driver} angle of the event`, "angle in °", angleTicks);
     anglePlot.svg.parentElement.hidden = true;
-    const unit = Object.fromEntries(data.runs.results.map((r) => [r.name, r]));
     const eventNow = () => events[Number(select.value)] ?? null;
     const eventBox = byId("live-event-controls");
     const angleAt = () => quantities.findIndex((q) => isAngle(q) && q.event === eventNow()?.name);
@@ -474,10 +475,6 @@
       }
       return studies.get(name);
     };
-    const series = (found, name, behind, title) => {
-      const crank = found.runs.crank(found.run), r = { speed: unit.speed_least, torque: unit.crank_torque_peak, current: unit.current_peak }[name];
-      return { title, behind, look: 0, x: found.run.time, y: Array.from(crank[name], (x) => r.factor * x + r.offset) };
-    };
     const judge = (found) => {
       const box = byId("live-judged"), w = model.speedOf(good), event = eventNow();
       let text = !event ? "The motor drives the machine." : event.from_rest ? "The motor starts with it." : "The motor runs through it.", mark = "good";
@@ -499,18 +496,17 @@
       root.dataset.transient = time.toFixed(1);
       judge(found);
       fill(measures, measureCells, found.measures ?? {}, before.measures ?? {});
-      ["speed", "torque", "current"].forEach((name, n) => {
-        const r = { speed: unit.speed_least, torque: unit.crank_torque_peak, current: unit.current_peak }[name];
-        const curves = [before, found].filter((f) => f.run).map((f, k) => series(f, name, f === before && found !== before, ""));
-        runPlots[n].svg.parentElement.hidden = !curves.length;
-        if (curves.length) runPlots[n].show(curves, r.unit);
-      });
-      const speeds = [before, found].filter((f) => f.start).map((f) => {
-        const crank = f.runs.crank(f.start);
-        return { title: "", behind: f === before && found !== before, look: 0, x: f.start.time, y: Array.from(crank.speed, (x) => unit.speed_least.factor * x) };
-      });
-      startPlot.svg.parentElement.hidden = !speeds.length;
-      if (speeds.length) startPlot.show(speeds, unit.speed_least.unit);
+      // a part of the outcome, "run" or "start": that of the study behind that of now
+      const plotted = (plot, part, name, r) => {
+        const curves = [before, found].filter((f) => f[part]).map((f) => ({
+          title: "", behind: f === before && found !== before, look: 0, x: f[part].time,
+          y: Array.from(f.runs.crank(f[part])[name], (x) => r.factor * x + r.offset),
+        }));
+        plot.svg.parentElement.hidden = !curves.length;
+        if (curves.length) plot.show(curves, r.unit);
+      };
+      SERIES.forEach(([name, r], n) => plotted(runPlots[n], "run", name, r));
+      plotted(startPlot, "start", "speed", unit.speed_least);
       root.dataset.runs = String(Number(root.dataset.runs ?? 0) + 1);
     };
     let token = 0;

@@ -7,16 +7,17 @@ turn, the machine in motion, and runs with events.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from ...core.printing.javascript import program
-from ...core.quantities import variable_of
-from ...reading.text import Units
-from ...study.sections import Run
-from ..live_block import LiveMachine
-from .quantities import LiveQuantity
+from ...core.quantities import Quantity, Variable
+from ...machines.machine import Machine
+from ...reading.text import DEFAULT_UNITS, Units
+from ..blocks import LiveMachine
+from .quantities import LiveQuantity, of_machine, speed_of_crank
 from .runs import LiveRuns
-from .turn import LiveTurn
+from .turn import LiveTurn, live_turn
 
 
 def assembled(
@@ -40,7 +41,19 @@ def assembled(
     return LiveMachine(data, program(equations))
 
 
-def speed_of_crank(value: float) -> LiveQuantity:
-    """The speed of the crank [rad/s]."""
-    variable = variable_of(Run, "crank_speed")
-    return LiveQuantity(("run", "crank_speed"), variable, value, "drive", role="speed")
+def of_linkage(machine: Machine, speed: float, file: str) -> LiveMachine:
+    """The live machine of a linkage at the `speed` of its driver [rad/s, m/s]; `file` is the name of its file."""
+    model = machine.model
+    speed_quantity = speed_of_crank(speed)
+    if model.slides:
+        q = Quantity("m/s", "speed of the driver", low=0.0, high=1e3, open_low=True)
+        speed_quantity = replace(speed_quantity, variable=Variable("crank_speed", "speed of the driver", q))
+    chosen = [*of_machine("feed", model.Feed()), speed_quantity, *of_machine("machine", machine.p)]
+    copied = None
+    if model.turns and not model.slides:
+        copied = {
+            "title": model.description,
+            "system": {"machine": file},
+            "run": {"crank_speed": float(speed)},
+        }
+    return assembled(live_turn(machine, speed, DEFAULT_UNITS), None, "", chosen, copied, DEFAULT_UNITS)

@@ -14,13 +14,12 @@ from ...study.config import load as load_study
 from ...study.linkage_turn import speed_of_driver
 from .. import blocks as b
 from ..lines import line
-from ..live_block import Live, LiveMachine
-from .linkage import of_linkage
+from .machine import of_linkage
 from .runs import whole_of
 from .study import of_study, without_drive
 
 
-def live_of_config(config: Config, folder: Path) -> LiveMachine:
+def live_of_config(config: Config, folder: Path) -> b.LiveMachine:
     """The live machine of a study before any run; a drive that a capability has to choose is not known."""
     if config.motor is None:
         return without_drive(config, "the study chooses the motor; a run of the study makes the page with it")
@@ -56,13 +55,13 @@ def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
     return _report(machine.model.description, "Live linkage", "the file", live, str(file))
 
 
-def _report(title: str, kind: str, whole: str, live: LiveMachine, source: str) -> b.Report:
+def _report(title: str, kind: str, whole: str, live: b.LiveMachine, source: str) -> b.Report:
     return b.Report(
         title,
         kind,
         {"chainunit": __version__, "source": source},
         (),
-        (b.Section("live", "Try it", (Live(lambda: live, whole),)),),
+        (b.Section("live", "Try it", (b.Live(lambda: live, whole),)),),
         source=line(f"{source} · chainunit {__version__}"),
         status="no run was made",
     )

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.descriptions import of_driver
-from ...core.quantities import Variable, named_values
+from ...core.quantities import Variable, named_values, variable_of
 from ...reading.text import Units, scales, unit_text
+from ...study.sections import Run
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,12 @@ def of_machine(table: str, declared: Any, model_names: Collection[str] = ()) -> 
             full = f"machine.{v.name}"
             runs = (full,) if full in model_names else ()
             yield LiveQuantity((table, *v.name.split(".")), v, value, table, (v.name,), runs)
+
+
+def speed_of_crank(value: float) -> LiveQuantity:
+    """The speed of the crank [rad/s]."""
+    variable = variable_of(Run, "crank_speed")
+    return LiveQuantity(("run", "crank_speed"), variable, value, "drive", role="speed")
 
 
 def shown_in_unit(unit: str, kind: str, units: Units) -> dict[str, Any]:

@@ -21,9 +21,9 @@ from ...study.registry import parts_of_line
 from ...study.sections import FlywheelTable, choosing_tables
 from ...study.study_file import changed_tables
 from ...study.verdict import Verdict
-from ..live_block import LiveMachine
-from .machine import assembled, speed_of_crank
-from .quantities import LiveQuantity, of_machine
+from ..blocks import LiveMachine
+from .machine import assembled
+from .quantities import LiveQuantity, of_machine, speed_of_crank
 from .runs import live_runs, reason_without_runs, stand_in
 from .turn import live_turn
 

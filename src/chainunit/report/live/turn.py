@@ -16,7 +16,7 @@ from ...mechanism.sketch import places
 from ...reading.text import Units
 from ...study.cycle_quantities import ANGLES
 from ...study.verdict import TOPICS
-from .. import linkage
+from .. import machine_picture
 from ..lines import capital
 from .quantities import shown_in_unit
 
@@ -32,22 +32,11 @@ class LiveTurn:
     data: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class _Force:
-    """A reaction: its title, its output, the joint at which it acts, and its name in the picture."""
-
-    title: str
-    output: str
-    joint: str
-    short: str
-
-
 def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     """The turn of a machine at a constant `speed` of its driver [rad/s, m/s]."""
     model = machine.model
     low, high = model.span
-    q = np.linspace(low, high, 121)
-    whole = machine.state(machine.inputs({"phi": q * machine.ratio, "w": speed * machine.ratio})).m
+    whole = machine.drive(np.linspace(low, high, 121) * machine.ratio)
     forces = list(_forces(machine))
     model_columns = trace(model).columns
     results = list(_results(machine, forces, model_columns, units))
@@ -56,13 +45,13 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     columns = dict.fromkeys(
         [
             *(result["of"] for result in results),
-            *(f"{force.output}.{axis}" for force in forces for axis in ("fx", "fy")),
+            *(f"{force['of']}.{axis}" for force in forces for axis in ("fx", "fy")),
             *(f"{axis}({pin})" for pin in shown for axis in "xy"),
             *lines,
             *(name for pull in _pulls(model_columns) for name in pull["columns"]),
         ]
     )
-    driver = whole.linkage.driver
+    picture = machine_picture.picture(machine, whole)
     data = {
         "parameters": machine.by_name,
         "turns": bool(model.turns),
@@ -70,53 +59,44 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         "places": ANGLES if model.turns else _ON_THE_WAY,
         "speed": speed,
         "driver": model.driver_noun,
-        "effort": _effort(machine),
+        "effort": machine_picture.driver_nouns(machine)[0],
         "place": shown_in_unit("m" if model.slides else "rad", "", units),
         "results": results,
         "pulls": list(_pulls(model_columns)),
-        "forces": [
-            {"title": force.title, "of": force.output, "at": force.joint, "short": force.short}
-            for force in forces
-        ],
+        "forces": forces,
         "curves": list(_curves(machine, model_columns, units)),
         "picture": {
-            "links": [asdict(link) for link in linkage.links(whole.linkage, {})],
-            "grounds": linkage.supports(whole.linkage),
-            "hanging": linkage.hanging(whole),
-            "circles": (*[(driver.bar.pin, driver.end)] * model.turns, *whole.linkage.circles),
-            "names": linkage.labels(whole.linkage),
+            "links": [asdict(link) for link in picture.links],
+            "grounds": picture.grounds,
+            "hanging": picture.hanging,
+            "circles": picture.circles,
+            "names": picture.names,
             "joints": shown,
             "blocks": {name[5:-1]: name for name in lines if name[5:-1] in shown},
-            "paths": {
-                title: title.removeprefix("path of ")
-                for title in linkage.paths(whole, "" if model.turns else driver.end)
-            },
-            "rails": list(linkage.rails(whole)),
+            "paths": {title: title.removeprefix("path of ") for title in picture.paths},
+            "rails": list(picture.rails),
         },
     }
     return LiveTurn(model_text(model, tuple(columns)), data)
 
 
-def _effort(machine: Machine) -> str:
-    """The noun of the effort at the driver."""
-    return "force" if machine.model.slides else "torque"
-
-
-def _forces(machine: Machine) -> Iterator[_Force]:
-    model = machine.model
-    named = hasattr(model, "described_by")
-    for title, output in model.pins.items():
-        if output in model.joints:
-            yield _Force(title, output, model.joints[output][0], title if named else "")
+def _forces(machine: Machine) -> Iterator[dict[str, str]]:
+    """The reactions: title, output, joint at which it acts, and name in the picture."""
+    for output, title, joint, short in machine_picture.reactions(machine):
+        yield {"title": title, "of": output, "at": joint, "short": short}
 
 
 def _results(
-    machine: Machine, forces: list[_Force], model_columns: Any, units: Units
+    machine: Machine, forces: list[dict[str, str]], model_columns: Any, units: Units
 ) -> Iterator[dict[str, Any]]:
     """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
     the factors ``by``: the speed of the driver, or the square of the ratio."""
     model = machine.model
-    port, driver, effort = model.driver_port.unit, model.driver_noun, _effort(machine)
+    port, driver, (effort, _) = (
+        model.driver_port.unit,
+        model.driver_noun,
+        machine_picture.driver_nouns(machine),
+    )
     unit, inertia = port("N.m"), port("kg.m2")
     rows: list[tuple[str, str, str, str, str]] = [
         (f"{driver} {effort}, peak", "peak", "crank_torque", unit, ""),
@@ -137,9 +117,9 @@ def _results(
             **shown_in_unit(row_unit, "", units),
         }  # fmt: skip
     for force in forces:
-        column = f"force({force.output})"
+        column = f"force({force['of']})"
         yield {
-            "name": f"peak({column})", "title": force.title, "reduce": "peak", "of": column, "by": "",
+            "name": f"peak({column})", "title": force["title"], "reduce": "peak", "of": column, "by": "",
             "group": "pins", **shown_in_unit("N", "", units),
         }  # fmt: skip
 
@@ -161,7 +141,11 @@ def _pulls(model_columns: Any) -> Iterator[dict[str, Any]]:
 def _curves(machine: Machine, model_columns: Any, units: Units) -> Iterator[dict[str, Any]]:
     """The plots over the turn: each has curves of one unit."""
     model = machine.model
-    port, driver, effort = model.driver_port.unit, model.driver_noun, _effort(machine)
+    port, driver, (effort, _) = (
+        model.driver_port.unit,
+        model.driver_noun,
+        machine_picture.driver_nouns(machine),
+    )
     curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
     if "rocker.tau" in model_columns:
         curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
