@@ -94,6 +94,7 @@ def jet(xp: Any) -> SimpleNamespace:
         return (first, second) if size else None
 
     def atan2(y: Any, x: Any) -> Any:
+        """The angle of (x, y), with the slope (x y' - y x') / (x^2 + y^2)."""
         if (pair := both(y, x)) is None:
             return xp.atan2(y, x)
         one, other = pair
@@ -105,6 +106,7 @@ def jet(xp: Any) -> SimpleNamespace:
         )
 
     def maximum(a: Any, b: Any) -> Any:
+        """The larger of two, with the derivatives that this one has."""
         if (pair := both(a, b)) is None:
             return xp.maximum(a, b)
         (x, *slopes), (y, *others) = (one.parts for one in pair)

@@ -145,7 +145,7 @@ def driven_from(xp: Any, m: Mechanism, q: Any, w: Any, free: Free) -> DrivenLink
     return DrivenLinkage(xp, m.linkage, motions_of(xp, m.linkage, q, w, free), m.derived, m.topology)
 
 
-class DrivenState(MachineState):
+class StateOfDrivers(MachineState):
     """A linkage at one place and speed of its first driver, of which further drivers have motors of their own:
     inertia and torque are what the first one gives; energies and losses belong to the whole machine."""
 

@@ -403,6 +403,7 @@ class MachineState:
         return self._by_angle(), self._by_speed()
 
     def _by_angle(self) -> Any:
+        """The slope over the place of the first driver, which the further ones follow."""
         m, w2, field = self.m, self.w * self.w, self.steady.field
         links, pins = m.third_derivatives()
         acting = {name: body.centrifugal_slope(w2, field, links[name]) for name, body in m.bodies.items()}

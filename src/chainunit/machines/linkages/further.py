@@ -18,7 +18,7 @@ from ...core.ports import further_terminals, way_terminals
 from ...core.quantities import Value, declared_class, fields_of, group, quantity
 from ...groups.driver import Course
 from ...mechanism.curves import TableCurve
-from ...mechanism.driven import DrivenState, Free, driven_from
+from ...mechanism.driven import StateOfDrivers, Free, driven_from
 from ...mechanism.driver_ports import ROTATING, SLIDING, DriverPort
 from ...mechanism.expressions import expression, value_of
 from ...mechanism.machine import MachineState
@@ -182,13 +182,13 @@ class FurtherDrivers:
         """The outputs of all drivers in a state of the linkage, at the acceleration `a` of the first one."""
         if not self.entries:
             return {}
-        driven, values = s.driven if isinstance(s, DrivenState) else driven_from(xp, s.m, s.m.q, s.w, {}), {}
+        driven, values = s.driven if isinstance(s, StateOfDrivers) else driven_from(xp, s.m, s.m.q, s.w, {}), {}
         efforts, accelerations = driven.efforts(a), driven.accelerations(a)
         for k, entry in enumerate(self.entries, 1):
             motion = driven.motions[k]
             common = {"tau": efforts[k], "power": efforts[k] * motion.speed}
             if entry.is_free:
-                assert isinstance(s, DrivenState)
+                assert isinstance(s, StateOfDrivers)
                 (J, bias), (dJ, _) = driven.port(k, self.geared, a), s.port_slope(k, a)
                 load = {"tau_bias": bias, "J": J, "dJ_dphi": dJ, "phi0": motion.place, "w0": motion.speed}
             else:
@@ -196,7 +196,7 @@ class FurtherDrivers:
             values[self.names[entry.name]] = self.declared[entry.name](**common, **load)
         return values
 
-    def slopes_at(self, s: DrivenState, a: Any) -> dict[str, Any]:
+    def slopes_at(self, s: StateOfDrivers, a: Any) -> dict[str, Any]:
         """The slopes of the load ports of the drivers that are inputs."""
         values = {}
         for k, entry in self.free.items():

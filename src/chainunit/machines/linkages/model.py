@@ -29,7 +29,7 @@ from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
-from ...mechanism.driven import DrivenState
+from ...mechanism.driven import StateOfDrivers
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
 from ...mechanism.expressions import expression, value_of
@@ -124,7 +124,7 @@ class FileMachine(InverseMachine):
         state, further = super().state(xp, p, u, q, w), self.described_by.further
         if not (further.free or further.are_motored):
             return state
-        return DrivenState(xp, state.m, w, further.geared, further.motions(u))
+        return StateOfDrivers(xp, state.m, w, further.geared, further.motions(u))
 
     def _direct_of(self, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> DirectMachine:
         """See `InverseMachine`.
@@ -143,7 +143,7 @@ class FileMachine(InverseMachine):
             )
         return super()._direct_of(base, parameters, **more)
 
-    def _slopes(self, xp: Any, p: Any, u: Any, x: Any, s: DrivenState) -> Any:
+    def _slopes(self, xp: Any, p: Any, u: Any, x: Any, s: StateOfDrivers) -> Any:
         """The slopes of the load ports of a machine with several inputs."""
         loads = self.described_by.further.slopes_at(s, u.a / p.ratio)
         return self.parts[1].layout.cls(**vars(slopes(xp, p, u, x, s)), **loads)
@@ -255,7 +255,7 @@ class LinkageDescription(LinkageOutputs):
 
     def _parts(self, geometry: LinkGeometry, u: Any, places: Mapping[str, Any] | None = None) -> LinkageParts:
         """The parts with the drivers that are inputs at the places that `u` gives, or at `places` by name."""
-        courses = self.further.courses(geometry.values, u, places)
+        courses = self.further.courses(geometry.values, u, places) if self.further.entries else {}
         return LinkageParts(geometry, self.sides, courses)
 
     def _standing(self, xp: Any, p: Any, places: Mapping[str, Any]) -> DescribedLinkage:
