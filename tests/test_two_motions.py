@@ -14,6 +14,7 @@ from multibody import Multibody
 from scipy.interpolate import CubicSpline
 
 from chainunit import GeometryError, InputError
+from chainunit.core.engines import MATH
 from chainunit.core.native.compilers import compiler
 from chainunit.core.symbolic_trace import outputs_of
 from chainunit.fmu.export import export as export_python
@@ -508,3 +509,18 @@ def test_three_drivers_in_any_order(names):
     for key in want:
         if key.endswith((".fx", ".fy", "tau")):
             assert out[key] == pytest.approx(want[key], abs=1e-10 * size), key
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_direct_model_gives_back_the_motion(name):
+    """The torque of the inverse model drives it with the acceleration of that one; the second driver follows."""
+    machine, _ = machine_of(name, FRICTION)
+    start = inputs(machine, name, motion(machine, name, 4))
+    want, direct = machine.evaluate(start), machine.model.direct()
+    p = direct.with_derived(MATH, direct.Parameters(phi_start=start["phi"], w_start=start["w"]))
+    u = direct.input_layout.from_names({"tau": float(want["tau"]), "drag": start["drag"]})
+    (part,) = direct.evaluate(MATH, p, u, direct.begin(p, u))
+    out = direct.parts[0].layout.by_name(part)
+    assert out["a"] == pytest.approx(start["a"], rel=1e-9)
+    for key in ("other.tau", "other.phi", "other.w", "other.a", "C.fx", "kinetic_energy", "dissipated_power"):
+        assert out[key] == pytest.approx(float(want[key]), rel=1e-9), key

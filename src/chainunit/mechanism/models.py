@@ -342,6 +342,10 @@ class DirectMachine(LinkageModel):
         yield from self.inverse.requirements(xp, p)
         yield p.J_added * p.ratio * p.ratio + self.linkage(xp, p, self.Inputs()).driver.inertia, 0.0, math.inf
 
+    def state(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
+        """See `LinkageModel`; the state of the inverse model."""
+        return self.inverse.state(xp, p, u, q, w)
+
     def start_from(self, outputs: Mapping[str, float]) -> dict[str, float]:
         """Start parameters with which the direct model continues a motion of the inverse model; `outputs` gives the
         outputs and states of the inverse model at that instant by name."""
