@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from chainunit.capabilities.sides.factors import overload_factors
 from chainunit.core.engines import MATH
 from chainunit.machines.api import EMPTY, ChainUnitMachine
 from chainunit.machines.chain_unit import Feed
 from chainunit.machines.crank_rocker import half_width_range
-from chainunit.study.cycle import overload_factors
 
 from .table import PICK
 
