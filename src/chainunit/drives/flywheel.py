@@ -15,7 +15,7 @@ from .gear import GearOutputs, GearParameters, geared
 class FlywheelParameters(GearParameters):
     """Parameters of the flywheel and of the gear before it."""
 
-    J: Value = quantity("kg.m2", "inertia of the flywheel, at its own shaft", default=1.0, min=0.0)
+    J_wheel: Value = quantity("kg.m2", "inertia of the flywheel, at its own shaft", default=1.0, min=0.0)
     turns: Value = quantity(
         "1", "turns of the flywheel per turn of the machine", default=1.0, above=0.0, max=1e3
     )
@@ -31,7 +31,7 @@ class FlywheelOutputs(GearOutputs):
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> FlywheelOutputs:
     """The outputs of the gear whose load has the inertia of the flywheel, too; the torque that this takes does not
     reach the machine."""
-    J = p.J * (p.turns * p.turns)
+    J = p.J_wheel * (p.turns * p.turns)
     outputs = geared(p.ratio, replace(u.load, J=u.load.J + J), u)
     driven = outputs.driven
     return FlywheelOutputs(

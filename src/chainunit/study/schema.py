@@ -13,7 +13,7 @@ from typing import Any
 
 from ..core.declared_numbers import may_be_share
 from ..core.quantities import Variable
-from ..drives.catalogue import catalogue
+from ..drives.catalogue import packaged_motors
 from ..reading.unit_patterns import pattern, zero
 from .entry_values import MOST_FILES
 from .event import TYPES
@@ -109,7 +109,7 @@ class _Schema:
             for event in section.random_events:
                 properties[name]["properties"][event] = random
         properties["system"]["properties"]["motor"]["examples"] += [
-            motor.designation for motor in catalogue()
+            motor.designation for motor in packaged_motors()
         ]
         return {
             "$schema": "http://json-schema.org/draft-07/schema#",

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..drives.catalogue import catalogue
+from ..drives.catalogue import packaged_motors
 from ..models import MACHINES, MOTORS
 from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
@@ -26,7 +26,7 @@ def rules() -> Iterator[Schema]:
     yield from _needs(given("machine.linkage"), ends_with("machine.linkage", LINKAGE))
     for name in MACHINES:
         yield _where(machine_is(name), _of_machine(name))
-    packaged = [motor.designation for motor in catalogue()]
+    packaged = [motor.designation for motor in packaged_motors()]
     motors = motor_is(*MOTORS, *packaged) | ends_with("system.motor", FMU)
     yield from _needs(given("system.motor") & ~given("catalogue"), motors)
     for name in MOTORS:

@@ -64,7 +64,7 @@ def of_study(
     if runs:
         chosen += runs.quantities
         J = variable_of(FlywheelTable, "J")
-        role, placed = ("added", ()) if drive.flywheel_shaft.is_motor else ("", ("flywheel.J",))
+        role, placed = ("added", ()) if drive.flywheel_shaft.is_motor else ("", ("flywheel.J_wheel",))
         chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", (), placed, role))
     # names of other files are as in the study file, beside which the copy lies
     folder = Path(config.file.source).parent

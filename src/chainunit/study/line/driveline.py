@@ -134,7 +134,7 @@ class DrivelinePart(PartOfLine):
             return None
         values = Layout(Driveline).by_name(plan.table)
         del values["exponent"]
-        ratio = drive.driven_machine.ratio if plan.place == "crank" else 1.0
+        ratio = drive.ratio / drive.line.ratio if plan.place == "crank" else 1.0
         p = self.model.parameter_layout.from_names(values | {"ratio": ratio})
         part = PlacedPart(self.name, self.model, p, ratio, p.J4)
         if plan.damping_ratio is None:

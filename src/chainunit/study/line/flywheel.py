@@ -61,5 +61,5 @@ ON_MOTOR = FlywheelShaft()
 
 
 def _placed(ratio: float, J: float, turns: float) -> PlacedPart:
-    p = Flywheel.Parameters(ratio=ratio, J=J, turns=turns)
+    p = Flywheel.Parameters(ratio=ratio, J_wheel=J, turns=turns)
     return PlacedPart("flywheel", Flywheel, p, ratio, J * turns**2)
