@@ -11,10 +11,11 @@ On 60 Hz each has the same power, and the speed, power factor, torques and curre
 Its efficiency is the limit of its class for 60 Hz, or that at 50 Hz if it is higher.
 
 A second table has motors of high slip, 0.75 to 55 kW with 4 and 6 poles, for machines with a flywheel: design D of
-NEMA MG 1 with 8 to 13 % slip. Each is the circuit of the motor of its power rewound (all impedances times one factor),
-with another resistance of its cage, which has no skin effect: these two give a rated slip of 10 % and the locked-rotor
-torque that NEMA MG 1 demands of design D, 2.75 times the rated one. All else of its nameplate is of this circuit;
-frame, inertia, mass and locked-rotor time are those of the next larger motor, as the cage has to give off more heat.
+NEMA MG 1, of the class with 8 to 13 % slip. Each is the circuit of the motor of its power rewound (all impedances
+times one factor) with another resistance of its cage, which has no skin effect. The two give a rated slip of 10 % and
+the locked-rotor torque that NEMA MG 1 demands of design D, 2.75 times the rated one. All else of its nameplate is of
+this circuit; frame, inertia, mass and locked-rotor time are those of the next larger motor, as the cage gives off
+more heat.
 
 Files of the user have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
 couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`,
