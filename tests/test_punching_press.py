@@ -48,10 +48,11 @@ def test_the_stroke_takes_the_work_of_the_textbook_within_a_tenth_of_a_turn():
 
 def by_hand(designation, ratio, inertia):
     """Fluctuation of the speed, and RMS over mean torque of the motor: a motor whose torque is proportional to its
-    slip, one inertia, and a torque of the stroke that is even over a tenth of the turn; after 40 turns."""
+    slip, one inertia, and a torque of the stroke that is even over a tenth of the turn; after 40 turns. The windings
+    of a run are cold, with 1/1.31 of the resistance and of the slip of the nameplate."""
     plate = motor_of_catalogue(designation).nameplate
     synchronous = plate.synchronous / ratio
-    steepness = 0.76 * ratio * plate.torque / (synchronous - plate.speed / ratio)
+    steepness = (1.0 + 0.00393 * 80.0) * 0.76 * ratio * plate.torque / (synchronous - plate.speed / ratio)
 
     def rates(load):
         return lambda t, x: [x[1], (steepness * (synchronous - x[1]) - load) / inertia]
@@ -103,8 +104,8 @@ def test_the_program_orders_the_motor_and_flywheel_of_a_press_builder(tmp_path):
     assert 0.9 * WORK / (whole * SPEED**2) == pytest.approx(ripple, rel=0.1)
     fluctuation, uneven = by_hand(MOTOR, ratio, whole)
     assert ripple == pytest.approx(fluctuation, rel=0.06)
-    steady = numbers["answers"]["steady"]
-    assert steady["motor_torque_rms"]["value"] * 2.48 * ratio == pytest.approx(MEAN * uneven, rel=0.03)
+    rms = numbers["answers"]["steady"]["motor_torque_rms"]["value"]
+    assert rms * 2.48 * ratio == pytest.approx(MEAN * uneven, rel=0.03)
     # without one it takes several times the power
     bare = [motor_of_catalogue(c["motor"]) for c in rest if not c["flywheel"]["J"]["value"]]
     assert min(m.nameplate.power for m in bare) > 1.2 * needed
