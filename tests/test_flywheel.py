@@ -209,6 +209,13 @@ def test_a_place_that_is_not_there_is_refused(place, more, said):
     assert said in str(refusal.value)
 
 
+def test_what_has_no_flywheel_behind_the_gear_refuses_it():
+    place = f"[flywheel]\n{MACHINE}\nJ = 1.0\n"
+    with pytest.raises(InputError, match="observer: has no flywheel behind the gear"):
+        config.parse(f"{place}[observer]\n")
+    config.parse("[flywheel]\nJ = 0.1\n[observer]\n")
+
+
 SIZED = '[system]\nmachine = "KnifeDrive"\n[flywheel]\n{}\n[sizing]\n'
 
 

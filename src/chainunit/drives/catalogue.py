@@ -151,7 +151,9 @@ def offer(*files: Path) -> Offer:
     InputError
         with a line for each wrong value: the file, the line, the column, the value and the allowed range.
     """
-    items_by_kind = items_in(files, KINDS, {MOTOR_KIND.name: {motor.designation for motor in packaged_motors()}})
+    items_by_kind = items_in(
+        files, KINDS, {MOTOR_KIND.name: {motor.designation for motor in packaged_motors()}}
+    )
     return Offer(
         tuple(map(_motor, items_by_kind[MOTOR_KIND.name])),
         tuple(CatalogueGear(**vars(item)) for item in items_by_kind[GEARS.name]),

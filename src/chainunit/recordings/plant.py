@@ -208,7 +208,7 @@ def free(drive: Drive) -> Drive:
         drive,
         motor=FreeRotor,
         parameters=rotor,
-        added_inertia=drive.added_inertia - drive.inertia_on_rotor,
+        added_inertia=0.0,
         gear_inertia=0.0,
         gear_friction=0.0,
         gear_loss=0.0,

@@ -146,6 +146,10 @@ def _of_parts() -> Iterator[Rule]:
     yield Rule("feed_forward", MACHINE_FMU, NEEDS_MODEL, is_one_of("feed_forward", True))
 
 
+FLYWHEEL_BEHIND = given("flywheel.place") & ~is_one_of("flywheel.place", MOTOR)
+"""Whether the flywheel is not on the motor's shaft."""
+
+
 def _of_flywheel() -> Iterator[Rule]:
     """Rules of the shaft of the flywheel."""
     refusal = 'is of a shaft geared to the machine; add flywheel.place = "machine", or leave it out'

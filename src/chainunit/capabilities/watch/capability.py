@@ -18,7 +18,7 @@ from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.plans import Estimates, EstimateUser, PartBeside
-from ...study.rules import MOTOR_FMU, Rule, has_sides
+from ...study.rules import FLYWHEEL_BEHIND, MOTOR_FMU, Rule, has_sides
 from .observer_table import ObserverTable
 from .reading import WatchPlan, read_watch
 from .table import KEYS, WatchTable
@@ -89,6 +89,11 @@ class WatchCapability(Capability):
             "observer",
             given("driveline"),
             "takes the shaft between motor and machine for rigid; leave out [driveline] or [observer]",
+        )
+        yield Rule(
+            "observer",
+            FLYWHEEL_BEHIND,
+            'has no flywheel behind the gear; set flywheel.place = "motor", or leave it out',
         )
 
     def plan(self, reading: FileReading) -> WatchPlans:
