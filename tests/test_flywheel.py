@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from chainunit import InputError
+from chainunit.capabilities.flywheels.analysis import FlywheelFindings
 from chainunit.capabilities.sizing.table import SizingPlan
 from chainunit.core import engines
 from chainunit.core.ports import LoadPort
@@ -207,6 +208,29 @@ def test_a_place_that_is_not_there_is_refused(place, more, said):
     with pytest.raises(InputError) as refusal:
         study(0.1, place, more=more)
     assert said in str(refusal.value)
+
+
+def test_the_hand_formula_counts_at_the_shaft_of_the_flywheel():
+    """J = dE/(fluctuation w^2), less what is there, at the motor; at the machine as much more as the gear has ratio
+    squared."""
+    findings = [
+        FlywheelFindings(
+            own=0.0,
+            permitted_fluctuation=0.05,
+            swing=600.0,
+            speed=150.0,
+            bare=0.01,
+            mean_torque=1.0,
+            ratio=ratio,
+        )
+        for ratio in (1.0, RATIO)
+    ]
+    motor, machine = (each.flywheel_by_hand for each in findings)
+    assert motor == pytest.approx(600.0 / (0.05 * 150.0**2) - 0.01, rel=1e-12)
+    assert machine == pytest.approx(motor * RATIO**2, rel=1e-12)
+    for each, flywheel in zip(findings, (motor, machine), strict=True):
+        assert each.by_hand(flywheel) == pytest.approx(0.05, rel=1e-12)
+        assert each.inertia(flywheel) == pytest.approx(motor + 0.01, rel=1e-12)
 
 
 def test_what_has_no_flywheel_behind_the_gear_refuses_it():
