@@ -56,8 +56,6 @@ class FlywheelFindings(Findings):
     bare: float
     mean_torque: float
     """mean torque of the machine at the motor's shaft, at constant speed [N m]"""
-    ratio: float
-    """turns of the motor per turn of the flywheel"""
     wheels: list[Wheel] = part("the flywheels that are compared", name="compared", default_factory=list)
     least: Wheel | None = None
     is_searched: bool = False
@@ -66,6 +64,8 @@ class FlywheelFindings(Findings):
         name="retuned",
         default=False,
     )
+    ratio: float = 1.0
+    """turns of the motor per turn of the flywheel"""
 
     def by_hand(self, flywheel: float) -> float:
         """Fluctuation with that flywheel [kg m2] where the drive gives a constant torque."""
