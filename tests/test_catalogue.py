@@ -12,12 +12,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import chainunit
+from scipy.optimize import fsolve
 
 from chainunit.core import engines
 from chainunit.core.errors import InputError
 from chainunit.core.integrators import rk4
 from chainunit.core.quantities import Layout
-from chainunit.drives.catalogue import KINDS, LAYOUT, catalogue, motor_of_catalogue, offer
+from chainunit.drives.catalogue import (
+    KINDS,
+    LAYOUT,
+    catalogue,
+    high_slip_motors,
+    motor_of_catalogue,
+    offer,
+    packaged_motors,
+)
 from chainunit.drives.catalogue_rows import heading
 from chainunit.drives.gearing import KINDS as TRANSMISSIONS
 from chainunit.drives.gearing import W_REST, Transmission, geared_acceleration, motor_side
@@ -154,6 +163,74 @@ def test_a_60_hz_motor_is_the_50_hz_motor_on_other_mains(motor):
     if kW in limits:
         limit = limits[kW][round(n.poles) // 2 - 1] / 100.0
         assert n.efficiency == pytest.approx(max(limit, other.nameplate.efficiency), abs=1e-9)
+
+
+HIGH_SLIP = high_slip_motors()
+
+
+def standard_of(motor, step=0):
+    """The standard motor of the same power, poles and frequency, or the one so many steps larger."""
+    n = motor.nameplate
+    row = [m for m in MOTORS if (m.nameplate.poles, m.nameplate.frequency) == (n.poles, n.frequency)]
+    return row[[m.nameplate.power for m in row].index(n.power) + step]
+
+
+def test_high_slip_motors_are_of_design_d():
+    """NEMA MG 1, design D: a locked-rotor torque of 2.75 times the rated one; 8 to 13 % slip is a usual class of it.
+    Their heat needs the frame of the next larger motor."""
+    assert packaged_motors() == [*MOTORS, *HIGH_SLIP] and all(m.is_packaged for m in HIGH_SLIP)
+    kinds = {(m.nameplate.power, m.nameplate.poles, m.nameplate.frequency) for m in HIGH_SLIP}
+    assert len(kinds) == len(HIGH_SLIP) == 64 and {kind[1:] for kind in kinds} == {
+        (poles, f) for poles in (4.0, 6.0) for f in (50.0, 60.0)
+    }
+    for m in HIGH_SLIP:
+        n, standard, larger = m.nameplate, standard_of(m), standard_of(m, 1)
+        assert n.slip == pytest.approx(0.1, abs=1e-9) and n.locked_torque_ratio == 2.75
+        assert n.locked_current_ratio < standard.nameplate.locked_current_ratio
+        assert (n.J, n.mass, n.locked_time) == tuple(
+            getattr(larger.nameplate, name) for name in ("J", "mass", "locked_time")
+        )
+        frame, *rest = larger.designation.split(", ")[1:]
+        title = f"High-slip {n.poles:g}-pole {n.power / 1000:g} kW, {frame}"
+        assert m.designation == ", ".join([title, *rest])
+        assert motor_of_catalogue(m.designation) is m
+
+
+@pytest.mark.parametrize("motor", HIGH_SLIP[::7], ids=lambda m: m.designation)
+def test_a_high_slip_motor_is_the_standard_motor_rewound_with_another_cage(motor):
+    """Its nameplate is the circuit of the standard motor with all impedances times one factor and a cage without skin
+    effect, which have the rated torque at 10 % slip and the locked-rotor torque of design D; and its own circuit
+    meets the nameplate."""
+    n, standard = motor.nameplate, standard_of(motor).identify().parameters
+    warm = standard.ambient.T + TYPICAL.rise
+
+    def rewound(x):
+        factor, resistance = x
+        scaled = {"stator.R": standard.stator.R, "main.L": standard.main.L, "cage.L": standard.cage.L}
+        values = {name: factor * value for name, value in scaled.items()}
+        values |= {"cage.R": resistance * standard.cage.R, "cage.skin_R": 0.0}
+        values["rotor.d"] = TYPICAL.friction * n.power / n.speed**2
+        return InductionMotor.parameter_layout.from_names(values, standard)
+
+    def missing(x):
+        rated = steady(engines.MATH, rewound(x), n.speed, T=warm).tau
+        return rated / n.torque - 1.0, steady(engines.MATH, rewound(x), 0.0).tau / (2.75 * n.torque) - 1.0
+
+    solution, _, code, _ = fsolve(missing, (1.15, 5.0), full_output=True)
+    assert code == 1 and 0.9 < solution[0] < 1.45 and 1.5 < solution[1] < 12.0
+    p = rewound(solution)
+    rated, locked = steady(engines.MATH, p, n.speed, T=warm), steady(engines.MATH, p, 0.0)
+    assert rated.power_factor == pytest.approx(n.power_factor, abs=0.001)
+    assert n.power / rated.supply_power == pytest.approx(n.efficiency, abs=0.001)
+    assert locked.i / rated.i == pytest.approx(n.locked_current_ratio, abs=0.006)
+    assert breakdown(p, T=warm).tau / n.torque == pytest.approx(n.breakdown_ratio, abs=0.006)
+    own = motor.identify()
+    assert abs(own.worst[1]) < 0.02
+    for share in (0.98, 0.95, 0.9, 0.0):
+        torques = [
+            steady(engines.MATH, each, share * n.synchronous, T=warm).tau for each in (p, own.parameters)
+        ]
+        assert torques[1] == pytest.approx(torques[0], abs=0.02 * n.torque), share
 
 
 def test_values_vary_smoothly_with_size():

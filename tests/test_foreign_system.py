@@ -27,6 +27,8 @@ from chainunit.study.choice import choose, drive_of
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.readings import crank_motion, crank_torque, largest_torque, pull_out_torque
+from chainunit.study.rig import Rig
+from chainunit.study.verdict import RESIDUAL
 from chainunit.system import (
     CoSimulation,
     ModelExchange,
@@ -590,6 +592,24 @@ def test_a_reference_in_another_unit_is_refused(file, tmp_path):
     )
     with pytest.raises(InputError, match=r"x\.fmu: w_ref is in rpm; must be in rad/s to be joined"):
         foreign_component(other, "motor")
+
+
+def test_a_flywheel_sits_behind_a_foreign_motor(file, tmp_path):
+    """Its rotor takes none; on the shaft of the machine it is a part of the system."""
+    text = f'[system]\nmotor = "{file}"\n[flywheel]\nJ = 2.0\n'
+    with pytest.raises(InputError, match=r'takes no flywheel.*, or set flywheel\.place = "machine"'):
+        drive_of(config.parse(text))
+    read = config.parse(f'{text}place = "machine"\n')
+    drive = drive_of(read)
+    files, _ = export_drive(drive, tmp_path)
+    rig = Rig(read.operation, drive, files)
+    assert list(rig.system.components) == ["machine", "flywheel", "motor"]
+    with rig.from_rest() as simulation:
+        motion = simulation.run(0.3, rig.step)
+    turned = motion["flywheel.driven.w"].values
+    assert turned[-1] > 0.0
+    assert motion["flywheel.kinetic_energy"].values == pytest.approx(turned**2, rel=1e-9)
+    assert max(rig.residuals(motion).values()) < RESIDUAL
 
 
 def test_a_study_that_asks_for_more_is_refused(file):

@@ -44,6 +44,7 @@ KINDS = {
     "knife_drive": ["RRR", "triad"],
     "level_luffing_crane": ["RRR"],
     "pump_jack": ["RRR"],
+    "punching_press": ["RRP"],
     "scissor_lift": ["cylinder", "RRP", "RRR", "RPR"],
     "scotch_yoke_pump": ["RPP"],
     "slider_crank_press": ["RRP"],

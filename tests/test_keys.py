@@ -109,6 +109,8 @@ def _one_key(table, key):
         system = "[driveline]\n"
     if table.name == "chain":
         system = 'organ = "chain"\n'
+    if (table.name, key.name) == ("flywheel", "turns"):
+        return f"[flywheel]\nplace = 'machine'\n{key.name} = {key.left_out}\n"
     if not table.name:
         return f"{key.name} = {key.left_out}"
     if table.name == "system":
@@ -207,7 +209,7 @@ def test_a_bare_number_has_its_unit_in_the_comment_and_a_text_has_not():
         "# crank O1-A: mass [kg]; distance of the centroid from the pin named first, along the link; "
         "moment of inertia about the centroid [kg m2]"
     )
-    assert flywheel.endswith("on the motor shaft [kg m2]")
+    assert flywheel.endswith("at its own shaft [kg m2]")
 
 
 def test_each_line_of_the_full_example_has_a_comment():

@@ -10,6 +10,13 @@ motors, and at 50 Hz below the limits of IEC 60034-12 (design N).
 On 60 Hz each has the same power, and the speed, power factor, torques and currents of its circuit with that supply.
 Its efficiency is the limit of its class for 60 Hz, or that at 50 Hz if it is higher.
 
+A second table has motors of high slip, 0.75 to 55 kW with 4 and 6 poles, for machines with a flywheel: design D of
+NEMA MG 1, of the class with 8 to 13 % slip. Each is the circuit of the motor of its power rewound (all impedances
+times one factor) with another resistance of its cage, which has no skin effect. The two give a rated slip of 10 % and
+the locked-rotor torque that NEMA MG 1 demands of design D, 2.75 times the rated one. All else of its nameplate is of
+this circuit; frame, inertia, mass and locked-rotor time are those of the next larger motor, as the cage gives off
+more heat.
+
 Files of the user have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
 couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`,
 `chainunit.drives.catalogue_flexible`).
@@ -75,6 +82,8 @@ MOTOR_KIND = CatalogueKind(
         },
     ),
 )
+STANDARD, HIGH_SLIP = "motors.csv", "high_slip_motors.csv"
+"""Files with the packaged motors."""
 KINDS = (MOTOR_KIND, GEARS, COUPLINGS, FLEXIBLE)
 """The kinds of things in catalogues."""
 
@@ -97,7 +106,7 @@ class CatalogueMotor:
     @property
     def is_packaged(self) -> bool:
         """Whether it is one of the packaged motors, which nobody sells."""
-        return self in _packaged()
+        return self in packaged_motors()
 
     def identify(self) -> Identification:
         """The equivalent circuit of the motor; see `chainunit.drives.nameplate.identify`.
@@ -142,7 +151,9 @@ def offer(*files: Path) -> Offer:
     InputError
         with a line for each wrong value: the file, the line, the column, the value and the allowed range.
     """
-    items_by_kind = items_in(files, KINDS, {MOTOR_KIND.name: {motor.designation for motor in _packaged()}})
+    items_by_kind = items_in(
+        files, KINDS, {MOTOR_KIND.name: {motor.designation for motor in packaged_motors()}}
+    )
     return Offer(
         tuple(map(_motor, items_by_kind[MOTOR_KIND.name])),
         tuple(CatalogueGear(**vars(item)) for item in items_by_kind[GEARS.name]),
@@ -152,14 +163,24 @@ def offer(*files: Path) -> Offer:
 
 
 def catalogue(*files: Path) -> list[CatalogueMotor]:
-    """The packaged motors, followed by the motors of these files, see `offer`.
+    """The packaged motors without those of high slip, followed by the motors of these files, see `offer`.
 
     Raises
     ------
     InputError
         see `offer`.
     """
-    return [*_packaged(), *offer(*files).motors]
+    return [*_packaged(STANDARD), *offer(*files).motors]
+
+
+def high_slip_motors() -> list[CatalogueMotor]:
+    """The packaged motors of high slip."""
+    return list(_packaged(HIGH_SLIP))
+
+
+def packaged_motors() -> list[CatalogueMotor]:
+    """All packaged motors."""
+    return [*_packaged(STANDARD), *_packaged(HIGH_SLIP)]
 
 
 def motor_of_catalogue(
@@ -173,7 +194,7 @@ def motor_of_catalogue(
     InputError
         for an unknown designation, in one line with the nearest ones; and see `catalogue`.
     """
-    motors = {m.designation: m for m in catalogue(*files)}
+    motors = {m.designation: m for m in (*catalogue(*files), *high_slip_motors())}
     if designation not in motors:
         near = difflib.get_close_matches(designation, motors, n=3, cutoff=0.0)
         hint = near_name(designation, (*motors, *others))
@@ -202,8 +223,8 @@ def check_own(files: Sequence[Path]) -> Offer:
 
 
 @cache
-def _packaged() -> tuple[CatalogueMotor, ...]:
-    name, faults = "motors.csv", Faults()
+def _packaged(name: str) -> tuple[CatalogueMotor, ...]:
+    faults = Faults()
     rows = [row for _, kind_rows in csv_rows(packaged(name), name, [MOTOR_KIND], faults) for row in kind_rows]
     motors = MOTOR_KIND.items(rows, (), faults)
     faults.refuse()

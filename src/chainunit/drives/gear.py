@@ -6,9 +6,11 @@ from typing import Any
 
 from ..core.model import Model, Part
 from ..core.ports import (
+    LoadPort,
     PortSlopes,
     PortValues,
     ShaftInput,
+    ShaftMotion,
     line_terminals,
     load_inertia,
     load_torque,
@@ -44,10 +46,10 @@ class GearOutputs(PortSlopes, PortValues):
     driven: SlowShaft = group(SlowShaft, "driven shaft")
 
 
-def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> GearOutputs:
-    """The load port of the machine as the motor sees it: the motor's angle and speed are `ratio` times larger, its
-    torque so much smaller; a derivative by its angle, speed or acceleration divides by the ratio once more."""
-    ratio, load = p.ratio, u.load
+def geared(ratio: Any, load: LoadPort, u: ShaftMotion) -> GearOutputs:
+    """The `load` port of the machine as the motor with the motion `u` sees it: the motor's angle and speed are
+    `ratio` times larger, its torque so much smaller; a derivative by its angle, speed or acceleration divides by the
+    ratio once more."""
     phi, w, a = u.phi / ratio, u.w / ratio, u.a / ratio
     tau = load_inertia(load, phi) * a + load_torque(load, phi, w)
     return GearOutputs(
@@ -62,6 +64,10 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> GearOutputs:
         power=tau * w,
         driven=SlowShaft(phi=phi, w=w, a=a, tau=tau),
     )
+
+
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> GearOutputs:
+    return geared(p.ratio, u.load, u)
 
 
 Gear = Model(

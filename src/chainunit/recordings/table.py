@@ -18,7 +18,7 @@ from ..reading.tables import instance
 from ..study.conditions import given
 from ..study.file_section import filled_text
 from ..study.organs import finer_models
-from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen
+from ..study.rules import FLYWHEEL_BEHIND, MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen
 from .measurands import COLUMNS as READABLE
 from .recording import Recording, read_signal, with_rms
 
@@ -78,6 +78,7 @@ def recording_rules(table: str) -> Iterator[Rule]:
         (MOTOR_FMU, "motor is an FMU"),
         (motor_is_chosen(), "motor is not known before it is chosen"),
         (given("driveline"), "driveline stands between motor and machine"),
+        (FLYWHEEL_BEHIND, 'flywheel is not on the motor\'s shaft (flywheel.place = "motor")'),
         *((model.is_chosen, model.phrase) for model in finer_models()),
     ):
         yield Rule(

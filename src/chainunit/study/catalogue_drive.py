@@ -99,6 +99,7 @@ def catalogue_drive(
         gear_loss=gear_with(tables, ratio, offer).loss,
         transmission=transmission_of(tables, ratio, offer),
         star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
+        flywheel_shaft=tables.flywheel_shaft,
     )
 
 
@@ -149,9 +150,9 @@ def usual_boost(p: Any, plate: Nameplate) -> float:
 
 
 def with_inertia(tables: DriveTables, drive: Drive, added: float) -> Drive:
-    """The drive with that inertia added to the motor's shaft [kg m2]. Slip compensation raises the frequency in each
-    peak of the load, where the inertia has to slow down to give its energy: with an added one there is none, unless
-    the file gives it."""
+    """The drive with a flywheel of that inertia at its own shaft [kg m2]. Slip compensation raises the frequency in
+    each peak of the load, where the flywheel has to slow down to give its energy: with one there is none, unless the
+    file gives it."""
     drive = replace(drive, added_inertia=added)
     if not added or tables.start != "inverter" or drive.rated_current is None or SLIP in tables.given:
         return drive

@@ -47,6 +47,7 @@ from .event import Event
 from .event_table import read_events
 from .file_section import FileSection
 from .foreign_machine import ForeignMachine, ForeignModel
+from .line.flywheel import FlywheelShaft
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
 from .operation import DriveTables, OperatingConditions
 from .parts import (
@@ -411,6 +412,7 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
             feed_forward=checked.feed_forward,
             start=checked.start,
             given=contents.given,
+            flywheel_shaft=FlywheelShaft(checked.flywheel.place, float(values["flywheel"].turns)),
             **{name: of_study[name] for name in _OF_DRIVE},
         ),
         events=events,

@@ -23,6 +23,7 @@ from ..machines.machine import Machine
 from ..system import Bond, Component, FmuComponent, ModelComponent, Profile, System, in_line, torque_names
 from ..system.graph import Connection
 from .foreign_machine import ForeignMachine
+from .line.flywheel import ON_MOTOR, FlywheelShaft
 from .line.placed import Line, PlacedPart
 
 
@@ -59,9 +60,11 @@ class Drive:
     """the tuning of the gains of its control, where they were tuned"""
 
     line: Line = field(default_factory=Line)
+    """its parts that have a table, without the flywheel"""
 
     added_inertia: float = 0.0
-    """inertia that is added to the motor's shaft [kg m2]"""
+    """inertia of the flywheel at its own shaft [kg m2]"""
+    flywheel_shaft: FlywheelShaft = ON_MOTOR
 
     gear_inertia: float = 0.0
     gear_friction: float = 0.0
@@ -102,25 +105,46 @@ class Drive:
     @cached_property
     def driven_machine(self) -> Machine:
         """The machine as its FMU has it: with the gear ratio that remains behind the line."""
-        if not self.line:
+        if not self._mounted_line:
             return self.machine
-        return self.machine.replace(ratio=self.ratio / self.line.ratio)
+        return self.machine.replace(ratio=self.ratio / self._mounted_line.ratio)
+
+    @cached_property
+    def _mounted_line(self) -> Line:
+        """The line with the flywheel, if it is on another shaft than the motor's."""
+        return self.flywheel_shaft.mounted(self.line, self.ratio, self.added_inertia)
+
+    @property
+    def inertia_on_rotor(self) -> float:
+        """Inertia of the flywheel if it is on the motor's shaft [kg m2], else 0."""
+        return self.added_inertia if self.flywheel_shaft.is_motor else 0.0
+
+    @property
+    def flywheel_ratio(self) -> float:
+        """Turns of the motor per turn of the flywheel."""
+        return self.flywheel_shaft.ratio(self.line, self.ratio)
+
+    @property
+    def inertia_behind(self) -> float:
+        """Inertia of the flywheel at the motor's shaft if it is on another one [kg m2], else 0."""
+        return (self.added_inertia - self.inertia_on_rotor) / self.flywheel_ratio**2
 
     @cached_property
     def fmu_parameters(self) -> Any:
-        """Parameters of the motor's FMU: the parameters of the motor, with gear and added inertia in the rotor."""
+        """Parameters of the motor's FMU: the parameters of the motor, with gear and the flywheel on its shaft in the
+        rotor."""
         p = self.parameters
-        if self.added_inertia or self.gear_inertia or self.gear_friction:
-            J = p.rotor.J + self.gear_inertia + self.added_inertia
+        if self.inertia_on_rotor or self.gear_inertia or self.gear_friction:
+            J = p.rotor.J + self.gear_inertia + self.inertia_on_rotor
             p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + self.gear_friction))
         return replace(p, gear=replace(p.gear, loss=self.gear_loss)) if self.gear_loss else p
 
     @property
     def rotor_inertia(self) -> float:
-        """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor and gear, the added one, and of
-        the parts of the line."""
+        """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor, gear, flywheel, and of the parts
+        of the line."""
         self.needs_own("the inertia of its rotor")
-        return float(self.fmu_parameters.rotor.J + self.line.at_motor(0.0))
+        return float(self.fmu_parameters.rotor.J + self._mounted_line.at_motor(0.0))
 
     def needs_own(self, quantity: str) -> None:
         """Refuse a `quantity`, named in words, that only a motor of this package has.
@@ -196,13 +220,13 @@ class Drive:
 
     @cached_property
     def whole_line(self) -> Line:
-        """The line with the gear before a foreign machine that has none. Behind other parts its ratio may be 1: the
-        twin with a rigid shaft puts that of the driveline there."""
-        machine = self.foreign_machine
+        """The line with the flywheel, and the gear before a foreign machine that has none. Behind other parts its
+        ratio may be 1: the twin with a rigid shaft puts that of the driveline there."""
+        machine, line = self.foreign_machine, self._mounted_line
         if machine is None or machine.model.has_gear() or not (self.line or machine.needs_gear):
-            return self.line
+            return line
         gear = Gear.Parameters(ratio=machine.ratio)
-        return self.line.behind(PlacedPart("gear", Gear, gear, machine.ratio))
+        return line.behind(PlacedPart("gear", Gear, gear, machine.ratio))
 
     @cached_property
     def motor_bond(self) -> Bond:
@@ -229,7 +253,7 @@ class Drive:
     @property
     def ratio_at_machine(self) -> float:
         """Turns of the shaft that drives the machine's component per turn of the crank."""
-        return self.driven_machine.ratio if self.whole_line is self.line else 1.0
+        return self.driven_machine.ratio if self.whole_line is self._mounted_line else 1.0
 
     def crank_output(self, quantity: Literal["phi", "w"]) -> tuple[str, float]:
         """Name of the angle ("phi") or speed ("w") that turns the machine in a run, and its ratio to that of the

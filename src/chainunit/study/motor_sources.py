@@ -45,7 +45,7 @@ class MotorSource(ABC):
 
     @abstractmethod
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
-        """The machine with this motor and the flywheel on its shaft; `turn` is the turn of the machine in normal
+        """The machine with this motor and the flywheel; `turn` is the turn of the machine in normal
         running."""
 
     @abstractmethod
@@ -72,6 +72,7 @@ class OwnMotor(MotorSource):
             feed_forward=tables.feed_forward,
             gear_loss=float(p.gear.loss),
             added_inertia=tables.added_inertia,
+            flywheel_shaft=tables.flywheel_shaft,
         )
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
@@ -125,8 +126,11 @@ class ForeignMotor(MotorSource):
         """See `MotorSource`; also refused is a quantity that only a motor of this package has."""
         inputs = self.component.connectors
         with refusal_prefix("system.motor: ", "system.motor"):
-            if tables.flywheel is not None:
-                raise InputError(f"{self.file}: its rotor takes no flywheel; leave [flywheel] out")
+            if tables.flywheel is not None and tables.flywheel_shaft.is_motor:
+                raise InputError(
+                    f"{self.file}: its rotor takes no flywheel; leave [flywheel] out, or set "
+                    'flywheel.place = "machine"'
+                )
             for part in registered():
                 if refusal := part.not_with_foreign_motor(plans[part.name]):
                     raise InputError(f"{self.file}: {refusal}")
@@ -134,9 +138,18 @@ class ForeignMotor(MotorSource):
                 raise InputError(f"{self.file}: has no input tau_ff in N.m; leave feed_forward out")
 
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
-        """See `MotorSource`; a study with a flywheel is refused."""
-        motor, fed = self.component, tables.feed_forward
-        return Drive(FOREIGN, None, machine, "w_ref" in motor.connectors, feed_forward=fed, foreign=motor)
+        """See `MotorSource`; a study with a flywheel on its rotor is refused."""
+        motor = self.component
+        return Drive(
+            FOREIGN,
+            None,
+            machine,
+            "w_ref" in motor.connectors,
+            feed_forward=tables.feed_forward,
+            added_inertia=tables.added_inertia,
+            flywheel_shaft=tables.flywheel_shaft,
+            foreign=motor,
+        )
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """Nothing follows."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..drives.gearing import Transmission
+from .line.flywheel import FlywheelShaft
 from .sections import Coupling, FlywheelTable, Run, Starter
 
 
@@ -64,12 +65,13 @@ class DriveTables:
     """one of `chainunit.study.sections.STARTS`"""
     starter: Starter
     flywheel: FlywheelTable | None
+    flywheel_shaft: FlywheelShaft
     given: Set[str] = field(compare=False)
     """names of all values that the file sets, such as "gear.ratio\""""
 
     @property
     def added_inertia(self) -> float:
-        """Inertia of the flywheel on the motor's shaft [kg m2]; 0 without one."""
+        """Inertia of the flywheel at its own shaft [kg m2]; 0 without one."""
         return 0.0 if self.flywheel is None else float(self.flywheel.J)
 
     @property

@@ -195,12 +195,14 @@ def _mean_supply(drive: Drive, run: Dataset) -> list[float]:
 
 def energy_behind(drive: Drive, run: Dataset) -> Any:
     """Kinetic and potential energy of the machine, and of the line before it [J], shape (time,). The energy of a part
-    that does not tell it, as a foreign FMU may, is left out."""
+    that does not tell it, as a foreign FMU may, is left out; a flywheel has no potential energy."""
     held = np.zeros(run.sizes["time"])
     for part in ("machine", *(part.name for part in drive.line)):
         names = [f"{part}.{kind}_energy" for kind in ("kinetic", "potential")]
         if set(names) <= set(run):
             held = held + run[names[0]].values + run[names[1]].values
+    if (name := "flywheel.kinetic_energy") in run:
+        held = held + run[name].values
     return held
 
 

@@ -24,8 +24,9 @@ from .conditions import (
     is_one_of,
 )
 from .foreign_machine import ForeignModel
+from .line.flywheel import MACHINE, MOTOR
 from .parts import FMU, Parts, parts_of
-from .registry import registered
+from .registry import parts_of_line, registered
 from .sections import choosing_tables
 
 
@@ -120,7 +121,7 @@ def all_rules() -> tuple[Rule, ...]:
 def _with_motors(names: tuple[str, ...]) -> tuple[Rule, ...]:
     """The rules for the registered motors of these names."""
     of_registered = (rule for part in registered() for rule in part.rules())
-    return (*_of_parts(), *_of_sides(), *_of_motors(), *of_registered)
+    return (*_of_parts(), *_of_flywheel(), *_of_sides(), *_of_motors(), *of_registered)
 
 
 BESIDE_MOTOR = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
@@ -143,6 +144,22 @@ def _of_parts() -> Iterator[Rule]:
     yield Rule("feed_forward", MACHINE_FMU, NEEDS_MODEL, is_one_of("feed_forward", True))
 
 
+FLYWHEEL_BEHIND = given("flywheel.place") & ~is_one_of("flywheel.place", MOTOR)
+"""Whether the flywheel is not on the motor's shaft."""
+
+
+def _of_flywheel() -> Iterator[Rule]:
+    """Rules of the shaft of the flywheel."""
+    refusal = 'is of a shaft geared to the machine; add flywheel.place = "machine", or leave it out'
+    yield Rule("flywheel.turns", ~is_one_of("flywheel.place", MACHINE), refusal)
+    names = [part.name for part in parts_of_line()]
+    for name in names:
+        refusal = f"names a part of the line that is not there; add [{name}], or give {MOTOR} or {MACHINE}"
+        yield Rule("flywheel.place", ~given(name), refusal, is_one_of("flywheel.place", name))
+    refusal = f"sizing tries flywheels of the {MOTOR} or of the {MACHINE}; give one of the two"
+    yield Rule("flywheel.place", motor_is_chosen(), refusal, is_one_of("flywheel.place", *names))
+
+
 def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
     yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
@@ -158,8 +175,8 @@ def _of_motors() -> Iterator[Rule]:
     deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
     refusal = "a motor of the type {type} has no input for the torque; leave it out"
     chosen, switched_on = motor_is_chosen(), is_one_of("feed_forward", True)
-    found = "sizing finds its own; leave out one of the two"
-    yield Rule("flywheel", chosen, found, has_entries("flywheel"))
+    for key in ("J", "fluctuation", "compare"):
+        yield Rule(f"flywheel.{key}", chosen, "sizing finds its own; leave out one of the two")
     yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), refusal, switched_on)
     keys = " or ".join([*(f"[{table}]" for table in choosing_tables()), "system.motor"])
     for name in ("gear", "start", "starter", "catalogue"):

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..core.declared_numbers import may_be_share
 from ..core.quantities import Variable
-from ..drives.catalogue import catalogue
+from ..drives.catalogue import packaged_motors
 from ..models import MACHINES, MOTORS
 from ..reading.unit_patterns import pattern, zero
 from .conditions import Condition, Schema, ends_with, given, is_one_of
@@ -38,7 +38,7 @@ def rules() -> Iterator[Schema]:
     yield _where(given("machine.linkage"), ends_with("machine.linkage", LINKAGE).schema())
     for name in MACHINES:
         yield _where(machine_is(name), _of_machine(name))
-    packaged = [motor.designation for motor in catalogue()]
+    packaged = [motor.designation for motor in packaged_motors()]
     motors = motor_is(*MOTORS, *packaged) | ends_with("system.motor", FMU)
     yield _where(given("system.motor") & ~given("catalogue"), motors.schema())
     for name in MOTORS:
@@ -150,7 +150,7 @@ class _Schema:
             for event in section.random_events:
                 properties[name]["properties"][event] = random
         properties["system"]["properties"]["motor"]["examples"] += [
-            motor.designation for motor in catalogue()
+            motor.designation for motor in packaged_motors()
         ]
         return {
             "$schema": "http://json-schema.org/draft-07/schema#",

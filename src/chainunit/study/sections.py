@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, Literal
 
@@ -17,7 +18,8 @@ from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
 from .file_section import FileNames, FileSection, numbers
-from .registry import organ_models, registered
+from .line.flywheel import MACHINE, MOTOR
+from .registry import organ_models, parts_of_line, registered
 
 
 @declaration
@@ -81,9 +83,16 @@ class Coupling:
 
 @declaration
 class FlywheelTable:
-    """A flywheel on the motor's shaft, and the fluctuation for which the least one is searched."""
+    """A flywheel, and the fluctuation for which the least one is searched."""
 
-    J: Value = quantity("kg.m2", "inertia of the flywheel, on the motor shaft", default=0.0, min=0.0, max=1e6)
+    J: Value = quantity("kg.m2", "inertia of the flywheel, at its own shaft", default=0.0, min=0.0, max=1e6)
+    turns: Value = quantity(
+        "1",
+        "turns of the flywheel per turn of the {driver}, if it sits on a faster shaft of the machine",
+        default=1.0,
+        min=0.01,
+        max=100.0,
+    )
     fluctuation: Value = quantity(
         "1",
         "permitted fluctuation of the speed, (largest - least)/mean",
@@ -254,7 +263,16 @@ def all_sections() -> dict[str, FileSection]:
         tables |= {
             name: part_section for name, part_section in part_tables.items() if part_section.before == table
         } | {table: section}
+    flywheel = tables["flywheel"]
+    tables["flywheel"] = replace(flywheel, keys={**flywheel.keys, "place": _places_of_flywheel()})
     return tables | part_tables
+
+
+def _places_of_flywheel() -> tuple[Any, Any]:
+    """The key `place` of the flywheel."""
+    parts = (part.name for part in parts_of_line())
+    text = "shaft that it is on: of the motor, behind a part of the line, or of the machine"
+    return Literal[(MOTOR, *parts, MACHINE)], Field(MOTOR, description=text)
 
 
 def choosing_tables() -> list[str]:

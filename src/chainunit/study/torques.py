@@ -33,9 +33,9 @@ def on_coupling(drive: Drive, run: Dataset) -> float:
 
 
 def gear_torque(drive: Drive, run: Dataset) -> Any:
-    """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where the
-    driveline is there, else at the crank."""
-    behind_gear = bool(drive.line) and drive.driven_machine.ratio == 1.0
+    """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where
+    driveline or flywheel are there, else at the crank."""
+    behind_gear = bool(drive.whole_line) and drive.driven_machine.ratio == 1.0
     return run[drive.motor_torque].values * drive.ratio if behind_gear else crank_torque(drive, run)
 
 

@@ -349,7 +349,7 @@ def made(name, power=2200.0, poles=4.0, flywheel=0.0, used=0.5, **more):
     motor = dataclasses.replace(
         motor, designation=name, nameplate=dataclasses.replace(motor.nameplate, **plate)
     )
-    drive = SimpleNamespace(added_inertia=flywheel, ratio=50.0, follows=False)
+    drive = SimpleNamespace(added_inertia=flywheel, ratio=50.0, follows=False, flywheel_ratio=1.0)
     checks = {"temperature": Check("heat", used, 1.0, "1"), "crank_speed": Check("speed", 0.95, 1.0, "1")}
     measured = {name: more.pop(name) for name in ("relay_seconds", "frequency") if name in more}
     trial = TrialResult(checks, **({"relay_seconds": 2.7} | measured))

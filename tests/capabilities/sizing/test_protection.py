@@ -55,6 +55,7 @@ from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
 from chainunit.study.events import one_sided_event
 from chainunit.study.judgement import motor_verdict
+from chainunit.study.line.flywheel import FlywheelShaft
 from chainunit.study.measures import read_answers, stall
 from chainunit.study.readings import crank_torque, largest_torque, pull_out_torque
 from chainunit.study.relay import CLASSES, MULTIPLE, class_holding, relay_trip, stall_trip, start_seconds
@@ -875,9 +876,12 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
         gear_words="worm gear",
         disc=True,
         flywheel_words="0.300 kg m² (steel disc of 22.1 kg, 0.330 m in diameter)",
+        drive=SimpleNamespace(flywheel_shaft=FlywheelShaft()),
     )
     drive = SizedDrive(best, False, "crank", None, False, protection=protection)
     assert drive.sentence.startswith("Motor: M, ratio 50 (worm gear); ") and drive.sentence.endswith(ending)
+    best.drive.flywheel_shaft = FlywheelShaft("machine", 9.0)
+    assert "; flywheel on the machine shaft 0.300 kg m²" in drive.sentence
 
 
 def test_a_relay_of_a_star_delta_starter_has_its_place():

@@ -155,17 +155,18 @@ def test_the_heat_of_a_start_does_not_depend_on_how_long_the_machine_idles(windo
 
 @dataclasses.dataclass
 class Wheeled:
-    """Stands for the drive of a candidate: the inertia on the motor's shaft."""
+    """Stands for the drive of a candidate: the inertia of the flywheel, and the turns of the motor per turn of it."""
 
     added_inertia: float = 0.0
+    flywheel_ratio: float = 1.0
     ratio = 10.0
 
     @property
     def rotor_inertia(self):
-        return 0.25 + self.added_inertia
+        return 0.25 + self.added_inertia / self.flywheel_ratio**2
 
 
-def wheel_of(monkeypatch, inertia, sizes, torque_mean=0.1, mean=1.0):
+def wheel_of(monkeypatch, inertia, sizes, torque_mean=0.1, mean=1.0, flywheel_ratio=1.0):
     """The result of the search for a flywheel, and the flywheels tried, where the checks use these shares of
     their limits with a flywheel; there are 0.25 kg m2 on the shaft, and `inertia` at the crank."""
     trials = []
@@ -181,9 +182,19 @@ def wheel_of(monkeypatch, inertia, sizes, torque_mean=0.1, mean=1.0):
     monkeypatch.setattr(MotorTrials, "judged", judged)
     numbers = SimpleNamespace(inertia_mean=inertia, torque_mean=mean)
     plate = SimpleNamespace(power=1e3, torque=10.0, speed=100.0, breakdown_ratio=2.0, locked_torque_ratio=1.5)
-    bare = sizing.Candidate(SimpleNamespace(nameplate=plate, designation="m"), Wheeled())
+    bare = sizing.Candidate(SimpleNamespace(nameplate=plate, designation="m"), Wheeled(0.0, flywheel_ratio))
     task = SimpleNamespace(tables=SimpleNamespace(start="direct"))
     return MotorTrials(task, SimpleNamespace(numbers=numbers)).with_flywheel(bare), trials
+
+
+def test_a_flywheel_on_a_slower_shaft_is_as_much_heavier(monkeypatch):
+    """The search is the same at the motor's shaft."""
+    _, motor = wheel_of(monkeypatch, 75.0, lambda J: {"rms_torque": 1.3 - 0.5 * J})
+    slow, machine = wheel_of(
+        monkeypatch, 75.0, lambda J: {"rms_torque": 1.3 - 0.5 * J / 25.0}, flywheel_ratio=5.0
+    )
+    assert len(motor) > 2 and machine == pytest.approx([25.0 * J for J in motor], rel=1e-12)
+    assert slow.fits and slow.drive.added_inertia in machine
 
 
 def test_flywheels_are_enlarged_until_one_suffices(monkeypatch):

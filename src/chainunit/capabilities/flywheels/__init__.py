@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Set
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.config import FileReading
+from ...study.parts import motor_is_left
 
 
 class FlywheelCapability(Capability):
@@ -16,8 +17,10 @@ class FlywheelCapability(Capability):
     order = 80
 
     def plan(self, reading: FileReading) -> Set[float] | None:
-        """The inertias of the flywheels that are compared [kg m2]; None without the table."""
-        return frozenset(reading.form.flywheel.compare) if "flywheel" in reading.data else None
+        """The inertias of the flywheels that are compared [kg m2]; None without the table, and if the drive is
+        chosen with its flywheel."""
+        is_given = "flywheel" in reading.data and not motor_is_left(reading.data)
+        return frozenset(reading.form.flywheel.compare) if is_given else None
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The runs with each flywheel."""

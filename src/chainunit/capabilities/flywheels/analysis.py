@@ -42,9 +42,9 @@ is called worse."""
 
 @result(frozen=False)
 class FlywheelFindings(Findings):
-    """The flywheels by their inertia, the `least` one that keeps the `permitted` fluctuation, if there is
-    one, and the inputs of the hand formula: the `swing` of the energy in a turn [J], the speed of the motor
-    [rad/s], and the inertia on its shaft without a flywheel (`bare`) [kg m2]."""
+    """The flywheels by their inertia at their own shaft, the `least` one that keeps the `permitted` fluctuation, if
+    there is one, and the inputs of the hand formula: the `swing` of the energy in a turn [J], the speed of the
+    motor [rad/s], and the inertia on its shaft without a flywheel (`bare`) [kg m2]."""
 
     own: float
     """flywheel of the study [kg m2]"""
@@ -64,10 +64,16 @@ class FlywheelFindings(Findings):
         name="retuned",
         default=False,
     )
+    ratio: float = 1.0
+    """turns of the motor per turn of the flywheel"""
 
     def by_hand(self, flywheel: float) -> float:
         """Fluctuation with that flywheel [kg m2] where the drive gives a constant torque."""
-        return self.swing / ((self.bare + flywheel) * self.speed * self.speed)
+        return self.swing / (self.inertia(flywheel) * self.speed * self.speed)
+
+    def inertia(self, flywheel: float) -> float:
+        """All inertia at the motor's shaft with that flywheel [kg m2]."""
+        return self.bare + flywheel / self.ratio**2
 
     def permits(self, wheel: Wheel) -> bool:
         """Whether a flywheel keeps the permitted fluctuation and exceeds no other limit."""
@@ -76,7 +82,8 @@ class FlywheelFindings(Findings):
     @derived("kg.m2", name="by_hand")
     def flywheel_by_hand(self) -> float:
         """Flywheel that keeps the permitted fluctuation by the hand formula [kg m2]; 0 where none is needed."""
-        return needed_inertia(self.swing, self.speed, self.permitted_fluctuation, self.bare)
+        needed = needed_inertia(self.swing, self.speed, self.permitted_fluctuation, self.bare)
+        return needed * self.ratio**2
 
     @property
     def rows(self) -> list[tuple[str, Wheel, str]]:
@@ -133,8 +140,11 @@ class FlywheelAnalysis(Analysis):
             permitted_fluctuation=table.fluctuation,
             swing=turn.energy_swing,
             speed=config.run.crank_speed * drive.ratio,
-            bare=drive.rotor_inertia - drive.added_inertia + turn.inertia_mean / drive.ratio**2,
+            bare=drive.rotor_inertia
+            - drive.added_inertia / drive.flywheel_ratio**2
+            + turn.inertia_mean / drive.ratio**2,
             mean_torque=turn.torque_mean / drive.ratio,
+            ratio=drive.flywheel_ratio,
         )
         study.findings[FlywheelAnalysis.name] = findings
         sizes = sorted({table.J, *config.plans["flywheels"]})
@@ -147,7 +157,11 @@ class FlywheelAnalysis(Analysis):
         for size in sizes:
             findings.wheels.append(_own(study, findings) if size == table.J else run(size))
         findings.least = least_flywheel(
-            findings.wheels, findings.permitted_fluctuation, findings.bare, findings.flywheel_by_hand, run
+            findings.wheels,
+            findings.permitted_fluctuation,
+            findings.bare * findings.ratio**2,
+            findings.flywheel_by_hand,
+            run,
         )
         findings.is_searched = True
         return findings
@@ -191,7 +205,7 @@ def _wheel(
         motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
     numbers = {
         "flywheel": flywheel,
-        "inertia": findings.bare + flywheel,
+        "inertia": findings.inertia(flywheel),
         "start_time": start.start_time,
         # the formula does not hold for a ripple of more than 2
         "by_hand": by_hand if (by_hand := findings.by_hand(flywheel)) < 2.0 else None,
@@ -215,7 +229,8 @@ def _wheel(
 def least_flywheel(
     wheels: Sequence[Wheel], permitted: float, bare: float, by_hand: float, run: Callable[[float], Wheel]
 ) -> Wheel | None:
-    """The least flywheel that keeps the `permitted` fluctuation, to `CLOSE` of the fluctuation.
+    """The least flywheel that keeps the `permitted` fluctuation, to `CLOSE` of the fluctuation; all inertias count at
+    its shaft.
 
     The `wheels` are in order of their inertia. The result is None where none of them keeps it, nor the
     flywheel of the hand formula, nor one that is a fifth heavier than the heaviest. The fluctuation falls
@@ -223,7 +238,7 @@ def least_flywheel(
 
     Parameters
     ----------
-    bare : inertia on the motor shaft without a flywheel [kg m2]
+    bare : inertia without a flywheel [kg m2]
     by_hand : flywheel by the hand formula [kg m2]
     run : makes the run with a flywheel of that inertia [kg m2]
     """
@@ -244,7 +259,7 @@ def least_flywheel(
     for _ in range(_TRIALS):
         if above.answers.speed_ripple >= (1.0 - CLOSE) * permitted:
             break
-        x = [math.log(wheel.answers.inertia) for wheel in (below, above)]
+        x = [math.log(bare + wheel.flywheel) for wheel in (below, above)]
         share = 0.5
         if below.answers.speed_ripple is not None:
             y = [math.log(wheel.answers.speed_ripple) for wheel in (below, above)]

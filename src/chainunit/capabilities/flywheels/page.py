@@ -79,7 +79,8 @@ def _table(study: StudyRecord, findings: FlywheelFindings) -> b.Table:
         ),
         (b.Column("flywheel"), *heads),
         title=line(
-            "Flywheels on the motor's shaft; permitted ripple of the speed ", exact(x.permitted_fluctuation)
+            f"Flywheels on the {study.drive.flywheel_shaft.words}; permitted ripple of the speed ",
+            exact(x.permitted_fluctuation),
         ),
     )
 
@@ -123,10 +124,9 @@ def _ripple(findings: FlywheelFindings, running: list[Wheel]) -> fig.Panel:
     """The ripple of the speed over the inertia on the motor's shaft."""
     inertia = np.array([wheel.answers.inertia for wheel in running])
     sizes = [wheel.answers.speed_ripple for wheel in running]
-    ends = np.array(
-        [min(inertia[0], findings.bare), 1.3 * max(inertia[-1], findings.bare + findings.flywheel_by_hand)]
-    )
-    by_hand = [findings.by_hand(J - findings.bare) for J in ends]
+    most = 1.3 * max(inertia[-1], findings.inertia(findings.flywheel_by_hand))
+    ends = np.array([min(inertia[0], findings.bare), most])
+    by_hand = [findings.by_hand((J - findings.bare) * findings.ratio**2) for J in ends]
     items: list[fig.Item] = [
         fig.Curve("by hand, dE/(J w2)", ends, by_hand, 1),
         fig.Curve("co-simulated", inertia, sizes, marker="o"),

@@ -20,7 +20,7 @@ class FlywheelAnswers:
     """Answers of the drive with a flywheel, in steady running; None where the motor does not start, or stalls
     under the load."""
 
-    flywheel: Value = quantity("kg.m2", "flywheel, on the motor shaft")
+    flywheel: Value = quantity("kg.m2", "flywheel, at its own shaft")
     inertia: Value = quantity("kg.m2", "all inertia on the motor shaft, mean of the machine's")
     start_time: Value = same_measure("start_time")
     speed_mean: Value = same_measure("speed_mean")

@@ -17,6 +17,7 @@ from ... import __version__
 from ...core.errors import printable
 from ...core.quantities import finite
 from ...reading.results import GIVEN, InUnit, part, result
+from ...study.line.flywheel import MOTOR
 from ...study.record import LOAD_CYCLE
 from .studied import StudiedDrive
 from .tables import text_of
@@ -109,7 +110,7 @@ def by_name(parts: Parts) -> Iterator[tuple[str, InUnit | str | None]]:
 
 def _values(study: StudiedDrive) -> Iterator[Value]:
     """All values by the parts of the drive. The inertia of the load is the largest over the turn, with gear and
-    flywheel, at the motor's shaft."""
+    flywheel, at the motor's shaft; that of the machine has a flywheel on another shaft already."""
     number, text, time = study.number, study.text, study.steady.time
     steady, check = "answers/steady/", "sizing/candidates/0/checks/"
     period, speed = float(time[-1]), study.steady.speed
@@ -124,7 +125,9 @@ def _values(study: StudiedDrive) -> Iterator[Value]:
         yield "application.mains_voltage", "V", number("motor/supply.V")
         yield "application.mains_frequency", "Hz", number("motor/supply.f")
 
-    beside = (number(path) or 0.0 for path in ("gear/J", "flywheel/J", "sizing/flywheel/J"))
+    is_on_motor = text("flywheel/place") in ("", MOTOR)
+    paths = ("gear/J", *(("flywheel/J", "sizing/flywheel/J") if is_on_motor else ()))
+    beside = (number(path) or 0.0 for path in paths)
     load, rotor = float(np.max(study.inertia)) + sum(beside), number("motor/rotor.J")
     mean = number(f"{steady}supply_power_mean")  # known only if the running lasts
     yield "drive.load_inertia", "kg.m2", load

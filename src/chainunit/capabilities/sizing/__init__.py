@@ -85,6 +85,7 @@ class SizingCapability(Capability):
             form.own_only,
             form.separate_bearing,
             form.load_class,
+            form.motors,
         )
 
     def faults(self, config: Config) -> Iterable[InputError]:

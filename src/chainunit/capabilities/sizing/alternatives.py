@@ -403,20 +403,21 @@ def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
 
 
 def on_motor_side(drive: Drive, run: xr.Dataset) -> float:
-    """Peak torque in a run on a coupling between rotor and added inertia, at the crank [N m]: that behind the
-    inertia, and the torque that accelerates it and the gear and overcomes the drag, as the gear passes it on."""
-    inertia = drive.added_inertia + drive.gear_inertia
+    """Peak torque in a run on a coupling between rotor and flywheel on the motor's shaft, at the crank [N m]: that
+    behind the inertia, and the torque that accelerates it and the gear and overcomes the drag, as the gear passes it
+    on."""
+    inertia = drive.inertia_on_rotor + drive.gear_inertia
     more = inertia * run["motor.a"].values + drive.gear_friction * run["motor.w"].values
     return peak(run["motor.tau"].values + more / (1.0 + drive.gear_loss)) * drive.ratio
 
 
 def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
-    """The coupling between motor and added inertia, where the drive has one; else None."""
-    if not rig.drive.added_inertia or study.start is None:
+    """The coupling between motor and the flywheel on its shaft; None for a drive without one."""
+    if not rig.drive.inertia_on_rotor or study.start is None:
         return None
     events = _loaded_starts(study)
     longest = longest_start(rig.operation.ramp_end, study.start.start_time)
-    before = rig.drive.added_inertia + rig.drive.gear_inertia
+    before = rig.drive.inertia_on_rotor + rig.drive.gear_inertia
     starts = starts_from_all(rig, longest, events, on_motor_side, before)
     if any(start.start_time is None for start in starts):
         return None

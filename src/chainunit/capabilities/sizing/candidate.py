@@ -37,7 +37,7 @@ FIELD_WEAKENING = 1.1
 class Flywheel:
     """The flywheel of a drive, and the disc of steel that has its inertia; None without a flywheel."""
 
-    J: Value = quantity("kg.m2", "flywheel on the motor shaft")
+    J: Value = quantity("kg.m2", "flywheel, at its own shaft")
     mass: Value = quantity("kg", "steel disc, mass")
     diameter: Value = quantity("m", "steel disc, diameter")
     width: Value = quantity("m", "steel disc, width")
@@ -266,7 +266,7 @@ class Candidate:
             mass=disc and disc.mass,
             diameter=disc and disc.diameter,
             width=disc and disc.width,
-            rim_speed=disc and disc.rim_speed(self.motor.nameplate.speed),
+            rim_speed=disc and disc.rim_speed(self.motor.nameplate.speed / self.drive.flywheel_ratio),
             fluctuation=self.trial.fluctuation,
         )
 

@@ -188,14 +188,17 @@ class MotorTrials:
         the peak of the cycle may run with a flywheel, which carries it through.
 
         The first flywheel has the share `_SMALL` of all other inertia, and each further one `_LARGER` times as much,
-        until one suffices, a limit that inertia makes worse is exceeded, or the torque is even. Only runs tell: where
+        until one suffices, a limit that inertia makes worse is exceeded, or the torque is even; all of them count at
+        the motor's shaft. Only runs tell: where
         a load changes faster than the cage of the motor follows, a small flywheel may make its torque less even."""
         numbers = self.duty.numbers
+        at_motor = bare.drive.flywheel_ratio**2
         there = bare.drive.rotor_inertia + numbers.inertia_mean / bare.drive.ratio**2
         trials: list[Candidate] = []
 
         def trial_with(flywheel: float) -> Candidate:
-            candidate = dataclasses.replace(bare, drive=with_inertia(self.task.tables, bare.drive, flywheel))
+            drive = with_inertia(self.task.tables, bare.drive, flywheel * at_motor)
+            candidate = dataclasses.replace(bare, drive=drive)
             trials.append(self.judged(candidate))
             return candidate
 

@@ -41,7 +41,7 @@ def answer(study: StudyRecord) -> Iterator[b.Block]:
     drive, x = findings.sized(study), cited(findings, "findings.sizing")
     sized, best = cited(drive, "findings.sizing"), x.candidates[0]
     gear = (_gear(findings.best, best), *_belt(sized.belt), *_gear_torque(sized))
-    ratio = exact(best.ratio, 4)
+    ratio, shaft = exact(best.ratio, 4), findings.best.drive.flywheel_shaft.words
     cards = [
         b.Card(
             "Motor",
@@ -51,7 +51,7 @@ def answer(study: StudyRecord) -> Iterator[b.Block]:
         b.Card("Gear ratio", ((ratio, f"motor turns per {study.driver_noun} turn"),), gear),
         b.Card(
             "Flywheel",
-            ((number(x.flywheel.J) if findings.best.disc else "none", "flywheel on the motor shaft"),),
+            ((number(x.flywheel.J) if findings.best.disc else "none", f"flywheel on the {shaft}"),),
             tuple(_disc(findings.best, best)),
         ),
     ]

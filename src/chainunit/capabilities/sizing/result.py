@@ -249,11 +249,10 @@ class SizedDrive:
         best, protection = self.best, self.protection
         motor = "Insufficient motor" if self.insufficient else "Motor"
         ratio = number(best.ratio, "1", digits=4, full=False)
+        shaft = best.drive.flywheel_shaft.words
         parts = [
             f"{motor}: {best.designation}, ratio {ratio}{aside(best.gear_words)}",
-            f"flywheel on the motor shaft {best.flywheel_words}"
-            if best.disc
-            else "no flywheel on the motor shaft",
+            f"flywheel on the {shaft} {best.flywheel_words}" if best.disc else f"no flywheel on the {shaft}",
         ]
         if isinstance(protection, MotorProtection):
             setting = protection.relay_current

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ...batch.transients import can_run
 from ...core.errors import InputError
-from ...drives.catalogue import CatalogueMotor, catalogue
+from ...drives.catalogue import CatalogueMotor, catalogue, high_slip_motors
 from ...drives.catalogue_gears import CatalogueGear
 from ...drives.gear_ratios import UNITS, nearest
 from ...fmu.backends import Backend
@@ -32,7 +32,7 @@ from .findings import SizingFindings
 from .inverter import inverter_needs
 from .motor_trials import EVENED, WORSE_WITH_INERTIA, MotorTrials
 from .preference import SPARED, STEP, choice, poles_rank, rank
-from .table import PRICE, Sizing
+from .table import HIGH_SLIP, PRICE, Sizing
 from .task import SizingTask
 
 _WISHES: Mapping[str, str] = {"speed": "fluctuation", "inertia": "inertia_ratio"}
@@ -53,7 +53,8 @@ def motors_on_offer(task: SizingTask, own_motors: Sequence[CatalogueMotor]) -> l
         for a catalogue that has no such motor, and as `check_ratios`.
     """
     limits, tables = task.plan.demands, task.tables
-    offered = own_motors if task.plan.own_only else [*catalogue(), *own_motors]
+    packaged = high_slip_motors() if task.plan.motors == HIGH_SLIP else catalogue()
+    offered = own_motors if task.plan.own_only else [*packaged, *own_motors]
     motors = [m for m in offered if limits.poles_least <= m.nameplate.poles <= limits.poles_most]
     if not motors and task.plan.own_only:
         raise InputError(

@@ -111,7 +111,19 @@ PREFERENCE, PRICE = "preference", "price"
 OBJECTIVES = (PREFERENCE, PRICE)
 """What is wanted of the drives that fit: the first by the order of preference, or the cheapest."""
 
+STANDARD, HIGH_SLIP = "standard", "high-slip"
+MOTORS = (STANDARD, HIGH_SLIP)
+"""The packaged motors that are tried."""
+
 SIZING_KEYS: Mapping[str, Any] = {
+    "motors": (
+        Literal[MOTORS],
+        Field(
+            STANDARD,
+            description="packaged motors that are tried: standard ones, or those of high slip (NEMA design D), with "
+            "which a flywheel gives its energy to the peaks of the load",
+        ),
+    ),
     "gear_kind": (
         Literal[tuple(UNITS)],
         Field(
@@ -175,6 +187,7 @@ class SizingPlan:
     own_only: bool = False
     separate_bearing: bool = False
     load_class: str | None = None
+    motors: str = STANDARD
 
     def load(self, inertia_factor: float) -> str:
         """The class of the load, by this inertia factor where the file does not give it."""

@@ -386,7 +386,7 @@ def try_motor(
     ramp = operation.run.ramp if drive.follows else 0.0
     # three times as long as the rated torque takes to bring all inertia up to speed, and at least the ramp of
     # the start
-    inertia = drive.fmu_parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
+    inertia = drive.rotor_inertia + duty.numbers.inertia_mean / drive.ratio**2
     rise = ramp if drive.star_delta else task.tables.starter_time or ramp
     late = drive.switched_until + max(1.0, _LATE * start_check(task, motor, drive).limit, 1.5 * rise)
     window = drive.switched_until + max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)

@@ -16,7 +16,7 @@ from ...study.config import Config, FileReading
 from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...study.file_section import FileSection, TableForm
-from ...study.rules import MOTOR_FMU, Rule, has_sides
+from ...study.rules import FLYWHEEL_BEHIND, MOTOR_FMU, Rule, has_sides
 from .tables import KEYS, ObserverTable, WatchPlan, WatchTable, read_watch
 
 
@@ -88,6 +88,11 @@ class WatchCapability(Capability):
             "observer",
             given("driveline"),
             "takes the shaft between motor and machine for rigid; leave out [driveline] or [observer]",
+        )
+        yield Rule(
+            "observer",
+            FLYWHEEL_BEHIND,
+            'has no flywheel behind the gear; set flywheel.place = "motor", or leave it out',
         )
 
     def plan(self, reading: FileReading) -> WatchPlans:

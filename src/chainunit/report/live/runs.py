@@ -105,7 +105,7 @@ def live_runs(
             "rocker": "machine.rocker.tau" if "machine.rocker.tau" in columns else None,
         },
         "columns": columns,
-        "line_ratio": float(drive.line.ratio),
+        "line_ratio": float(drive.whole_line.ratio),
         "reference": "motor.w_ref" if drive.follows else None,
         "ramp": float(run.ramp),
         "switching": {full: _profile(x) for full, x in drive.switching().items()},
@@ -129,7 +129,7 @@ def live_runs(
         "rotor": {
             "name": "motor.rotor.J",
             "own": float(drive.parameters.rotor.J),
-            "added": float(drive.added_inertia),
+            "added": float(drive.inertia_on_rotor),
             "rest": float(drive.gear_inertia),
         },
         "events": [_event(rig, event) for event in taken],

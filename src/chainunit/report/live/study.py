@@ -64,7 +64,8 @@ def of_study(
     if runs:
         chosen += runs.quantities
         J = variable_of(FlywheelTable, "J")
-        chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", role="added"))
+        role, placed = ("added", ()) if drive.flywheel_shaft.is_motor else ("", ("flywheel.J_wheel",))
+        chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", (), placed, role))
     # names of other files are as in the study file, beside which the copy lies
     folder = Path(config.file.source).parent
     copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)

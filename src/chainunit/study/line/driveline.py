@@ -128,19 +128,19 @@ class DrivelinePart(PartOfLine):
     def placed(self, plan: DrivelinePlan | None, drive: Drive, turn: Cycle) -> PlacedPart | None:
         """The driveline, with the damping that its damping ratio asks for."""
         from .placed import PlacedPart
-        from .shaft import masses_of
+        from .shaft import two_masses
 
         if plan is None:
             return None
         values = Layout(Driveline).by_name(plan.table)
         del values["exponent"]
-        ratio = drive.driven_machine.ratio if plan.place == "crank" else 1.0
+        ratio = drive.ratio / drive.line.ratio if plan.place == "crank" else 1.0
         p = self.model.parameter_layout.from_names(values | {"ratio": ratio})
         part = PlacedPart(self.name, self.model, p, ratio, p.J4)
         if plan.damping_ratio is None:
             return part
         inertia = float(np.mean(turn.inertia_at(drive.ratio)))
-        masses = masses_of(p, drive.fmu_parameters.rotor.J, inertia)
+        masses = two_masses(replace(drive, line=drive.line.behind(part)), inertia)
         damped = with_damping_ratio(masses, plan.damping_ratio)
         return replace(part, parameters=replace(p, d2=damped.d2, d3=damped.d3))
 

@@ -55,6 +55,11 @@ class Line:
         """The line with one more part, behind the others."""
         return Line((*self, part))
 
+    def around(self, name: str) -> tuple[Line, Line]:
+        """The parts before the part of that name, and those behind it."""
+        place = [part.name for part in self].index(name)
+        return Line(self.parts[:place]), Line(self.parts[place + 1 :])
+
     def turned(self, angle: float) -> Line:
         """The line that starts with the motor's shaft turned by the `angle` [rad]."""
         parts = []

@@ -132,15 +132,13 @@ def driveline_of(drive: Drive) -> Parameters:
 
 
 def two_masses(drive: Drive, inertia: float) -> Cardan:
-    """The drive's line between its rotor and a machine with the `inertia` at the motor [kg m2]. Both inertias
-    are reduced to the shafts of the line."""
-    return masses_of(driveline_of(drive), drive.fmu_parameters.rotor.J, inertia)
-
-
-def masses_of(line: Parameters, rotor: float, inertia: float) -> Cardan:
-    """The `line` between a `rotor` and a machine, of which the inertias at the motor are given [kg m2]."""
+    """The drive's line between its rotor and a machine with the `inertia` at the motor [kg m2], with a flywheel
+    on its side. Both inertias are reduced to the shafts of the line."""
+    line, (before, behind) = driveline_of(drive), drive.whole_line.around("driveline")
     shafts = {v.name: getattr(line, v.name) for v in variables(ShaftLine)}
-    return Cardan(**shafts, J1=rotor * line.ratio**2, J4=line.J4 + inertia * line.ratio**2)
+    rotor = drive.fmu_parameters.rotor.J + before.at_motor(0.0)
+    driven = line.J4 + inertia * line.ratio**2 + behind.at_motor(0.0)
+    return Cardan(**shafts, J1=rotor * line.ratio**2, J4=driven)
 
 
 def line_modes(drive: Drive, inertia: Any) -> LineModes:
@@ -168,11 +166,9 @@ def remedies(line: ShaftLine) -> list[str]:
 
 def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
     """Torque in shaft 2 [N m], shape (time,), in the run `rigid` of the rigid drive."""
-    line, gear = driveline_of(drive), "gear.tau" in rigid
-    return (
-        line.ratio * rigid["gear.tau" if gear else "machine.tau"].values
-        + line.J4 / line.ratio * rigid["motor.a"].values
-    )
+    line, (_, behind) = driveline_of(drive), drive.whole_line.around("driveline")
+    driven = behind.parts[0].name if behind else "machine"
+    return line.ratio * rigid[f"{driven}.tau"].values + line.J4 / line.ratio * rigid["motor.a"].values
 
 
 def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:

@@ -1,0 +1,65 @@
+"""The shaft of the flywheel of a drive: the motor's, that behind a part of the line, or the machine's. Its inertia
+stands there for all that uses it: in the rotor, or as a part of the line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...drives.flywheel import Flywheel
+from .placed import Line, PlacedPart
+
+MOTOR, MACHINE = "motor", "machine"
+"""The places that every drive has; the others are the names of the parts of its line."""
+
+
+@dataclass(frozen=True)
+class FlywheelShaft:
+    """The shaft of a flywheel."""
+
+    place: str = MOTOR
+    """`MOTOR`, `MACHINE`, or the part of the line on whose driven shaft it sits"""
+    turns: float = 1.0
+    """turns of the flywheel per turn of the crank, in place of 1, if it sits on a faster shaft of the machine"""
+
+    @property
+    def is_motor(self) -> bool:
+        """Whether it is the motor's shaft."""
+        return self.place == MOTOR
+
+    @property
+    def words(self) -> str:
+        """The shaft in words."""
+        if self.place in (MOTOR, MACHINE):
+            return f"{self.place} shaft"
+        return f"shaft behind the {self.place.replace('_', ' ')}"
+
+    def ratio(self, line: Line, ratio: float) -> float:
+        """Turns of the motor per turn of the flywheel, in a drive with that `line` and `ratio`."""
+        if self.is_motor:
+            return 1.0
+        if self.place == MACHINE:
+            return ratio / self.turns
+        return self._before(line).ratio
+
+    def mounted(self, line: Line, ratio: float, J: float) -> Line:
+        """The `line` with a flywheel of the inertia `J` [kg m2], in a drive of that `ratio`; the line itself for a
+        flywheel on the motor's shaft."""
+        if self.is_motor:
+            return line
+        if self.place == MACHINE:
+            return line.behind(_placed(ratio / line.ratio, J, self.turns))
+        before = self._before(line)
+        return Line((*before, _placed(1.0, J, 1.0), *line.parts[len(before.parts) :]))
+
+    def _before(self, line: Line) -> Line:
+        """The line up to the part at whose driven shaft the flywheel sits."""
+        names = [part.name for part in line]
+        return Line(line.parts[: names.index(self.place) + 1])
+
+
+ON_MOTOR = FlywheelShaft()
+
+
+def _placed(ratio: float, J: float, turns: float) -> PlacedPart:
+    p = Flywheel.Parameters(ratio=ratio, J_wheel=J, turns=turns)
+    return PlacedPart("flywheel", Flywheel, p, ratio, J * turns**2)
