@@ -82,13 +82,13 @@ def catalogue_drive(
         # the slip is proportional to the torque; the reference of an inverter has the speed of the crank
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
         if gear_ratio is None:
-            ratio = speed / w
-    if gear_ratio is None and offer.kind != "belt" and abs(ratio - 1.0) <= _NO_GEAR:
+            ratio = speed * tables.speed_behind(mean, plate) / w
+    if gear_ratio is None and not tables.line and offer.kind != "belt" and abs(ratio - 1.0) <= _NO_GEAR:
         return catalogue_drive(tables, machine, turn, motor, ambient, 1.0, offer)
     p = with_starter(tables, p, plate)
     if ambient is not None:
         p = replace(p, ambient=replace(p.ambient, T=ambient))
-    return Drive(
+    drive = Drive(
         model,
         p,
         machine.replace({"ratio": ratio}),
@@ -99,7 +99,22 @@ def catalogue_drive(
         gear_loss=gear_with(tables, ratio, offer).loss,
         transmission=transmission_of(tables, ratio, offer),
         star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
+        nameplate=plate,
     )
+    return with_slipping_parts(drive, tables)
+
+
+def with_slipping_parts(drive: Drive, tables: DriveTables) -> Drive:
+    """The drive with the parts of its line that slip.
+
+    Raises
+    ------
+    InputError
+        where such a part does not fit the drive.
+    """
+    for plan in tables.line:
+        drive = replace(drive, line=drive.line.behind(plan.placed(drive.nameplate, drive.ratio)))
+    return drive
 
 
 def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> Transmission:
@@ -108,15 +123,22 @@ def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> 
     gear, given_keys = tables.gear, tables.given
     if "gear.efficiency" in given_keys:
         return replace(gear, ratio=ratio)
+    behind = _behind(tables, ratio)
     return replace(
-        gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, _is_made(tables, offer))
+        gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, behind, _is_made(tables, offer))
     )
 
 
 def transmission_of(tables: DriveTables, ratio: float, offer: GearOffer) -> str:
     """The parts between motor and machine in a noun, see `Drive.transmission`."""
-    unit = gear_unit(offer.kind, ratio, _is_made(tables, offer))
+    unit = gear_unit(offer.kind, _behind(tables, ratio), _is_made(tables, offer))
     return GearUnit.noun if unit is None else unit.noun
+
+
+def _behind(tables: DriveTables, ratio: float) -> float:
+    """The part of a whole `ratio` that the gear behind the line has; about 1 is none."""
+    behind = ratio / tables.line_ratio(ratio)
+    return 1.0 if tables.line and abs(behind - 1.0) <= _NO_GEAR else behind
 
 
 def _is_made(tables: DriveTables, offer: GearOffer) -> bool:

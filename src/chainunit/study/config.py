@@ -41,6 +41,7 @@ from .file_reading import FileReading
 from .file_section import FileSection
 from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
+from .line.slip_plan import SlipPlan
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
 from .operation import OperatingConditions
 from .parts import (
@@ -383,6 +384,7 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
             feed_forward=checked.feed_forward,
             start=checked.start,
             given=contents.given,
+            line=tuple(plan for plan in plans.values() if isinstance(plan, SlipPlan)),
             **{name: of_study[name] for name in _OF_DRIVE},
         ),
         events=events,

@@ -17,6 +17,7 @@ from ..drives.contactor import CONTACTOR_EDGE, StarDelta
 from ..drives.gear import Gear
 from ..drives.gear_rating import GearRating
 from ..drives.motor import Motor
+from ..drives.nameplate import Nameplate
 from ..drives.speed_control import Tuning
 from ..machines.api import ChainUnitMachine
 from ..machines.machine import Machine
@@ -59,6 +60,10 @@ class Drive:
     """the tuning of the gains of its control, where they were tuned"""
 
     line: Line = field(default_factory=Line)
+    """its parts without the gear; see `geared_line`"""
+
+    nameplate: Nameplate | None = None
+    """the nameplate of a motor of the catalogue"""
 
     added_inertia: float = 0.0
     """inertia that is added to the motor's shaft [kg m2]"""
@@ -110,17 +115,34 @@ class Drive:
     def fmu_parameters(self) -> Any:
         """Parameters of the motor's FMU: the parameters of the motor, with gear and added inertia in the rotor."""
         p = self.parameters
-        if self.added_inertia or self.gear_inertia or self.gear_friction:
-            J = p.rotor.J + self.gear_inertia + self.added_inertia
-            p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + self.gear_friction))
-        return replace(p, gear=replace(p.gear, loss=self.gear_loss)) if self.gear_loss else p
+        # behind a part that slips the gear turns with the driven shaft, see `geared_line`
+        slips = self.line.before_gear is not None
+        inertia, friction, loss = (0.0, 0.0, 0.0) if slips else self._gear
+        if self.added_inertia or inertia or friction:
+            J = p.rotor.J + inertia + self.added_inertia
+            p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + friction))
+        return replace(p, gear=replace(p.gear, loss=loss)) if loss or slips else p
+
+    @property
+    def _gear(self) -> tuple[float, float, float]:
+        return self.gear_inertia, self.gear_friction, self.gear_loss
+
+    @property
+    def gear_at_rotor(self) -> float:
+        """Inertia of the gear that turns with the rotor, at its shaft [kg m2]."""
+        return self.gear_inertia if self.line.before_gear is None else 0.0
+
+    @cached_property
+    def geared_line(self) -> Line:
+        """The line, with the gear on the driven shaft of the last part that slips."""
+        return self.line.with_gear(*self._gear)
 
     @property
     def rotor_inertia(self) -> float:
         """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor and gear, the added one, and of
         the parts of the line."""
         self.needs_own("the inertia of its rotor")
-        return float(self.fmu_parameters.rotor.J + self.line.at_motor(0.0))
+        return float(self.fmu_parameters.rotor.J + self.geared_line.at_motor(0.0))
 
     def needs_own(self, quantity: str) -> None:
         """Refuse a `quantity`, named in words, that only a motor of this package has.
@@ -200,9 +222,9 @@ class Drive:
         twin with a rigid shaft puts that of the driveline there."""
         machine = self.foreign_machine
         if machine is None or machine.model.has_gear() or not (self.line or machine.needs_gear):
-            return self.line
+            return self.geared_line
         gear = Gear.Parameters(ratio=machine.ratio)
-        return self.line.behind(PlacedPart("gear", Gear, gear, machine.ratio))
+        return self.geared_line.behind(PlacedPart("gear", Gear, gear, machine.ratio))
 
     @cached_property
     def motor_bond(self) -> Bond:
@@ -229,7 +251,7 @@ class Drive:
     @property
     def ratio_at_machine(self) -> float:
         """Turns of the shaft that drives the machine's component per turn of the crank."""
-        return self.driven_machine.ratio if self.whole_line is self.line else 1.0
+        return self.driven_machine.ratio if self.whole_line is self.geared_line else 1.0
 
     def crank_output(self, quantity: Literal["phi", "w"]) -> tuple[str, float]:
         """Name of the angle ("phi") or speed ("w") that turns the machine in a run, and its ratio to that of the

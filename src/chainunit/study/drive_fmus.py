@@ -48,7 +48,7 @@ def coasting_model(drive: Drive) -> DirectMachine:
 
 def coasting_parameters(drive: Drive) -> dict[str, float]:
     """Parameters of the `coasting_model` by name."""
-    additions = {"J_added": drive.line.inertia} if drive.line else {}
+    additions = {"J_added": drive.geared_line.inertia} if drive.line else {}
     return drive.simulated_machine.by_name | additions
 
 

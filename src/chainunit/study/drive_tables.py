@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Set
 from dataclasses import dataclass, field
 
 from ..drives.gearing import Transmission
+from ..drives.nameplate import Nameplate
+from .line.slip_plan import SlipPlan
 from .sections import FlywheelTable, Starter
 
 
@@ -21,11 +24,21 @@ class DriveTables:
     flywheel: FlywheelTable | None
     given: Set[str] = field(compare=False)
     """names of all values that the file sets, such as "gear.ratio\""""
+    line: tuple[SlipPlan, ...] = ()
+    """the parts of the line that slip, from the motor on"""
 
     @property
     def added_inertia(self) -> float:
         """Inertia of the flywheel on the motor's shaft [kg m2]; 0 without one."""
         return 0.0 if self.flywheel is None else float(self.flywheel.J)
+
+    def line_ratio(self, ratio: float) -> float:
+        """The share of the parts of the line in a whole `ratio` of the drive."""
+        return math.prod(plan.share(ratio) for plan in self.line)
+
+    def speed_behind(self, torque: float, plate: Nameplate) -> float:
+        """Speed behind the line over that of a rigid one, with a mean `torque` at the motor's shaft [N m]."""
+        return math.prod(1.0 - plan.slip_at(torque, plate) for plan in self.line)
 
     @property
     def starter_time(self) -> float:

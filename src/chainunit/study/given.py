@@ -104,7 +104,8 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     config = study.config
     randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():
-        values = config.table(name)
+        placed = study.drive.line.part(name)
+        values = config.table(name) if placed is None or placed.table is None else placed.table
         is_idle = section.with_findings and name not in study.findings
         if values is None or not section.is_used(config) or is_idle:
             continue

@@ -17,7 +17,7 @@ from ..drives.motor import FOREIGN, Motor
 from ..machines.machine import Machine
 from ..reading.tables import given_values, read_table, schema
 from ..system import FmuComponent, foreign_component
-from .catalogue_drive import as_used, catalogue_drive, with_inertia
+from .catalogue_drive import as_used, catalogue_drive, with_inertia, with_slipping_parts
 from .cycle import Cycle
 from .drive import Drive
 from .drive_tables import DriveTables
@@ -64,7 +64,7 @@ class OwnMotor(MotorSource):
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
         """See `MotorSource`."""
         follows, p = self.kind.follows(self.parameters), self.parameters
-        return Drive(
+        drive = Drive(
             self.kind,
             p,
             machine,
@@ -73,6 +73,7 @@ class OwnMotor(MotorSource):
             gear_loss=float(p.gear.loss),
             added_inertia=tables.added_inertia,
         )
+        return with_slipping_parts(drive, tables)
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """The gains of the control are tuned to the inertia; gains that the file gives stay as they are."""
@@ -135,7 +136,8 @@ class ForeignMotor(MotorSource):
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
         """See `MotorSource`; a study with a flywheel is refused."""
         motor, fed = self.component, tables.feed_forward
-        return Drive(FOREIGN, None, machine, "w_ref" in motor.connectors, feed_forward=fed, foreign=motor)
+        drive = Drive(FOREIGN, None, machine, "w_ref" in motor.connectors, feed_forward=fed, foreign=motor)
+        return with_slipping_parts(drive, tables)
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """Nothing follows."""

@@ -61,11 +61,15 @@ def shaft_power(drive: Drive, run: xr.Dataset) -> Any:
 def torque_before_gear(drive: Drive, run: xr.Dataset) -> Any:
     """Torque on the motor's shaft [N m], shape (time,), with the one that the gear loses."""
     torque = run[drive.motor_torque].values
+    if drive.line.before_gear is not None:
+        return torque
     return torque + lost_torque(np, drive.gear_loss, torque, run[drive.motor_speed].values)
 
 
 def gear_loss(drive: Drive, run: xr.Dataset) -> Any:
     """Power that the gear loses [W], shape (time,)."""
+    if (part := drive.line.before_gear) is not None:
+        return run[f"{part.name}.gear_loss"].values
     torque, w = run["motor.tau"].values, run["motor.w"].values
     return lost_torque(np, drive.gear_loss, torque, w) * w + drive.gear_friction * w * w
 
@@ -175,10 +179,16 @@ def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
 
 def pull_out_torque(drive: Drive, run: xr.Dataset, T: float) -> float:
     """Largest torque at the crank [N m] that the motor gives while a rising load slows it down from the mean state of
-    a run until it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
-    drive.needs_own("the pull-out torque")
-    torque = drive.motor.pull_out(drive.fmu_parameters, T, *_mean_supply(drive, run))
+    a run until it stalls, with the winding at `T` [K], or that a part of the line passes on at most; see
+    `Motor.pull_out`."""
+    torque = min(motor_pull_out(drive, run, T), drive.line.stall_torque)
     return torque / (1.0 + drive.gear_loss) * drive.ratio
+
+
+def motor_pull_out(drive: Drive, run: xr.Dataset, T: float) -> float:
+    """The pull-out torque of the motor at its shaft [N m], see `pull_out_torque`."""
+    drive.needs_own("the pull-out torque")
+    return float(drive.motor.pull_out(drive.fmu_parameters, T, *_mean_supply(drive, run)))
 
 
 def breakdown_speed(drive: Drive, run: xr.Dataset) -> float:

@@ -136,7 +136,9 @@ def _read(w: Window, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
     parts["winding"] = w.mean("motor.heat")
     parts["windage"] = float(drive.parameters.rotor.d) * squared
     parts["gear"] = w.mean(gear_loss) if drive.gear_friction or drive.gear_loss else None
-    parts["line"] = sum(w.mean(full) for full in line if full in turns) if drive.line else None
+    if drive.line:
+        geared = parts["gear"] or 0.0 if drive.line.before_gear is not None else 0.0
+        parts["line"] = sum(w.mean(full) for full in line if full in turns) - geared
     if inverter is not None:
         parts["inverter"] = w.mean(lambda drive, run: inverter.loss(run))
     if "machine.dissipated_power" in turns:
