@@ -25,11 +25,11 @@ _AT_REST = 1e-9
 class FluidCouplingData:
     """A fluid coupling by its data sheet. The start values are assumptions of this package."""
 
-    power: Value = quantity("W", "rated power at the motor's shaft", default=15e3, above=0.0)
-    speed: Value = quantity(
+    rated_power: Value = quantity("W", "rated power at the motor's shaft", default=15e3, above=0.0)
+    rated_speed: Value = quantity(
         "rad/s", "rated speed of the motor's shaft", default=152.0, above=0.0, kind="speed"
     )
-    slip: Value = quantity(
+    rated_slip: Value = quantity(
         "1", "rated slip: at the rated power and speed", default=0.03, min=0.002, max=0.15, kind="percent"
     )
     peak_factor: Value = quantity(
@@ -44,12 +44,12 @@ class FluidCouplingData:
         kind="percent",
     )
     J_motor: Value = quantity("kg.m2", "inertia of pump wheel and housing", default=0.08, min=0.0)
-    J: Value = quantity("kg.m2", "inertia of the turbine wheel", default=0.04, above=0.0)
+    J_driven: Value = quantity("kg.m2", "inertia of the turbine wheel", default=0.04, above=0.0)
 
     @property
     def stall_torque(self) -> float:
         """Torque in a stall with the motor at the rated speed [N m]."""
-        return float(self.filling * self.peak_factor * self.power / self.speed)
+        return float(self.filling * self.peak_factor * self.rated_power / self.rated_speed)
 
 
 @declaration
@@ -59,13 +59,19 @@ class Parameters(Slipping, FluidCouplingData):
 
 def softness(p: Any) -> Any:
     """The number b of the torque's rise with the slip."""
-    return p.slip * (p.peak_factor - 1.0) / (1.0 - p.peak_factor * p.slip)
+    return p.rated_slip * (p.peak_factor - 1.0) / (1.0 - p.peak_factor * p.rated_slip)
 
 
 def torque(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
     """Torque on both shafts [N m] at their speeds [rad/s]: a coupling has no other support."""
     b = softness(p)
-    parabola = p.filling * p.peak_factor * (1.0 + b) * p.power / (p.speed * p.speed * p.speed)
+    parabola = (
+        p.filling
+        * p.peak_factor
+        * (1.0 + b)
+        * p.rated_power
+        / (p.rated_speed * p.rated_speed * p.rated_speed)
+    )
     faster, behind = xp.maximum(xp.abs(w), xp.abs(driven)), w - driven
     tau = parabola * faster * faster * behind / (xp.abs(behind) + b * faster + _AT_REST)
     return tau, tau
@@ -74,8 +80,8 @@ def torque(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
 def _internal_step(xp: Any, p: Any) -> Any:
     """At most 0.25 ms, and half of the time in which the turbine wheel alone follows the pump at rated speed."""
     b = softness(p)
-    steepest = p.filling * p.peak_factor * (1.0 + b) / b * p.power / (p.speed * p.speed)
-    return xp.minimum(2.5e-4, 0.5 * p.J / steepest)
+    steepest = p.filling * p.peak_factor * (1.0 + b) / b * p.rated_power / (p.rated_speed * p.rated_speed)
+    return xp.minimum(2.5e-4, 0.5 * p.J_driven / steepest)
 
 
 FluidCoupling = slipping(

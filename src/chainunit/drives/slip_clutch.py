@@ -24,7 +24,7 @@ class Parameters(Slipping):
         "rad/s", "slip below which the smoothed torque falls well below the setting", default=0.2, above=0.0
     )
     J_motor: Value = quantity("kg.m2", "inertia on the motor's side", default=0.0, min=0.0)
-    J: Value = quantity("kg.m2", "inertia on the driven side", default=0.0, min=0.0)
+    J_driven: Value = quantity("kg.m2", "inertia on the driven side", default=0.0, min=0.0)
 
 
 def torque(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:

@@ -65,7 +65,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
     Parameters
     ----------
     ratio : turns of the motor's shaft per turn of the driven one, by the parameters
-    parameters : declaration with `Slipping`, and with the inertias ``J_motor`` and ``J`` of both sides [kg m2]
+    parameters : declaration with `Slipping`, and with the inertias ``J_motor`` and ``J_driven`` of both sides [kg m2]
     parts : outputs beside `SlipOutputs`
     more : further fields of `Model`
     """
@@ -80,7 +80,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
             self.tau, passed = law(xp, p, w, driven)
             drag = p.gear.d * driven
             self.a, self.load = geared_motion(
-                xp, u.load, x.driven.phi, driven, p.J, passed - drag, p.gear.loss
+                xp, u.load, x.driven.phi, driven, p.J_driven, passed - drag, p.gear.loss
             )
             self.lost = (lost_torque(xp, p.gear.loss, self.load, driven) + drag) * driven
             self.heat = self.tau * w - passed * driven + self.lost
@@ -103,7 +103,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
             slip=u.w - ratio(p) * x.driven.w,
             driven=Driven(a=s.a, tau=s.load),
             power=tau * u.w,
-            kinetic_energy=0.5 * (p.J_motor * w2 + p.J * x.driven.w * x.driven.w),
+            kinetic_energy=0.5 * (p.J_motor * w2 + p.J_driven * x.driven.w * x.driven.w),
             potential_energy=0.0 * tau,
             dissipated_power=s.heat,
             gear_loss=s.lost,

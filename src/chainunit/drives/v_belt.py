@@ -39,8 +39,8 @@ class VBeltData:
     ratio: Value = quantity(
         "1", "turns of the motor per turn of the driven pulley", default=3.0, min=0.1, max=15.0
     )
-    power: Value = quantity("W", "rated power at the motor's shaft", default=15e3, above=0.0)
-    speed: Value = quantity(
+    rated_power: Value = quantity("W", "rated power at the motor's shaft", default=15e3, above=0.0)
+    rated_speed: Value = quantity(
         "rad/s", "rated speed of the motor's shaft", default=152.0, above=0.0, kind="speed"
     )
     diameter: Value = quantity("m", "pitch diameter of the motor's pulley", default=0.16, above=0.0, max=5.0)
@@ -56,12 +56,14 @@ class VBeltData:
         max=5.0,
     )
     mass: Value = quantity("kg/m", "mass of all belts per length", default=0.0, min=0.0, max=100.0)
-    slip: Value = quantity("1", "slip at the rated torque", default=0.01, min=0.001, max=0.05, kind="percent")
+    rated_slip: Value = quantity(
+        "1", "slip at the rated torque", default=0.01, min=0.001, max=0.05, kind="percent"
+    )
     efficiency: Value = quantity(
         "1", "efficiency at the rated torque, with the slip", default=0.95, min=0.7, max=0.999
     )
     J_motor: Value = quantity("kg.m2", "inertia of the motor's pulley", default=0.02, min=0.0)
-    J: Value = quantity("kg.m2", "inertia of the driven pulley", default=0.5, above=0.0)
+    J_driven: Value = quantity("kg.m2", "inertia of the driven pulley", default=0.5, above=0.0)
 
 
 @declaration
@@ -108,29 +110,29 @@ def grip(xp: Any, p: Any, w: Any) -> Any:
 
 def rated_force(xp: Any, p: Any) -> Any:
     """Force of the belt at the rated torque of the motor [N], without the torque that bends it."""
-    return p.efficiency / (1.0 - p.slip) * p.power / p.speed / _radius(xp, p)
+    return p.efficiency / (1.0 - p.rated_slip) * p.rated_power / p.rated_speed / _radius(xp, p)
 
 
 def bending(xp: Any, p: Any) -> Any:
     """Torque at the motor's shaft that bends the belt [N m]."""
-    return (1.0 - p.efficiency / (1.0 - p.slip)) * p.power / p.speed
+    return (1.0 - p.efficiency / (1.0 - p.rated_slip)) * p.rated_power / p.rated_speed
 
 
 def _creep(xp: Any, p: Any) -> Any:
     """The number c of the law."""
-    over = grip(xp, p, p.speed) / rated_force(xp, p)
-    return p.slip * xp.sqrt(over * over - 1.0)
+    over = grip(xp, p, p.rated_speed) / rated_force(xp, p)
+    return p.rated_slip * xp.sqrt(over * over - 1.0)
 
 
 def force(xp: Any, p: Any, w: Any, driven: Any) -> Any:
     """Force of the belt [N] at the speeds of both pulleys [rad/s]."""
-    behind, c, least = w - p.ratio * driven, _creep(xp, p), W_SHARE * p.speed
+    behind, c, least = w - p.ratio * driven, _creep(xp, p), W_SHARE * p.rated_speed
     return grip(xp, p, w) * behind / xp.sqrt(behind * behind + c * c * (w * w + least * least))
 
 
 def torques(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
     """Torque that the motor's pulley takes and that the driven one gets [N m], at their speeds [rad/s]."""
-    through, slow = force(xp, p, w, driven) * _radius(xp, p), 0.01 * p.speed
+    through, slow = force(xp, p, w, driven) * _radius(xp, p), 0.01 * p.rated_speed
     return through + bending(xp, p) * w / xp.sqrt(w * w + slow * slow), p.ratio * through
 
 
@@ -152,23 +154,23 @@ def usual_pretension(p: VBeltData, factor: float) -> float:
     """Tension of a strand at rest [N] by the rule of makers, for `factor` times the rated torque: F (2.5 - K)/(2 K)
     with the factor K of the wrap, 1 at half a turn, and the centrifugal part."""
     K = 1.25 * (1.0 - math.exp(-_NOMINAL * wrap(MATH, p)))
-    v = 0.5 * p.diameter * p.speed
-    return float(factor * p.power / v * (2.5 - K) / (2.0 * K) + p.mass * v * v)
+    v = 0.5 * p.diameter * p.rated_speed
+    return float(factor * p.rated_power / v * (2.5 - K) / (2.0 * K) + p.mass * v * v)
 
 
 def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
     """The pulleys do not touch, the belt carries its rated torque, and the slip is a part of its loss."""
-    v = _radius(xp, p) * p.speed
+    v = _radius(xp, p) * p.rated_speed
     yield p.distance, 0.5 * p.diameter * (1.0 + p.ratio), math.inf
-    yield p.efficiency, 0.0, 1.0 - p.slip
+    yield p.efficiency, 0.0, 1.0 - p.rated_slip
     carried = _LEAST_GRIP * rated_force(xp, p) / (2.0 * _euler(xp, p.friction, wrap(xp, p)))
     yield p.pretension, p.mass * v * v + carried, math.inf
 
 
 def _internal_step(xp: Any, p: Any) -> Any:
     """At most 0.25 ms, and half of the time in which the driven pulley alone follows that of the motor."""
-    steepest = grip(xp, p, 0.0) * _radius(xp, p) / (_creep(xp, p) * W_SHARE * p.speed)
-    return xp.minimum(2.5e-4, 0.5 * p.J / (p.ratio * p.ratio * steepest))
+    steepest = grip(xp, p, 0.0) * _radius(xp, p) / (_creep(xp, p) * W_SHARE * p.rated_speed)
+    return xp.minimum(2.5e-4, 0.5 * p.J_driven / (p.ratio * p.ratio * steepest))
 
 
 def _forces(xp: Any, p: Any, u: Any, x: Any, s: Any) -> BeltForces:
@@ -191,13 +193,13 @@ VBelt = slipping(
     ),
     required=(
         Requirement("distance", "m", "the pulleys touch", ("diameter", "ratio")),
-        Requirement("efficiency", "1", "the slip is a part of the loss", ("slip",)),
+        Requirement("efficiency", "1", "the slip is a part of the loss", ("rated_slip",)),
         Requirement(
             "pretension",
             "N",
             "the belt slips through at the rated torque",
-            ("power", "speed", "diameter", "friction"),
-            depends=("ratio", "distance", "mass", "efficiency", "slip"),
+            ("rated_power", "rated_speed", "diameter", "friction"),
+            depends=("ratio", "distance", "mass", "efficiency", "rated_slip"),
         ),
     ),
     requirements=_limits,

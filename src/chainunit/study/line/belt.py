@@ -62,20 +62,20 @@ class BeltPlan(SlipPlan):
         """With the standard pulley of the motor, the usual distance and tension, and the inertia of the pulleys."""
         table = replace(table, ratio=ratio)
         if "diameter" not in self.given:
-            belt = belt_drive(table.power, table.speed, ratio, table.service_factor)
+            belt = belt_drive(table.rated_power, table.rated_speed, ratio, table.service_factor)
             table = replace(table, diameter=belt.small)
         if "distance" not in self.given:
             table = replace(table, distance=table.diameter * (1.0 + ratio))
         usual = {
             "pretension": lambda: usual_pretension(table, table.service_factor),
             "J_motor": lambda: pulley_inertia(table.diameter, table.diameter),
-            "J": lambda: pulley_inertia(table.diameter * ratio, table.diameter),
+            "J_driven": lambda: pulley_inertia(table.diameter * ratio, table.diameter),
         }
         return replace(table, **{key: value() for key, value in usual.items() if key not in self.given})
 
     def stall_torque(self, table: Any) -> float:
         """The belt slips through, and bends."""
-        return float(0.5 * table.diameter * grip(MATH, table, table.speed) + bending(MATH, table))
+        return float(0.5 * table.diameter * grip(MATH, table, table.rated_speed) + bending(MATH, table))
 
 
 def pulley_inertia(diameter: float, small: float) -> float:
@@ -137,22 +137,25 @@ class BeltFindings(Findings):
                 )
 
 
-_SLIPS_THROUGH = "{title}: the belt slips through for {time}, at {torque} at the motor's shaft, and turns {heat} into heat."
+_SLIPS_THROUGH = (
+    "{title}: the belt slips through for {time}, at {torque} at the motor's shaft.",
+    "It turns {heat} into heat.",
+)
 _SIZES = {"s": "time", "N.m": "torque", "J": "heat"}
 _SLIPS = warning(
     "belt-slips",
-    _SLIPS_THROUGH,
+    *_SLIPS_THROUGH,
     remedy="More tension (belt.pretension), more belts or larger pulleys hold it, and load both shafts more.",
     sizes=_SIZES,
 )
-_PROTECTS = note("belt-slips-in-overload", _SLIPS_THROUGH, sizes=_SIZES)
+_PROTECTS = note("belt-slips-in-overload", *_SLIPS_THROUGH, sizes=_SIZES)
 
 
 def at_loads(table: BeltTable) -> tuple[BeltLoad, ...]:
     """The belt at the `LOADS`, as far as it carries them."""
-    radius, bend, rated = 0.5 * table.diameter, bending(MATH, table), table.power / table.speed
-    most, usual = grip(MATH, table, table.speed), rated_force(MATH, table)
-    creep, rows = table.slip * math.sqrt((most / usual) ** 2 - 1.0), []
+    radius, bend, rated = 0.5 * table.diameter, bending(MATH, table), table.rated_power / table.rated_speed
+    most, usual = grip(MATH, table, table.rated_speed), rated_force(MATH, table)
+    creep, rows = table.rated_slip * math.sqrt((most / usual) ** 2 - 1.0), []
     for load in LOADS:
         share = (load * rated - bend) / radius / most
         if 0.0 < share < 1.0:
@@ -180,7 +183,7 @@ class BeltAnalysis(Analysis):
         table, answers = placed.table, {}
         for name, run in parts_of_runs(study, placed):
             x = run.variables
-            through = np.abs(run.speed - run.behind) > SLIPS * table.slip * table.speed
+            through = np.abs(run.speed - run.behind) > SLIPS * table.rated_slip * table.rated_speed
             answers[name] = BeltAnswers(
                 force_peak=peak(x["force"]),
                 grip_largest=peak(x["grip"]),
@@ -197,7 +200,7 @@ class BeltAnalysis(Analysis):
             small_pulley=table.diameter,
             large_pulley=table.diameter * table.ratio,
             wrap=angle,
-            speed=0.5 * table.diameter * table.speed,
+            speed=0.5 * table.diameter * table.rated_speed,
             pretension=table.pretension,
             static_force=2.0 * table.pretension * math.sin(0.5 * angle),
             slip_torque=placed.stall_torque,
@@ -221,13 +224,13 @@ class BeltPart(SlippingPart):
             title="V-belt",
             follows={
                 "ratio": "the whole ratio of the drive up to 6.3, else 3; a gear behind the belt has the rest",
-                "power": "the motor's, by its nameplate",
-                "speed": "the motor's, by its nameplate",
+                "rated_power": "the motor's, by its nameplate",
+                "rated_speed": "the motor's, by its nameplate",
                 "diameter": "the standard pulley of a narrow V-belt for the rated torque times service_factor",
                 "distance": "both diameters together",
                 "pretension": "makers' rule for service_factor times the rated torque",
                 "J_motor": "cast iron pulley, half of a solid disc",
-                "J": "cast iron pulley, half of a solid disc",
+                "J_driven": "cast iron pulley, half of a solid disc",
             },
         )
     }

@@ -56,8 +56,8 @@ class FluidCouplingPlan(SlipPlan):
 
     def completed(self, table: Any, ratio: float) -> Any:
         """With the inertia of a coupling of this size."""
-        size = table.power / table.speed**3
-        usual = {"J_motor": _PUMP * size, "J": _TURBINE * size}
+        size = table.rated_power / table.rated_speed**3
+        usual = {"J_motor": _PUMP * size, "J_driven": _TURBINE * size}
         return replace(table, **{key: x for key, x in usual.items() if key not in self.given})
 
     def stall_torque(self, table: Any) -> float:
@@ -105,7 +105,7 @@ _TOO_SMALL = warning(
     "fluid-coupling-too-small",
     "The fluid coupling slips by {slip} in steady running, more than 1.5 times its rated slip. Its rated torque is "
     "{rated}.",
-    remedy="A coupling of more power (fluid_coupling.power) or more oil (filling) slips less.",
+    remedy="A coupling of more power (fluid_coupling.rated_power) or more oil (filling) slips less.",
     sizes={("1", "percent"): "slip", "N.m": "rated"},
 )
 _MOTOR_STALLS = warning(
@@ -157,7 +157,7 @@ class CouplingAnalysis(Analysis):
         placed = drive.line.part(FluidCouplingPlan.name)
         assert placed is not None
         table = placed.table
-        rated, answers = table.power / table.speed, {}
+        rated, answers = table.rated_power / table.rated_speed, {}
         for name, run in parts_of_runs(study, placed):
             torque = peak(run.variables["tau"])
             answers[name] = CouplingAnswers(
@@ -173,7 +173,7 @@ class CouplingAnalysis(Analysis):
         if drive.foreign is None:
             steady = study.window(Phase.STEADY, study.steady)
             motor = motor_pull_out(drive, steady.run, steady.warm)
-        return CouplingFindings(rated, table.slip, table.stall_torque, motor, answers)
+        return CouplingFindings(rated, table.rated_slip, table.stall_torque, motor, answers)
 
 
 class FluidCouplingPart(SlippingPart):
@@ -191,10 +191,10 @@ class FluidCouplingPart(SlippingPart):
             title="Fluid coupling",
             order=(("temperature", "<", "plug_temperature"),),
             follows={
-                "power": "the motor's, by its nameplate",
-                "speed": "the motor's, by its nameplate",
+                "rated_power": "the motor's, by its nameplate",
+                "rated_speed": "the motor's, by its nameplate",
                 "J_motor": f"{_PUMP:g} times the rated torque by the square of the speed",
-                "J": f"{_TURBINE:g} times the rated torque by the square of the speed",
+                "J_driven": f"{_TURBINE:g} times the rated torque by the square of the speed",
             },
         )
     }

@@ -42,8 +42,8 @@ class PlacedPart:
         this `Transmission.loss`."""
         p, square = self.parameters, self.ratio**2
         gear = replace(p.gear, d=d * square, loss=loss)
-        p = replace(p, J=self.inertia + J * square, gear=gear)
-        return replace(self, parameters=p, inertia=p.J)
+        p = replace(p, J_driven=self.inertia + J * square, gear=gear)
+        return replace(self, parameters=p, inertia=p.J_driven)
 
     def turned(self, angle: float) -> PlacedPart:
         """The part that starts with its shaft on the motor's side turned by the `angle` [rad]."""

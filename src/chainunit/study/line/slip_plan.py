@@ -49,7 +49,7 @@ class SlipPlan(ABC):
             where neither the file nor a nameplate gives one.
         """
         values = {}
-        for key, unit in (("power", "W"), ("speed", "rad/s")):
+        for key, unit in (("rated_power", "W"), ("rated_speed", "rad/s")):
             if key in self.given:
                 values[key] = getattr(self.table, key)
             elif plate is None:
@@ -58,13 +58,13 @@ class SlipPlan(ABC):
                     key=f"{self.name}.{key}",
                 )
             else:
-                values[key] = getattr(plate, key)
+                values[key] = getattr(plate, key.removeprefix("rated_"))
         return values
 
     def slip_at(self, torque: float, plate: Nameplate | None) -> float:
         """The slip at a `torque` of the motor's shaft [N m], in proportion to it."""
         rated = self.rated(plate)
-        return float(self.table.slip * torque * rated["speed"] / rated["power"])
+        return float(self.table.rated_slip * torque * rated["rated_speed"] / rated["rated_power"])
 
     def placed(self, plate: Nameplate | None, ratio: float) -> PlacedPart:
         """The part behind a motor with this nameplate, in a drive of this whole `ratio`.
@@ -82,4 +82,4 @@ class SlipPlan(ABC):
         with refusal_prefix(f"{self.name}.", self.name):
             self.model.check(p)
         stall = self.stall_torque(table)
-        return PlacedPart(self.name, self.model, p, share, p.J, p.J_motor, table, True, stall)
+        return PlacedPart(self.name, self.model, p, share, p.J_driven, p.J_motor, table, True, stall)
