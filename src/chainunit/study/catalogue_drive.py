@@ -18,16 +18,12 @@ from ..drives.nameplate import Nameplate
 from ..machines.machine import Machine
 from .cycle import Cycle
 from .drive import Drive
-from .drive_tables import DriveTables
+from .drive_tables import NO_GEAR, DriveTables
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""
 BOOST = "starter.inverter.boost"
 """Key of the voltage boost at low frequency."""
-
-
-_NO_GEAR = 0.05
-"""Relative difference of a ratio to 1 up to which the machine turns with the motor: nobody makes such a gear."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +78,9 @@ def catalogue_drive(
         # the slip is proportional to the torque; the reference of an inverter has the speed of the crank
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
         if gear_ratio is None:
-            ratio = speed * tables.speed_behind(mean, plate) / w
-    if gear_ratio is None and not tables.line and offer.kind != "belt" and abs(ratio - 1.0) <= _NO_GEAR:
+            # a motor that follows its reference keeps its own speed, so that no ratio makes up for the slip
+            ratio = speed * (1.0 if follows else tables.speed_behind(mean, plate)) / w
+    if gear_ratio is None and not tables.line and offer.kind != "belt" and abs(ratio - 1.0) <= NO_GEAR:
         return catalogue_drive(tables, machine, turn, motor, ambient, 1.0, offer)
     p = with_starter(tables, p, plate)
     if ambient is not None:
@@ -123,7 +120,7 @@ def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> 
     gear, given_keys = tables.gear, tables.given
     if "gear.efficiency" in given_keys:
         return replace(gear, ratio=ratio)
-    behind = _behind(tables, ratio)
+    behind = tables.ratio_behind(ratio)
     return replace(
         gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, behind, _is_made(tables, offer))
     )
@@ -131,14 +128,8 @@ def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> 
 
 def transmission_of(tables: DriveTables, ratio: float, offer: GearOffer) -> str:
     """The parts between motor and machine in a noun, see `Drive.transmission`."""
-    unit = gear_unit(offer.kind, _behind(tables, ratio), _is_made(tables, offer))
+    unit = gear_unit(offer.kind, tables.ratio_behind(ratio), _is_made(tables, offer))
     return GearUnit.noun if unit is None else unit.noun
-
-
-def _behind(tables: DriveTables, ratio: float) -> float:
-    """The part of a whole `ratio` that the gear behind the line has; about 1 is none."""
-    behind = ratio / tables.line_ratio(ratio)
-    return 1.0 if tables.line and abs(behind - 1.0) <= _NO_GEAR else behind
 
 
 def _is_made(tables: DriveTables, offer: GearOffer) -> bool:

@@ -11,6 +11,9 @@ from ..drives.nameplate import Nameplate
 from .line.slip_plan import SlipPlan
 from .sections import FlywheelTable, Starter
 
+NO_GEAR = 0.05
+"""Relative difference of a ratio to 1 up to which the machine turns with the motor: nobody makes such a gear."""
+
 
 @dataclass(frozen=True)
 class DriveTables:
@@ -35,6 +38,13 @@ class DriveTables:
     def line_ratio(self, ratio: float) -> float:
         """The share of the parts of the line in a whole `ratio` of the drive."""
         return math.prod(plan.share(ratio) for plan in self.line)
+
+    def ratio_behind(self, ratio: float) -> float:
+        """The share of the gear behind the line in a whole `ratio` of the drive, 1 without a gear."""
+        if not self.line:
+            return ratio
+        behind = ratio / self.line_ratio(ratio)
+        return 1.0 if abs(behind - 1.0) <= NO_GEAR else behind
 
     def speed_behind(self, torque: float, plate: Nameplate) -> float:
         """Speed behind the line over that of a rigid one, with a mean `torque` at the motor's shaft [N m]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +18,11 @@ from ...drives.v_belt import VBelt, VBeltData, bending, grip, rated_force, usual
 from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
+from ..conditions import is_one_of
 from ..event import Role
 from ..file_section import FileSection
 from ..remark import note, warning
+from ..rules import Rule
 from .slip_plan import SlipPlan
 from .slipping import SlippingPart, parts_of_runs
 
@@ -211,6 +213,12 @@ class BeltAnalysis(Analysis):
 
 class BeltPart(SlippingPart):
     """The part, with the table [belt]."""
+
+    def rules(self) -> Iterable[Rule]:
+        """Sizing takes the rest of the ratio for the gear, not for a second belt."""
+        yield from super().rules()
+        words = 'is the belt; take sizing.gear_kind = "none", or the kind of the gear behind it'
+        yield Rule(self.name, is_one_of("sizing.gear_kind", "belt"), words)
 
     name = BeltPlan.name
     order = 6
