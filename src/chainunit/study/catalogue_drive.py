@@ -80,7 +80,8 @@ def catalogue_drive(
         if gear_ratio is None:
             # a motor that follows its reference keeps its own speed, so that no ratio makes up for the slip
             ratio = speed * (1.0 if follows else tables.speed_behind(mean, plate)) / w
-    if gear_ratio is None and not tables.line and offer.kind != "belt" and abs(ratio - 1.0) <= NO_GEAR:
+    is_free = gear_ratio is None and offer.kind != "belt" and tables.line_ratio(ratio) == 1.0
+    if is_free and abs(ratio - 1.0) <= NO_GEAR:
         return catalogue_drive(tables, machine, turn, motor, ambient, 1.0, offer)
     p = with_starter(tables, p, plate)
     if ambient is not None:
