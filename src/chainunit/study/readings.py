@@ -112,6 +112,8 @@ def _turns(drive: Drive, run: xr.Dataset) -> Any:
     return (angle - angle[0]) / (2.0 * math.pi)
 
 
+_AT_SPEED = 0.95
+"""Speed of a motor over its last one from which on it takes the current of its start no more."""
 _ROUNDING = 1e-9
 """Turns that a run which ends on a whole turn may miss by rounding."""
 
@@ -185,6 +187,16 @@ def pull_out_torque(drive: Drive, run: xr.Dataset, T: float) -> float:
     return torque / (1.0 + drive.gear_loss) * drive.ratio
 
 
+def motor_run_up(drive: Drive, run: xr.Dataset, started: float | None) -> float | None:
+    """Time from rest for which the motor takes the current of its start [s], in a `run` from rest: until the machine
+    has `started` [s] or, before a part that decouples, until the motor has its speed at the end of the run; None for
+    a machine that does not start."""
+    if started is None or not drive.line.decouples:
+        return started
+    speed = run[drive.motor_speed].values
+    return float(run["time"].values[np.argmax(speed >= _AT_SPEED * speed[-1])])
+
+
 def motor_pull_out(drive: Drive, run: xr.Dataset, T: float) -> float:
     """The pull-out torque of the motor at its shaft [N m], see `pull_out_torque`."""
     drive.needs_own("the pull-out torque")
@@ -193,9 +205,11 @@ def motor_pull_out(drive: Drive, run: xr.Dataset, T: float) -> float:
 
 def breakdown_speed(drive: Drive, run: xr.Dataset) -> float:
     """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature of a run; 0
-    where the motor has no such speed. See `Motor.breakdown_speed`."""
+    where the motor has no such speed, or a part of the line slips before. See `Motor.breakdown_speed`."""
     drive.needs_own("the breakdown speed")
     T = float(np.mean(run[f"motor.{drive.motor.temperature}"].values))
+    if math.isfinite(drive.line.stall_torque) and drive.line.stall_torque < motor_pull_out(drive, run, T):
+        return 0.0
     return drive.motor.breakdown_speed(drive.fmu_parameters, T, *_mean_supply(drive, run)) / drive.ratio
 
 

@@ -24,7 +24,7 @@ from ...study.inverter import need_of
 from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
 from ...study.permitted_starts import permitted_starts, starting_data
-from ...study.readings import crank_angle, load_inertia, turns_made
+from ...study.readings import crank_angle, load_inertia, motor_run_up, turns_made
 from ...study.relay import start_seconds
 from ...study.rig import Rig, join
 from ...study.start_runs import (
@@ -308,7 +308,8 @@ class Trial:
         speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
-        start = start_check(self.task, self.motor, self.drive, self.start_time)
+        run_up = motor_run_up(self.drive, self._from_rest, self.start_time)
+        start = start_check(self.task, self.motor, self.drive, run_up)
         weaker = min(1.0, plate.frequency / self.frequency)
         # a motor that does not start has the limits that it has at its speed
         cooling = (

@@ -53,6 +53,7 @@ class FluidCouplingPlan(SlipPlan):
 
     name = "fluid_coupling"
     model = FluidCoupling
+    decouples = True
 
     def completed(self, table: Any, ratio: float) -> Any:
         """With the inertia of a coupling of this size."""

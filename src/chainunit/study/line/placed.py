@@ -29,6 +29,8 @@ class PlacedPart:
     """the values of its table with those that follow from the drive, if it has such values"""
     slips: bool = False
     """whether its driven shaft has a speed of its own, so that the gear behind it turns with this shaft"""
+    decouples: bool = False
+    """whether a motor comes to its speed before the machine does, as its torque grows with the speed"""
     stall_torque: float = math.inf
     """largest torque that it takes from the motor's shaft while the machine stands [N m]"""
 
@@ -81,6 +83,11 @@ class Line:
             parts.append(part.with_gear(*gear) if part is before else part)
             ratio *= part.ratio
         return Line(tuple(parts))
+
+    @property
+    def decouples(self) -> bool:
+        """Whether a motor comes to its speed before the machine does."""
+        return any(part.decouples for part in self)
 
     @property
     def stall_torque(self) -> float:

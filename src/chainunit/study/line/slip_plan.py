@@ -27,6 +27,8 @@ class SlipPlan(ABC):
     name: ClassVar[str]
     """name of its table"""
     model: ClassVar[Model]
+    decouples: ClassVar[bool] = False
+    """see `PlacedPart`"""
 
     def share(self, ratio: float) -> float:
         """The part of the whole `ratio` of the drive that it has."""
@@ -82,4 +84,15 @@ class SlipPlan(ABC):
         with refusal_prefix(f"{self.name}.", self.name):
             self.model.check(p)
         stall = self.stall_torque(table)
-        return PlacedPart(self.name, self.model, p, share, p.J_driven, p.J_motor, table, True, stall)
+        return PlacedPart(
+            self.name,
+            self.model,
+            p,
+            share,
+            p.J_driven,
+            p.J_motor,
+            table,
+            slips=True,
+            decouples=self.decouples,
+            stall_torque=stall,
+        )
