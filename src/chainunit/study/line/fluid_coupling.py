@@ -190,7 +190,7 @@ class FluidCouplingPart(SlippingPart):
             FluidCouplingTable,
             optional=True,
             title="Fluid coupling",
-            order=(("temperature", "<", "plug_temperature"),),
+            order=(("temperature", ">", "plug_temperature"),),
             follows={
                 "rated_power": "the motor's, by its nameplate",
                 "rated_speed": "the motor's, by its nameplate",
