@@ -148,9 +148,7 @@ def test_the_mill_with_a_fluid_coupling_by_hand(tmp_path):
     last = {name: float(jam[f"fluid_coupling.{name}"][-1]) for name in ("tau", "slip", "dissipated_power")}
     speed = float(jam["motor.w"][-1])
     b, s = 0.03 * 1.0 / (1.0 - 0.06), last["slip"] / speed
-    assert last["tau"] == pytest.approx(
-        stall * (1.0 + b) * s / (s + b) * (speed / w_rated) ** 2, rel=2e-3
-    )
+    assert last["tau"] == pytest.approx(stall * (1.0 + b) * s / (s + b) * (speed / w_rated) ** 2, rel=2e-3)
     assert last["dissipated_power"] == pytest.approx(torque * w, rel=0.03)
     assert abs(float(jam["fluid_coupling.driven.w"][-1])) < 0.02 * w
     findings = result["coupling_slip"]

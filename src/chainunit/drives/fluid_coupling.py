@@ -72,8 +72,8 @@ def torque(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
         * p.rated_power
         / (p.rated_speed * p.rated_speed * p.rated_speed)
     )
-    faster, behind = xp.maximum(xp.abs(w), xp.abs(driven)), w - driven
-    tau = parabola * faster * faster * behind / (xp.abs(behind) + b * faster + _AT_REST)
+    faster, lag = xp.maximum(xp.abs(w), xp.abs(driven)), w - driven
+    tau = parabola * faster * faster * lag / (xp.abs(lag) + b * faster + _AT_REST)
     return tau, tau
 
 

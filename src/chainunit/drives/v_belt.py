@@ -97,7 +97,7 @@ def _radius(xp: Any, p: Any) -> Any:
     return 0.5 * p.diameter
 
 
-def _left(xp: Any, p: Any, w: Any) -> Any:
+def _pressing(xp: Any, p: Any, w: Any) -> Any:
     """Tension of a strand at the speed `w` of the motor that presses on the pulleys [N]."""
     v = _radius(xp, p) * w
     return xp.maximum(p.pretension - p.mass * v * v, 0.0)
@@ -105,7 +105,7 @@ def _left(xp: Any, p: Any, w: Any) -> Any:
 
 def grip(xp: Any, p: Any, w: Any) -> Any:
     """Force at which the belt slips through [N] at the speed `w` of the motor [rad/s]."""
-    return 2.0 * _left(xp, p, w) * _euler(xp, p.friction, wrap(xp, p))
+    return 2.0 * _pressing(xp, p, w) * _euler(xp, p.friction, wrap(xp, p))
 
 
 def rated_force(xp: Any, p: Any) -> Any:
@@ -120,27 +120,27 @@ def bending(xp: Any, p: Any) -> Any:
 
 def _creep(xp: Any, p: Any) -> Any:
     """The number c of the law."""
-    over = grip(xp, p, p.rated_speed) / rated_force(xp, p)
-    return p.rated_slip * xp.sqrt(over * over - 1.0)
+    reserve = grip(xp, p, p.rated_speed) / rated_force(xp, p)
+    return p.rated_slip * xp.sqrt(reserve * reserve - 1.0)
 
 
 def force(xp: Any, p: Any, w: Any, driven: Any) -> Any:
     """Force of the belt [N] at the speeds of both pulleys [rad/s]."""
-    behind, c, least = w - p.ratio * driven, _creep(xp, p), W_SHARE * p.rated_speed
-    return grip(xp, p, w) * behind / xp.sqrt(behind * behind + c * c * (w * w + least * least))
+    lag, c, least = w - p.ratio * driven, _creep(xp, p), W_SHARE * p.rated_speed
+    return grip(xp, p, w) * lag / xp.sqrt(lag * lag + c * c * (w * w + least * least))
 
 
 def torques(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
     """Torque that the motor's pulley takes and that the driven one gets [N m], at their speeds [rad/s]."""
-    through, slow = force(xp, p, w, driven) * _radius(xp, p), 0.01 * p.rated_speed
-    return through + bending(xp, p) * w / xp.sqrt(w * w + slow * slow), p.ratio * through
+    torque, slow = force(xp, p, w, driven) * _radius(xp, p), 0.01 * p.rated_speed
+    return torque + bending(xp, p) * w / xp.sqrt(w * w + slow * slow), p.ratio * torque
 
 
 def forces(xp: Any, p: Any, w: Any, driven: Any) -> BeltForces:
     """The strands at the speeds of both pulleys [rad/s]."""
     pull, centrifugal = force(xp, p, w, driven), p.mass * (_radius(xp, p) * w) * (_radius(xp, p) * w)
-    left, half = _left(xp, p, w), 0.5 * xp.abs(pull)
-    tight, slack = left + half, xp.maximum(left - half, 0.0)
+    pressing, half = _pressing(xp, p, w), 0.5 * xp.abs(pull)
+    tight, slack = pressing + half, xp.maximum(pressing - half, 0.0)
     return BeltForces(
         force=pull,
         grip=xp.abs(pull) / xp.maximum(grip(xp, p, w), 1e-9),

@@ -102,7 +102,7 @@ def _speeds_of(study: StudyRecord, part: PlacedPart) -> fig.Figure:
             time = run.time - (0.0 if name == START else study.event[name])
             curves = (
                 fig.Curve(f"before the {noun}", time, run.speed),
-                fig.Curve(f"behind the {noun}, at the shaft before it", time, run.behind, 1),
+                fig.Curve(f"behind the {noun}, at the shaft before it", time, run.driven, 1),
             )
             x = fig.Axis("time", "s", low=float(time[0]), high=float(time[-1]))
             panels.append(fig.Panel(x, fig.Axis("speed", "rad/s", "speed"), curves, study.title_of(name)))

@@ -56,24 +56,24 @@ class BeltPlan(SlipPlan):
 
     def share(self, ratio: float) -> float:
         """Its own ratio, or the whole one where one belt has it."""
-        if "ratio" in self.given:
+        if "ratio" in self.keys:
             return float(self.table.ratio)
         return ratio if 1.0 <= ratio <= UNITS["belt"][0].largest else KINDS["belt"].ratio
 
     def completed(self, table: Any, ratio: float) -> Any:
         """With the standard pulley of the motor, the usual distance and tension, and the inertia of the pulleys."""
         table = replace(table, ratio=ratio)
-        if "diameter" not in self.given:
+        if "diameter" not in self.keys:
             belt = belt_drive(table.rated_power, table.rated_speed, ratio, table.service_factor)
             table = replace(table, diameter=belt.small)
-        if "distance" not in self.given:
+        if "distance" not in self.keys:
             table = replace(table, distance=table.diameter * (1.0 + ratio))
-        usual = {
+        defaults = {
             "pretension": lambda: usual_pretension(table, table.service_factor),
             "J_motor": lambda: pulley_inertia(table.diameter, table.diameter),
             "J_driven": lambda: pulley_inertia(table.diameter * ratio, table.diameter),
         }
-        return replace(table, **{key: value() for key, value in usual.items() if key not in self.given})
+        return replace(table, **{key: value() for key, value in defaults.items() if key not in self.keys})
 
     def stall_torque(self, table: Any) -> float:
         """The belt slips through, and bends."""
@@ -156,13 +156,13 @@ _PROTECTS = note("belt-slips-in-overload", *_SLIPS_THROUGH, sizes=_SIZES)
 def at_loads(table: BeltTable) -> tuple[BeltLoad, ...]:
     """The belt at the `LOADS`, as far as it carries them."""
     radius, bend, rated = 0.5 * table.diameter, bending(MATH, table), table.rated_power / table.rated_speed
-    most, usual = grip(MATH, table, table.rated_speed), rated_force(MATH, table)
-    creep, rows = table.rated_slip * math.sqrt((most / usual) ** 2 - 1.0), []
+    limit, rated_pull = grip(MATH, table, table.rated_speed), rated_force(MATH, table)
+    creep, rows = table.rated_slip * math.sqrt((limit / rated_pull) ** 2 - 1.0), []
     for load in LOADS:
-        share = (load * rated - bend) / radius / most
+        share = (load * rated - bend) / radius / limit
         if 0.0 < share < 1.0:
             slip = creep * share / math.sqrt(1.0 - share * share)
-            rows.append(BeltLoad(load, slip, (1.0 - slip) * share * most * radius / (load * rated)))
+            rows.append(BeltLoad(load, slip, (1.0 - slip) * share * limit * radius / (load * rated)))
     return tuple(rows)
 
 
@@ -185,12 +185,12 @@ class BeltAnalysis(Analysis):
         table, answers = placed.table, {}
         for name, run in parts_of_runs(study, placed):
             x = run.variables
-            through = np.abs(run.speed - run.behind) > SLIPS * table.rated_slip * table.rated_speed
+            slipping = np.abs(run.speed - run.driven) > SLIPS * table.rated_slip * table.rated_speed
             answers[name] = BeltAnswers(
                 force_peak=peak(x["force"]),
                 grip_largest=peak(x["grip"]),
                 slip_mean=run.mean(run.slip),
-                slipping_time=run.sum(through.astype(float)),
+                slipping_time=run.sum(slipping.astype(float)),
                 tight_strand_peak=peak(x["tight_strand"]),
                 shaft_force_mean=run.mean(x["shaft_force"]),
                 shaft_force_peak=peak(x["shaft_force"]),
@@ -217,8 +217,8 @@ class BeltPart(SlippingPart):
     def rules(self) -> Iterable[Rule]:
         """Sizing takes the rest of the ratio for the gear, not for a second belt."""
         yield from super().rules()
-        words = 'is the belt; take sizing.gear_kind = "none", or the kind of the gear behind it'
-        yield Rule(self.name, is_one_of("sizing.gear_kind", "belt"), words)
+        refusal = 'is the belt; take sizing.gear_kind = "none", or the kind of the gear behind it'
+        yield Rule(self.name, is_one_of("sizing.gear_kind", "belt"), refusal)
 
     name = BeltPlan.name
     order = 6

@@ -58,8 +58,8 @@ class FluidCouplingPlan(SlipPlan):
     def completed(self, table: Any, ratio: float) -> Any:
         """With the inertia of a coupling of this size."""
         size = table.rated_power / table.rated_speed**3
-        usual = {"J_motor": _PUMP * size, "J_driven": _TURBINE * size}
-        return replace(table, **{key: x for key, x in usual.items() if key not in self.given})
+        defaults = {"J_motor": _PUMP * size, "J_driven": _TURBINE * size}
+        return replace(table, **{key: x for key, x in defaults.items() if key not in self.keys})
 
     def stall_torque(self, table: Any) -> float:
         """See `SlipPlan`."""

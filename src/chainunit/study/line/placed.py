@@ -77,10 +77,10 @@ class Line:
     def with_gear(self, J: float, d: float, loss: float) -> Line:
         """The line whose `before_gear` turns a gear with this inertia [kg m2] and drag [N m s/rad] at the motor's
         shaft, and this `Transmission.loss`; without such a part the same line."""
-        before, ratio, parts = self.before_gear, 1.0, []
+        geared, ratio, parts = self.before_gear, 1.0, []
         for part in self:
             gear = (J * ratio**2, d * ratio**2, loss)
-            parts.append(part.with_gear(*gear) if part is before else part)
+            parts.append(part.with_gear(*gear) if part is geared else part)
             ratio *= part.ratio
         return Line(tuple(parts))
 

@@ -21,7 +21,7 @@ class SlipPlan(ABC):
 
     table: Any
     """the values of its table"""
-    given: Set[str]
+    keys: Set[str]
     """the keys of its table that the file gives"""
 
     name: ClassVar[str]
@@ -52,7 +52,7 @@ class SlipPlan(ABC):
         """
         values = {}
         for key, unit in (("rated_power", "W"), ("rated_speed", "rad/s")):
-            if key in self.given:
+            if key in self.keys:
                 values[key] = getattr(self.table, key)
             elif plate is None:
                 raise InputError(

@@ -69,23 +69,23 @@ class SlipRun:
 
     time: Any
     speed: Any
-    behind: Any
+    driven: Any
     heat: Any
     variables: Mapping[str, Any]
 
     @classmethod
-    def of(cls, placed: PlacedPart, run: xr.Dataset) -> SlipRun:
+    def read(cls, placed: PlacedPart, run: xr.Dataset) -> SlipRun:
         """The variables of the part in a run."""
         prefix = f"{placed.name}."
         x = {str(name).removeprefix(prefix): run[name].values for name in run if str(name).startswith(prefix)}
-        behind = placed.ratio * x["driven.w"]
+        driven = placed.ratio * x["driven.w"]
         heat = x["dissipated_power"] - x["gear_loss"]
-        return cls(run["time"].values, behind + x["slip"], behind, heat, x)
+        return cls(run["time"].values, driven + x["slip"], driven, heat, x)
 
     @property
     def slip(self) -> Any:
         """Slip over the speed before the part, 0 while this is at rest."""
-        return (self.speed - self.behind) / np.maximum(np.abs(self.speed), 1e-3)
+        return (self.speed - self.driven) / np.maximum(np.abs(self.speed), 1e-3)
 
     def mean(self, x: Any) -> float:
         """The mean of a variable over the time."""
@@ -101,4 +101,4 @@ def parts_of_runs(study: StudyRecord, placed: PlacedPart) -> Iterator[tuple[str,
     pieces = {STEADY: study.steady, START: study.runs[START].sel(time=slice(None, study.steady_begin))}
     pieces |= {name: from_event_on(study, name) for name in study.event if name in study.runs}
     for name, run in pieces.items():
-        yield name, SlipRun.of(placed, run)
+        yield name, SlipRun.read(placed, run)
