@@ -13,9 +13,11 @@ import xarray as xr
 from command import chainunit
 
 from chainunit import InputError
+from chainunit.capabilities.energy.running import run_steadily
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
+from chainunit.study.rig import Rig
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MILL = """
@@ -122,6 +124,22 @@ def test_sizing_has_no_second_belt():
         parse("event = []\n[belt]\n[sizing]\ngear_kind = 'belt'\n")
 
 
+# -- energy
+
+
+@pytest.mark.second
+def test_the_account_of_energy_closes_with_both_parts():
+    """The electric power goes to motor, line, gear and machine; the gear, which turns with the belt, counts once."""
+    config = parse(MILL + "[gear]\nratio = 52\nd = 0.0005\n[fluid_coupling]\n[belt]\nratio = 4\n")
+    slipping = drive_of(config)
+    load = run_steadily(Rig(config.operation, slipping, None), slipping, config.feed, None)
+    losses = load.losses
+    assert abs(losses.missing) < 2e-3 * losses.electric
+    heat = sum(np.mean(load.turns[f"{name}.dissipated_power"]) for name in ("fluid_coupling", "belt"))
+    assert losses.gear == pytest.approx(np.mean(load.turns["belt.gear_loss"]), rel=0.01) and losses.gear > 0.0
+    assert losses.line == pytest.approx(heat - losses.gear, rel=0.01) and losses.line > losses.gear
+
+
 # -- the examples
 
 
@@ -187,5 +205,7 @@ def test_the_belt_that_slips_by_hand(tmp_path):
     # the efficiency of the data at full load, less at part load
     loads = {row["load"]["value"]: row["efficiency"]["value"] for row in findings["loads"]}
     assert loads[1.0] == pytest.approx(0.95, rel=1e-6) and loads[0.25] < 0.86 < loads[0.5]
+    (shaft,) = (row for row in result["checks"]["rows"] if row["title"] == "overhung load of the shaft")
+    assert shaft["value"]["value"] == pytest.approx(2.0 * tension * math.sin(0.5 * wrap), rel=0.01)
     assert "the belt slips through" in text
     assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())

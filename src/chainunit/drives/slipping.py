@@ -70,7 +70,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
     more : further fields of `Model`
     """
 
-    class Point:
+    class SlipPoint:
         """The part between a motor at ``u.w`` and the states."""
 
         __slots__ = ("a", "by_speed", "heat", "held", "load", "lost", "tau")
@@ -88,7 +88,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
             self.by_speed = slope(law(engine, p, Dual(w, 1.0), driven)[0])
             self.held = slope(law(engine, p, w, Dual(driven, self.a))[0])
 
-    def outputs(xp: Any, p: Any, u: Any, x: Any, s: Point) -> SlipOutputs:
+    def outputs(xp: Any, p: Any, u: Any, x: Any, s: SlipPoint) -> SlipOutputs:
         tau, w2 = s.tau + p.J_motor * u.a, u.w * u.w
         small2 = W_SMALL * W_SMALL
         return SlipOutputs(
@@ -116,7 +116,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
 
     def rates(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
-        s = Point(xp, p, u, x)
+        s = SlipPoint(xp, p, u, x)
         return [s.load * x.driven.w, x.driven.w, s.a]
 
     return Model(
@@ -127,7 +127,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
         input_rates=MappingProxyType({"phi": "w", "w": "a"}),
         parts=(Part(SlipOutputs, outputs), *parts),
         initial_states=initial_states,
-        shared=Point,
+        shared=SlipPoint,
         derivatives=rates,
         **more,
     )
