@@ -32,7 +32,7 @@ def on_coupling(drive: Drive, run: xr.Dataset) -> float:
 def gear_torque(drive: Drive, run: xr.Dataset) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where the
     driveline is there, else at the crank."""
-    behind_gear = drive.line.part("driveline") is not None and drive.driven_machine.ratio == 1.0
+    behind_gear = drive.line.is_elastic and drive.driven_machine.ratio == 1.0
     return run[drive.motor_torque].values * drive.ratio if behind_gear else crank_torque(drive, run)
 
 

@@ -70,6 +70,11 @@ class Line:
         return next((part for part in self if part.name == name), None)
 
     @property
+    def is_elastic(self) -> bool:
+        """Whether it has parts, none of which slips."""
+        return bool(self) and self.before_gear is None
+
+    @property
     def before_gear(self) -> PlacedPart | None:
         """The last part that slips; None where the gear turns with the motor."""
         return next((part for part in reversed(self.parts) if part.slips), None)

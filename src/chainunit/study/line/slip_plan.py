@@ -22,7 +22,7 @@ class SlipPlan(ABC):
     table: Any
     """the values of its table"""
     keys: Set[str]
-    """the keys of its table that the file gives"""
+    """the keys that the file gives of those whose values follow from the drive"""
 
     name: ClassVar[str]
     """name of its table"""

@@ -48,7 +48,7 @@ class SlippingPart(PartOfLine):
         """The plan of the table."""
         if self.name not in reading.data:
             return None
-        keys = frozenset(reading.data[self.name])
+        keys = frozenset(reading.data[self.name]) & self.tables[self.name].follows.keys()
         return self.plan_type(reading.values[self.name], keys)
 
     def settled(self, tables: Mapping[str, Any], placed: PlacedPart) -> dict[str, Any]:
