@@ -9,8 +9,8 @@ import numpy as np
 from ..core.engines import numpy_
 from ..core.quantities import Layout
 from ..drives.fluid_coupling import torque
-from ..study.line.belt import BeltAnswers, BeltFindings
-from ..study.line.fluid_coupling import CouplingAnswers, CouplingFindings
+from ..study.line.belt import BeltAnalysis, BeltAnswers, BeltFindings
+from ..study.line.fluid_coupling import CouplingAnalysis, CouplingAnswers, CouplingFindings
 from ..study.line.placed import PlacedPart
 from ..study.line.slipping import parts_of_runs
 from ..study.record import StudyRecord
@@ -24,21 +24,24 @@ from .runs import by_side, over_runs
 PICTURES = Pictures()
 _BESIDE = 3
 """Number of runs beside each other in the figure."""
-_KINDS = ((CouplingFindings, CouplingAnswers, "fluid coupling"), (BeltFindings, BeltAnswers, "V-belt"))
-"""The findings and the answers of each part, and its noun."""
+_KINDS = (
+    (CouplingFindings, CouplingAnswers, CouplingAnalysis.name, "fluid coupling"),
+    (BeltFindings, BeltAnswers, BeltAnalysis.name, "V-belt"),
+)
+"""The findings and the answers of each part, the name of its analysis, and its noun."""
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figures of both parts."""
-    for kind, declared, noun in _KINDS:
+    for kind, declared, name, noun in _KINDS:
         findings = kind.found_in(study)
         if findings is None:
             continue
-        x = cited(findings, f"findings.{_name(study, findings)}")
+        x = cited(findings, f"findings.{name}")
         yield b.Table(quantity_rows(x), title=f"The {noun}")
         if isinstance(findings, BeltFindings):
             yield from table(
-                x.loads,
+                cited(findings, f"findings.{name}").loads,
                 ("load over the rated torque", lambda row: number(row.load)),
                 ("slip", lambda row: number(row.slip)),
                 ("efficiency", lambda row: number(row.efficiency)),
@@ -52,10 +55,6 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         )
         yield over_runs(study, runs, rows, f"Load of the {noun}")
     yield from PICTURES.figures(study)
-
-
-def _name(study: StudyRecord, findings: object) -> str:
-    return next(name for name, entry in study.findings.items() if entry is findings)
 
 
 @PICTURES.declare(CouplingFindings.found_in, "coupling_torque.png")

@@ -69,11 +69,11 @@ class BeltPlan(SlipPlan):
         if "distance" not in self.keys:
             table = replace(table, distance=table.diameter * (1.0 + ratio))
         defaults = {
-            "pretension": lambda: usual_pretension(table, table.service_factor),
-            "J_motor": lambda: pulley_inertia(table.diameter, table.diameter),
-            "J_driven": lambda: pulley_inertia(table.diameter * ratio, table.diameter),
+            "pretension": usual_pretension(table, table.service_factor),
+            "J_motor": pulley_inertia(table.diameter, table.diameter),
+            "J_driven": pulley_inertia(table.diameter * ratio, table.diameter),
         }
-        return replace(table, **{key: value() for key, value in defaults.items() if key not in self.keys})
+        return replace(table, **{key: x for key, x in defaults.items() if key not in self.keys})
 
     def stall_torque(self, table: Any) -> float:
         """The belt slips through, and bends."""
