@@ -100,6 +100,11 @@ class MotorTrials:
         unit = gear_unit(plan.gear_kind, behind, is_given=self.is_made)
         if unit is DIRECT and not self.has_given_ratio:
             series = ""
+        if unit is not None and (belt := task.tables.line_ratio(drive.ratio)) != 1.0:
+            title = (
+                "V-belt" if unit is DIRECT else f"V-belt of {belt:.3g} before a {unit.title} of {behind:.4g}"
+            )
+            unit = dataclasses.replace(unit, title=title)
         return Candidate(motor, drive, margin=plan.demands.margin, unit=unit, series=series)
 
     def judged(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
