@@ -213,3 +213,22 @@ def test_the_belt_that_slips_by_hand(tmp_path):
     assert shaft["value"]["value"] == pytest.approx(2.0 * tension * math.sin(0.5 * wrap), rel=0.01)
     assert "the belt slips through" in text
     assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())
+
+
+@pytest.mark.slow
+def test_sizing_takes_the_line_into_its_trials(tmp_path):
+    """The chosen drive has coupling, belt and gear; the machine has its speed in spite of the slip, and the motor is
+    at its speed before the machine, so that its start is short."""
+    text = "event = []\n[fluid_coupling]\nrated_slip = '6 %'\n[belt]\nratio = 3\n"
+    text += "[sizing]\npoles_least = 4\npoles_most = 4\n"
+    (tmp_path / "mill.toml").write_text(text, "utf-8")
+    process = chainunit("study", "mill.toml", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
+    assert "V-belt of 3 before a two-stage helical gear of" in process.stdout.replace("\n", " ")
+    assert list(result["fmus"]) == ["machine", "belt", "fluid_coupling", "motor"]
+    assert result["answers"]["steady"]["speed_mean"]["value"] == pytest.approx(3.0, rel=0.03)
+    steady = result["coupling_slip"]["answers"]["steady"]
+    assert 0.0 < steady["slip_mean"]["value"] < 0.06
+    chosen = result["sizing"]["candidates"][result["sizing"]["chosen"]]
+    assert chosen["checks"]["start"]["value"]["value"] < result["answers"]["steady"]["speed_mean"]["value"]

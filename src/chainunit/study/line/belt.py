@@ -21,6 +21,7 @@ from ..arrays import peak
 from ..conditions import is_one_of
 from ..event import Role
 from ..file_section import FileSection
+from ..record import StudyRecord
 from ..remark import note, warning
 from ..rules import Rule
 from .slip_plan import SlipPlan
@@ -28,7 +29,6 @@ from .slipping import SlippingPart, parts_of_runs
 
 if TYPE_CHECKING:
     from ..drive import Drive
-    from ..record import StudyRecord
 
 _IRON, _FILLED, _WIDTH = 7200.0, 0.5, 0.35
 """A pulley: density of cast iron [kg/m3], share of a solid disc, width over the diameter of the motor's pulley."""

@@ -15,6 +15,7 @@ from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
 from ..file_section import FileSection
 from ..readings import motor_pull_out
+from ..record import StudyRecord
 from ..remark import note, warning
 from ..verdict import STEADY
 from ..window import Phase
@@ -23,7 +24,6 @@ from .slipping import SlippingPart, SlipRun, parts_of_runs
 
 if TYPE_CHECKING:
     from ..drive import Drive
-    from ..record import StudyRecord
 
 _PUMP, _TURBINE = 20.0, 10.0
 """Inertia of pump wheel and housing and of the turbine wheel over the rated torque by the square of the rated speed
