@@ -109,6 +109,7 @@ def test_icons_follow_from_the_terminals():
     for name, reference in {
         "ChamberForces": "machine", "ChainUnit": "machine", "ChainUnitFlexible": "machine",
         "DcMotor": "motor", "InductionMotor": "motor", "CardanDriveline": "line", "KnifeDrive": "KnifeDrive",
+        "FluidCoupling": "line", "VBelt": "line",
     }.items():  # fmt: skip
         assert shown(MODELS[name]) == {"svg": f"{reference}.svg", "png": f"{reference}.png"}
     assert shown(Gear)["svg"] == "line.svg"

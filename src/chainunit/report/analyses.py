@@ -96,7 +96,7 @@ def _reactions(turn: TurnFindings) -> fig.Panel:
         items.append(fig.Bars(title, positions, [peak for peak, _ in peaks], 0.38, look, words=places))
     # 30 % of room for the words beside the bars
     largest = max(max(r.peak, r.peak_free) for r in pins.values())
-    x = fig.Axis("largest reaction", "N", low=0.0, high=1.3 * largest)
+    x = fig.Axis("largest reaction", "N", low=0.0, high=1.3 * largest or None)
     return fig.Panel(x, fig.Axis("pin", names=tuple(pins)), tuple(items))
 
 

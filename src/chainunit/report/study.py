@@ -20,7 +20,7 @@ from ..study.provenance import Heading
 from ..study.record import StudyRecord
 from ..study.result import speed_control
 from ..study.transients import DIFFERENCE
-from . import answer, figures, run_names, runs, shaft
+from . import answer, figures, run_names, runs, shaft, slip
 from . import blocks as b
 from .analyses import analysis_sections
 from .capability import Contents, capabilities
@@ -290,6 +290,7 @@ def _sections() -> Mapping[str, Contents]:
         **{name: contents for name, contents in analysis_sections().items() if contents.before == "runs"},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
+        "slip": Contents("The parts of the line that slip", slip.blocks, slip.PICTURES.files),
         **analysis_sections(),
         "plots": Contents("Plots", lambda study: figures.PICTURES.figures(study), figures.PICTURES.files),
         "motion": Contents("The machine in motion", lambda study: iter(_motion(study))),

@@ -18,16 +18,12 @@ from ..drives.nameplate import Nameplate
 from ..machines.machine import Machine
 from .cycle import Cycle
 from .drive import Drive
-from .operation import DriveTables
+from .operation import NO_GEAR, DriveTables
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""
 BOOST = "starter.inverter.boost"
 """Key of the voltage boost at low frequency."""
-
-
-_NO_GEAR = 0.05
-"""Relative difference of a ratio to 1 up to which the machine turns with the motor: nobody makes such a gear."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +78,15 @@ def catalogue_drive(
         # the slip is proportional to the torque; the reference of an inverter has the speed of the crank
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
         if gear_ratio is None:
-            ratio = speed / w
-    if gear_ratio is None and offer.kind != "belt" and abs(ratio - 1.0) <= _NO_GEAR:
+            # a motor that follows its reference keeps its own speed, so that no ratio makes up for the slip
+            ratio = speed * (1.0 if follows else tables.speed_behind(mean, plate)) / w
+    is_free = gear_ratio is None and offer.kind != "belt" and tables.line_ratio(ratio) == 1.0
+    if is_free and abs(ratio - 1.0) <= NO_GEAR:
         return catalogue_drive(tables, machine, turn, motor, ambient, 1.0, offer)
     p = with_starter(tables, p, plate)
     if ambient is not None:
         p = replace(p, ambient=replace(p.ambient, T=ambient))
-    return Drive(
+    drive = Drive(
         model,
         p,
         machine.replace({"ratio": ratio}),
@@ -100,7 +98,22 @@ def catalogue_drive(
         transmission=transmission_of(tables, ratio, offer),
         star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
         flywheel_shaft=tables.flywheel_shaft,
+        nameplate=plate,
     )
+    return with_slipping_parts(drive, tables)
+
+
+def with_slipping_parts(drive: Drive, tables: DriveTables) -> Drive:
+    """The drive with the parts of its line that slip.
+
+    Raises
+    ------
+    InputError
+        where such a part does not fit the drive.
+    """
+    for plan in tables.line:
+        drive = replace(drive, line=drive.line.behind(plan.placed(drive.nameplate, drive.ratio)))
+    return drive
 
 
 def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> Transmission:
@@ -109,14 +122,15 @@ def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> 
     gear, given_keys = tables.gear, tables.given
     if "gear.efficiency" in given_keys:
         return replace(gear, ratio=ratio)
+    behind = tables.ratio_behind(ratio)
     return replace(
-        gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, _is_made(tables, offer))
+        gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, behind, _is_made(tables, offer))
     )
 
 
 def transmission_of(tables: DriveTables, ratio: float, offer: GearOffer) -> str:
     """The parts between motor and machine in a noun, see `Drive.transmission`."""
-    unit = gear_unit(offer.kind, ratio, _is_made(tables, offer))
+    unit = gear_unit(offer.kind, tables.ratio_behind(ratio), _is_made(tables, offer))
     return GearUnit.noun if unit is None else unit.noun
 
 

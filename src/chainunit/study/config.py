@@ -48,6 +48,7 @@ from .event_table import read_events
 from .file_section import FileSection
 from .foreign_machine import ForeignMachine, ForeignModel
 from .line.flywheel import FlywheelShaft
+from .line.slip_plan import SlipPlan
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
 from .operation import DriveTables, OperatingConditions
 from .parts import (
@@ -413,6 +414,7 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
             start=checked.start,
             given=contents.given,
             flywheel_shaft=FlywheelShaft(checked.flywheel.place, float(values["flywheel"].turns)),
+            line=tuple(plan for plan in plans.values() if isinstance(plan, SlipPlan)),
             **{name: of_study[name] for name in _OF_DRIVE},
         ),
         events=events,

@@ -17,6 +17,7 @@ from ..drives.contactor import CONTACTOR_EDGE, StarDelta
 from ..drives.gear import Gear
 from ..drives.gear_rating import GearRating
 from ..drives.motor import Motor
+from ..drives.nameplate import Nameplate
 from ..drives.speed_control import Tuning
 from ..machines.api import ChainUnitMachine
 from ..machines.machine import Machine
@@ -60,7 +61,10 @@ class Drive:
     """the tuning of the gains of its control, where they were tuned"""
 
     line: Line = field(default_factory=Line)
-    """its parts that have a table, without the flywheel"""
+    """its parts that have a table, without the flywheel and the gear; see `geared_line`"""
+
+    nameplate: Nameplate | None = None
+    """the nameplate of a motor of the catalogue"""
 
     added_inertia: float = 0.0
     """inertia of the flywheel at its own shaft [kg m2]"""
@@ -105,14 +109,16 @@ class Drive:
     @cached_property
     def driven_machine(self) -> Machine:
         """The machine as its FMU has it: with the gear ratio that remains behind the line."""
-        if not self._mounted_line:
+        if not self.geared_line:
             return self.machine
-        return self.machine.replace(ratio=self.ratio / self._mounted_line.ratio)
+        return self.machine.replace(ratio=self.ratio / self.geared_line.ratio)
 
     @cached_property
-    def _mounted_line(self) -> Line:
-        """The line with the flywheel, if it is on another shaft than the motor's."""
-        return self.flywheel_shaft.mounted(self.line, self.ratio, self.added_inertia)
+    def geared_line(self) -> Line:
+        """The line with the flywheel, if it is on another shaft than the motor's, and with the gear on the driven
+        shaft of the last part that slips."""
+        line = self.flywheel_shaft.mounted(self.line, self.ratio, self.added_inertia)
+        return line.with_gear(*self._gear)
 
     @property
     def inertia_on_rotor(self) -> float:
@@ -134,17 +140,29 @@ class Drive:
         """Parameters of the motor's FMU: the parameters of the motor, with gear and the flywheel on its shaft in the
         rotor."""
         p = self.parameters
-        if self.inertia_on_rotor or self.gear_inertia or self.gear_friction:
-            J = p.rotor.J + self.gear_inertia + self.inertia_on_rotor
-            p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + self.gear_friction))
-        return replace(p, gear=replace(p.gear, loss=self.gear_loss)) if self.gear_loss else p
+        # behind a part that slips the gear turns with the driven shaft, see `geared_line`
+        slips = self.line.before_gear is not None
+        inertia, friction, loss = (0.0, 0.0, 0.0) if slips else self._gear
+        if self.inertia_on_rotor or inertia or friction:
+            J = p.rotor.J + inertia + self.inertia_on_rotor
+            p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + friction))
+        return replace(p, gear=replace(p.gear, loss=loss)) if loss or slips else p
+
+    @property
+    def _gear(self) -> tuple[float, float, float]:
+        return self.gear_inertia, self.gear_friction, self.gear_loss
+
+    @property
+    def gear_at_rotor(self) -> float:
+        """Inertia of the gear that turns with the rotor, at its shaft [kg m2]."""
+        return self.gear_inertia if self.line.before_gear is None else 0.0
 
     @property
     def rotor_inertia(self) -> float:
         """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor, gear, flywheel, and of the parts
         of the line."""
         self.needs_own("the inertia of its rotor")
-        return float(self.fmu_parameters.rotor.J + self._mounted_line.at_motor(0.0))
+        return float(self.fmu_parameters.rotor.J + self.geared_line.at_motor(0.0))
 
     def needs_own(self, quantity: str) -> None:
         """Refuse a `quantity`, named in words, that only a motor of this package has.
@@ -222,7 +240,7 @@ class Drive:
     def whole_line(self) -> Line:
         """The line with the flywheel, and the gear before a foreign machine that has none. Behind other parts its
         ratio may be 1: the twin with a rigid shaft puts that of the driveline there."""
-        machine, line = self.foreign_machine, self._mounted_line
+        machine, line = self.foreign_machine, self.geared_line
         if machine is None or machine.model.has_gear() or not (self.line or machine.needs_gear):
             return line
         gear = Gear.Parameters(ratio=machine.ratio)
@@ -253,7 +271,7 @@ class Drive:
     @property
     def ratio_at_machine(self) -> float:
         """Turns of the shaft that drives the machine's component per turn of the crank."""
-        return self.driven_machine.ratio if self.whole_line is self._mounted_line else 1.0
+        return self.driven_machine.ratio if self.whole_line is self.geared_line else 1.0
 
     def crank_output(self, quantity: Literal["phi", "w"]) -> tuple[str, float]:
         """Name of the angle ("phi") or speed ("w") that turns the machine in a run, and its ratio to that of the

@@ -108,7 +108,8 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     config = study.config
     randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():
-        values = config.table(name)
+        placed = study.drive.line.part(name)
+        values = config.table(name) if placed is None or placed.table is None else placed.table
         if values is None or not section.is_used(study):
             continue
         prefix = f"{name}."

@@ -10,7 +10,7 @@ from ..reading.text import number
 from .coupling import LESS_TORQUE
 from .event import Role
 from .limits import Check, given_motor, reaches
-from .readings import has_turn, less_than_a_turn
+from .readings import has_turn, less_than_a_turn, motor_run_up
 from .record import StudyRecord
 from .rig import worst_residual
 from .start_runs import longest_of
@@ -57,6 +57,7 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
         # the worst crank angle counts
         others = longest_of(findings.starts)
         time = None if others is None or time is None else max(time, others)
+    time = motor_run_up(study.drive, study.runs[START].sel(time=slice(None, study.steady_begin)), time)
     config, permitted = study.config, study.config.permitted_temperature[1]
     return given_motor(
         study.drive, config.plate, permitted, steady.winding_temperature, steady.current_rms, time

@@ -17,7 +17,7 @@ from ..drives.motor import FOREIGN, Motor
 from ..machines.machine import Machine
 from ..reading.tables import given_values, read_table, schema
 from ..system import FmuComponent, foreign_component
-from .catalogue_drive import as_used, catalogue_drive, with_inertia
+from .catalogue_drive import as_used, catalogue_drive, with_inertia, with_slipping_parts
 from .cycle import Cycle
 from .drive import Drive
 from .foreign_machine import declared_parameters
@@ -64,7 +64,7 @@ class OwnMotor(MotorSource):
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
         """See `MotorSource`."""
         follows, p = self.kind.follows(self.parameters), self.parameters
-        return Drive(
+        drive = Drive(
             self.kind,
             p,
             machine,
@@ -74,6 +74,7 @@ class OwnMotor(MotorSource):
             added_inertia=tables.added_inertia,
             flywheel_shaft=tables.flywheel_shaft,
         )
+        return with_slipping_parts(drive, tables)
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """The gains of the control are tuned to the inertia; gains that the file gives stay as they are."""
@@ -140,7 +141,7 @@ class ForeignMotor(MotorSource):
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle) -> Drive:
         """See `MotorSource`; a study with a flywheel on its rotor is refused."""
         motor = self.component
-        return Drive(
+        drive = Drive(
             FOREIGN,
             None,
             machine,
@@ -150,6 +151,7 @@ class ForeignMotor(MotorSource):
             flywheel_shaft=tables.flywheel_shaft,
             foreign=motor,
         )
+        return with_slipping_parts(drive, tables)
 
     def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
         """Nothing follows."""

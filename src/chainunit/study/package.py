@@ -59,7 +59,7 @@ def start_of(drive: Drive, operation: OperatingConditions, model: Model) -> dict
     """
     for kind in parts_of_line():
         if model is kind.model:
-            if (part := drive.line.part(kind.name)) is None:
+            if (part := drive.geared_line.part(kind.name)) is None:
                 raise InputError(f"the study has no [{kind.name}]; add the table, or export without config")
             return part.component.start
     if not isinstance(model, Motor):

@@ -25,8 +25,8 @@ def standard_inertia(
 ) -> tuple[float, float] | None:
     """The inertia at the motor's shaft beside its rotor [kg m2], and the one that IEC 60034-12 demands of a motor of
     design N at 50 Hz to bring up to speed: 0.04 P^0.9 p^2.5, with P in kW and p pairs of poles. None for another
-    start or frequency."""
-    if start not in ("direct", "star-delta") or plate.frequency != 50.0:
+    start or frequency, and before a part that decouples."""
+    if start not in ("direct", "star-delta") or plate.frequency != 50.0 or drive.line.decouples:
         return None
     inertia = np.mean(load_inertia(drive, steady)) + drive.fmu_parameters.rotor.J - plate.J
     return float(inertia), 0.04 * (plate.power / 1e3) ** 0.9 * (plate.poles / 2.0) ** 2.5

@@ -59,11 +59,15 @@ def shaft_power(drive: Drive, run: Dataset) -> Any:
 def torque_before_gear(drive: Drive, run: Dataset) -> Any:
     """Torque on the motor's shaft [N m], shape (time,), with the one that the gear loses."""
     torque = run[drive.motor_torque].values
+    if drive.line.before_gear is not None:
+        return torque
     return torque + lost_torque(np, drive.gear_loss, torque, run[drive.motor_speed].values)
 
 
 def gear_loss(drive: Drive, run: Dataset) -> Any:
     """Power that the gear loses [W], shape (time,)."""
+    if (part := drive.line.before_gear) is not None:
+        return run[f"{part.name}.gear_loss"].values
     torque, w = run["motor.tau"].values, run["motor.w"].values
     return lost_torque(np, drive.gear_loss, torque, w) * w + drive.gear_friction * w * w
 
@@ -106,6 +110,8 @@ def _turns(drive: Drive, run: Dataset) -> Any:
     return (angle - angle[0]) / (2.0 * math.pi)
 
 
+_AT_SPEED = 0.95
+"""Speed of a motor over its last one from which on it takes the current of its start no more."""
 _ROUNDING = 1e-9
 """Turns that a run which ends on a whole turn may miss by rounding."""
 
@@ -121,7 +127,6 @@ def only_whole_turns(drive: Drive, run: Dataset, most: float = math.inf) -> Data
 
     The last row is interpolated linearly; in periodic running it equals the first.
     """
-    import xarray as xr
 
     turned = _turns(drive, run)
     turns = min(_whole(turned), most)
@@ -133,7 +138,7 @@ def only_whole_turns(drive: Drive, run: Dataset, most: float = math.inf) -> Data
     def closed(x: Any) -> Any:
         return np.append(x[:last], x[last - 1] + share * (x[last] - x[last - 1]))
 
-    return xr.Dataset(
+    return Dataset(
         {name: ("time", closed(x.values), x.attrs) for name, x in run.data_vars.items()},
         {"time": ("time", closed(run["time"].values), run["time"].attrs)},
         run.attrs,
@@ -174,17 +179,35 @@ def largest_torque(drive: Drive, run: Dataset, T: float) -> Any:
 
 def pull_out_torque(drive: Drive, run: Dataset, T: float) -> float:
     """Largest torque at the crank [N m] that the motor gives while a rising load slows it down from the mean state of
-    a run until it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
-    drive.needs_own("the pull-out torque")
-    torque = drive.motor.pull_out(drive.fmu_parameters, T, *_mean_supply(drive, run))
+    a run until it stalls, with the winding at `T` [K], or that a part of the line passes on at most; see
+    `Motor.pull_out`."""
+    torque = min(motor_pull_out(drive, run, T), drive.line.stall_torque)
     return torque / (1.0 + drive.gear_loss) * drive.ratio
+
+
+def motor_run_up(drive: Drive, run: Dataset, started: float | None) -> float | None:
+    """Time from rest for which the motor takes the current of its start [s], in a `run` from rest: until the machine
+    has `started` [s] or, before a part that decouples, until the motor has its speed at the end of the run; None for
+    a machine that does not start."""
+    if started is None or not drive.line.decouples:
+        return started
+    speed = run[drive.motor_speed].values
+    return float(run["time"].values[np.argmax(speed >= _AT_SPEED * speed[-1])])
+
+
+def motor_pull_out(drive: Drive, run: Dataset, T: float) -> float:
+    """The pull-out torque of the motor at its shaft [N m], see `pull_out_torque`."""
+    drive.needs_own("the pull-out torque")
+    return float(drive.motor.pull_out(drive.fmu_parameters, T, *_mean_supply(drive, run)))
 
 
 def breakdown_speed(drive: Drive, run: Dataset) -> float:
     """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature of a run; 0
-    where the motor has no such speed. See `Motor.breakdown_speed`."""
+    where the motor has no such speed, or a part of the line slips before. See `Motor.breakdown_speed`."""
     drive.needs_own("the breakdown speed")
     T = float(np.mean(run[f"motor.{drive.motor.temperature}"].values))
+    if math.isfinite(drive.line.stall_torque) and drive.line.stall_torque < motor_pull_out(drive, run, T):
+        return 0.0
     return drive.motor.breakdown_speed(drive.fmu_parameters, T, *_mean_supply(drive, run)) / drive.ratio
 
 

@@ -187,7 +187,7 @@ def transient_words(study: StudyRecord) -> str:
     """The title of the largest torque of a start at the output of the gear, with the electromagnetic transient."""
     line = (
         "with the stiffness of the driveline"
-        if study.drive.line
+        if study.drive.line.is_elastic
         else "an upper bound, as the shafts are rigid"
     )
     return f"electromagnetic transient of the motor puts more on it for some milliseconds ({line})"

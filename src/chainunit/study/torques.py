@@ -35,6 +35,9 @@ def on_coupling(drive: Drive, run: Dataset) -> float:
 def gear_torque(drive: Drive, run: Dataset) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where
     driveline or flywheel are there, else at the crank."""
+    if drive.line.before_gear is not None:
+        wheel = drive.geared_line.part("flywheel")
+        return run["flywheel.tau"].values * wheel.ratio if wheel else crank_torque(drive, run)
     behind_gear = bool(drive.whole_line) and drive.driven_machine.ratio == 1.0
     return run[drive.motor_torque].values * drive.ratio if behind_gear else crank_torque(drive, run)
 
@@ -56,8 +59,8 @@ def quasi_static_torque(drive: Drive, run: Dataset, before: float = 0.0) -> Any:
     It lacks the electromagnetic transient of a motor that is switched on, some periods of the line long: play and
     stiffness of a real line change its peaks. The speed of the run overshoots by this transient; the curve brakes no
     more there than the load drives. An inverter switches nothing: its torque is that of the run, as is that of a
-    machine that gives no load port."""
-    if drive.follows or any(name not in run for name in CURVE):
+    machine that gives no load port, and that behind a part that slips, which softens the transient."""
+    if _is_of_run(drive, run):
         return gear_torque(drive, run)
     p, ratio = drive.fmu_parameters, drive.ratio
     voltage, frequency = run["motor.v"].values / p.supply.V, run["motor.supply.frequency"].values
@@ -70,11 +73,16 @@ def quasi_static_torque(drive: Drive, run: Dataset, before: float = 0.0) -> Any:
     return ratio * (load + (inertia + before / (1.0 + drive.gear_loss)) * a)
 
 
+def _is_of_run(drive: Drive, run: Dataset) -> bool:
+    """Whether the quasi-static torque is that of the run."""
+    return drive.follows or drive.line.before_gear is not None or any(name not in run for name in CURVE)
+
+
 def quasi_static_peak(drive: Drive, run: Dataset, peak_of: PeakOf = at_gear, before: float = 0.0) -> float:
     """Peak torque of a part in a run by load and acceleration, at the crank [N m], see `quasi_static_torque`; at
     most what `peak_of` reads from the run, whose motor may speed up faster than its field follows the curve."""
     most = peak_of(drive, run)
-    if drive.follows or any(name not in run for name in CURVE):
+    if _is_of_run(drive, run):
         return most
     return min(peak(quasi_static_torque(drive, run, before)), most)
 

@@ -57,6 +57,7 @@ _PULLEY = CheckRule(
     *_SHAFT, "F = 2 T f/d, T: largest torque at the motor's shaft in steady running",
     "T = torque; f = /motor_shaft.tension_factor; d = /motor_shaft.pulley_diameter",
 )  # fmt: skip
+_BELT = CheckRule(*_SHAFT, "largest force of both strands of the belt in steady running, as vectors")
 _CRANK = CheckRule(*_SHAFT, "largest reaction of {pin} in steady running")
 
 
@@ -227,7 +228,10 @@ def motor_shaft(study: StudyRecord, plan: CheckPlan, checks: Checks) -> ShaftLoa
         checks.lack(what, why + belt, "motor_shaft")
         return None
     bearing = driver_bearing(drive)
-    if table.pulley_diameter and table.tension_factor:
+    parts = [part.name for part in drive.line]
+    if parts[:1] == ["belt"]:
+        load, rule = ShaftLoad(None, peak(turns["belt.shaft_force"].values)), _BELT
+    elif table.pulley_diameter and table.tension_factor:
         torque = peak(torque_before_gear(drive, turns))
         load = ShaftLoad(torque, pulley_force(torque, table.pulley_diameter, table.tension_factor))
         rule = _PULLEY

@@ -136,13 +136,15 @@ def _read(w: Window, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
     parts["winding"] = w.mean("motor.heat")
     parts["windage"] = float(drive.parameters.rotor.d) * squared
     parts["gear"] = w.mean(gear_loss) if drive.gear_friction or drive.gear_loss else None
-    parts["line"] = sum(w.mean(full) for full in line if full in turns) if drive.line else None
+    # behind a part that slips the gear is a part of the line
+    geared = parts["gear"] or 0.0 if drive.line.before_gear is not None else 0.0
+    parts["line"] = sum(w.mean(full) for full in line if full in turns) - geared if drive.line else None
     if inverter is not None:
         parts["inverter"] = w.mean(lambda drive, run: inverter.loss(run))
     if "machine.dissipated_power" in turns:
         parts |= _machine(w, feed)
     else:
-        parts["machine"] = shaft - (parts["line"] or 0.0)
+        parts["machine"] = shaft - (parts["line"] or 0.0) - geared
     electric = motor + (parts["inverter"] or 0.0)
     missing = electric - sum(x for x in parts.values() if x is not None)
     back = w.mean(lambda drive, run: np.maximum(-run["motor.supply_power"].values, 0.0))

@@ -466,7 +466,7 @@ def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
     even = [
         wheel for wheel, ripple in ripples if ripple is not None and ripple <= findings.permitted_fluctuation
     ]
-    if not even:
+    if not even or not study.drive.line.is_elastic:
         return
     best = min(even, key=lambda wheel: float(wheel.answers.speed_ripple))
     causes = remedies(driveline_of(study.drive))

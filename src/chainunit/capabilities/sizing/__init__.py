@@ -98,6 +98,9 @@ class SizingCapability(Capability):
 
         torque = float(plan.demands.gear_torque)
         if gears := offer(*config.file.catalogues).gears:
+            if config.drive.line_ratio(3.0) != 1.0:
+                why = "a gear of the catalogue is chosen by the whole ratio; leave out [belt], or these gears"
+                yield InputError(f"belt: {why}", "belt")
             yield from gear_faults(gears, config.file.given, config.drive.gear.ratio, torque)
 
     def unused_values(self, machine: Machine, plan: SizingPlan | None) -> Iterable[str]:

@@ -92,11 +92,19 @@ class MotorTrials:
         if chosen is not None:
             series = "own list" if plan.offered else "R80"
         elif not self.has_given_ratio:
-            ratio, series = ratio_on_offer(drive.ratio, plan.ratio_series, plan.offered, _TOLERANCE)
-            drive = with_ratio(gear_ratio=ratio)
-        unit = gear_unit(plan.gear_kind, drive.ratio, is_given=self.is_made)
+            # the parts of the line have their share, and the gear the rest
+            share = task.tables.line_ratio(drive.ratio)
+            ratio, series = ratio_on_offer(drive.ratio / share, plan.ratio_series, plan.offered, _TOLERANCE)
+            drive = with_ratio(gear_ratio=share * ratio)
+        behind = task.tables.ratio_behind(drive.ratio)
+        unit = gear_unit(plan.gear_kind, behind, is_given=self.is_made)
         if unit is DIRECT and not self.has_given_ratio:
             series = ""
+        if unit is not None and (belt := task.tables.line_ratio(drive.ratio)) != 1.0:
+            title = (
+                "V-belt" if unit is DIRECT else f"V-belt of {belt:.3g} before a {unit.title} of {behind:.4g}"
+            )
+            unit = dataclasses.replace(unit, title=title)
         return Candidate(motor, drive, margin=plan.demands.margin, unit=unit, series=series)
 
     def judged(self, c: Candidate, *, worst_start: bool = False) -> Candidate:

@@ -25,7 +25,7 @@ from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
 from ...study.permitted_starts import permitted_starts, starting_data
 from ...study.proposal import DutyPeak
-from ...study.readings import crank_angle, load_inertia, turns_made
+from ...study.readings import crank_angle, load_inertia, motor_run_up, turns_made
 from ...study.relay import start_seconds
 from ...study.rig import Rig, join
 from ...study.start_runs import (
@@ -94,12 +94,12 @@ class Trial:
     def _first(self) -> float | None:
         """Time of the start from the angle 0 [s]; None where it fails."""
         requested = self.task.operation.crank_speed * self.drive.ratio
-        if self.speed <= CREEPS * requested or speeds_up(
+        if self.speed_behind <= CREEPS * requested or speeds_up(
             Rig(self.task.operation, self.drive, None), self.steady
         ):
             return None
-        time, speed = (self._from_rest[name].values for name in ("time", "motor.w"))
-        return time_to_start(time, speed, self.speed, requested)
+        time, speed = self._from_rest["time"].values, self._speed_behind(self._from_rest)
+        return time_to_start(time, speed, self.speed_behind, requested)
 
     @cached_property
     def stall_angle(self) -> float | None:
@@ -166,10 +166,19 @@ class Trial:
         return float(np.mean(self.steady["motor.w"]))
 
     @cached_property
+    def speed_behind(self) -> float:
+        """Mean speed of the machine, at the motor [rad/s]: less than that of the motor by the slip of the line."""
+        return float(np.mean(self._speed_behind(self.steady)))
+
+    def _speed_behind(self, run: xr.Dataset) -> Any:
+        name, ratio = self.drive.crank_output("w")
+        return run[name].values * (self.drive.ratio / ratio)
+
+    @cached_property
     def fluctuation(self) -> float:
         """(Largest - least)/mean of the speed."""
-        w = self.steady["motor.w"].values
-        return float(np.ptp(w[len(w) // 2 :])) / self.speed if self.speed > 0.0 else math.inf
+        w, mean = self._speed_behind(self.steady), self.speed_behind
+        return float(np.ptp(w[len(w) // 2 :])) / mean if mean > 0.0 else math.inf
 
     @cached_property
     def duty(self) -> DutyPeak:
@@ -300,7 +309,8 @@ class Trial:
         speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
-        start = start_check(self.task, self.motor, self.drive, self.start_time)
+        run_up = motor_run_up(self.drive, self._from_rest, self.start_time)
+        start = start_check(self.task, self.motor, self.drive, run_up)
         weaker = min(1.0, plate.frequency / self.frequency)
         # a motor that does not start has the limits that it has at its speed
         cooling = (
@@ -323,7 +333,7 @@ class Trial:
             "starts": Check(
                 "starts per hour", demands.starts_per_hour, self.permitted_starts, "1", forbidden=too_hot
             ),
-            "crank_speed": keeping_speed(self.speed, requested_speed, self.drive.driver_noun),
+            "crank_speed": keeping_speed(self.speed_behind, requested_speed, self.drive.driver_noun),
         }
         if math.isfinite(demands.fluctuation):
             checks["speed"] = Check(

@@ -130,7 +130,7 @@ def live_runs(
             "name": "motor.rotor.J",
             "own": float(drive.parameters.rotor.J),
             "added": float(drive.inertia_on_rotor),
-            "rest": float(drive.gear_inertia),
+            "rest": float(drive.gear_at_rotor),
         },
         "events": [_event(rig, event) for event in taken],
         "results": list(_results(drive, units, "machine.rocker.tau" in columns)),

@@ -48,8 +48,11 @@ class FlywheelShaft:
             return line
         if self.place == MACHINE:
             return line.behind(_placed(ratio / line.ratio, J, self.turns))
-        before = self._before(line)
-        return Line((*before, _placed(1.0, J, 1.0), *line.parts[len(before.parts) :]))
+        *before, part = self._before(line)
+        behind = line.parts[len(before) + 1 :]
+        if part.slips:
+            return Line((*before, part.with_inertia(J), *behind))
+        return Line((*before, part, _placed(1.0, J, 1.0), *behind))
 
     def _before(self, line: Line) -> Line:
         """The line up to the part at whose driven shaft the flywheel sits."""

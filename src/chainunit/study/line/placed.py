@@ -23,11 +23,34 @@ class PlacedPart:
     """turns of its shaft on the motor's side per turn of that on the machine's side"""
     inertia: float = 0.0
     """inertia that turns with its shaft on the machine's side, in addition to the machine's [kg m2]"""
+    inertia_before: float = 0.0
+    """inertia that turns with its shaft on the motor's side [kg m2]"""
+    table: Any = None
+    """the values of its table with those that follow from the drive, if it has such values"""
+    slips: bool = False
+    """whether its driven shaft has a speed of its own, so that the gear behind it turns with this shaft"""
+    decouples: bool = False
+    """whether a motor comes to its speed before the machine does, as its torque grows with the speed"""
+    stall_torque: float = math.inf
+    """largest torque that it takes from the motor's shaft while the machine stands [N m]"""
 
     @property
     def component(self) -> ModelComponent:
         """Its component of the system."""
         return ModelComponent(self.model, self.parameters)
+
+    def with_gear(self, J: float, d: float, loss: float) -> PlacedPart:
+        """The part before a gear with this inertia [kg m2] and drag [N m s/rad] at its shaft on the motor's side, and
+        this `Transmission.loss`."""
+        p, square = self.parameters, self.ratio**2
+        gear = replace(p.gear, d=d * square, loss=loss)
+        p = replace(p, J_driven=self.inertia + J * square, gear=gear)
+        return replace(self, parameters=p, inertia=p.J_driven)
+
+    def with_inertia(self, J: float) -> PlacedPart:
+        """The part with the inertia `J` [kg m2] on its driven shaft, before the gear."""
+        p = replace(self.parameters, J_driven=self.inertia + J)
+        return replace(self, parameters=p, inertia=p.J_driven)
 
     def turned(self, angle: float) -> PlacedPart:
         """The part that starts with its shaft on the motor's side turned by the `angle` [rad]."""
@@ -50,6 +73,39 @@ class Line:
     def part(self, name: str) -> PlacedPart | None:
         """The part of that name; None where there is none."""
         return next((part for part in self if part.name == name), None)
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether it has parts, none of which slips."""
+        return bool(self) and self.before_gear is None
+
+    @property
+    def before_gear(self) -> PlacedPart | None:
+        """The last part that slips; None where the gear turns with the motor."""
+        return next((part for part in reversed(self.parts) if part.slips), None)
+
+    def with_gear(self, J: float, d: float, loss: float) -> Line:
+        """The line whose `before_gear` turns a gear with this inertia [kg m2] and drag [N m s/rad] at the motor's
+        shaft, and this `Transmission.loss`; without such a part the same line."""
+        geared, ratio, parts = self.before_gear, 1.0, []
+        for part in self:
+            gear = (J * ratio**2, d * ratio**2, loss)
+            parts.append(part.with_gear(*gear) if part is geared else part)
+            ratio *= part.ratio
+        return Line(tuple(parts))
+
+    @property
+    def decouples(self) -> bool:
+        """Whether a motor comes to its speed before the machine does."""
+        return any(part.decouples for part in self)
+
+    @property
+    def stall_torque(self) -> float:
+        """Largest torque that the line takes from the motor's shaft while the machine stands [N m]."""
+        ratio, least = 1.0, math.inf
+        for part in self:
+            least, ratio = min(least, part.stall_torque / ratio), ratio * part.ratio
+        return least
 
     def behind(self, part: PlacedPart) -> Line:
         """The line with one more part, behind the others."""
@@ -78,12 +134,12 @@ class Line:
         """Inertia of the parts at the shaft behind the line [kg m2]."""
         inertia = 0.0
         for part in self:
-            inertia = inertia * part.ratio**2 + part.inertia
+            inertia = (inertia + part.inertia_before) * part.ratio**2 + part.inertia
         return inertia
 
     def at_motor(self, inertia: Any) -> Any:
         """An inertia on the shaft behind the line, and the inertias of the parts, at the motor's shaft [kg m2]; a
         part counts as rigid, and as if its ratio were even."""
         for part in reversed(self.parts):
-            inertia = (inertia + part.inertia) / part.ratio**2
+            inertia = (inertia + part.inertia) / part.ratio**2 + part.inertia_before
         return inertia

@@ -1,0 +1,124 @@
+"""The section on the parts of the line that slip: the fluid coupling and the belt, by run and over the load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..core.engines import numpy_
+from ..core.quantities import Layout
+from ..drives.fluid_coupling import torque
+from ..study.line.belt import BeltAnalysis, BeltAnswers, BeltFindings
+from ..study.line.fluid_coupling import CouplingAnalysis, CouplingAnswers, CouplingFindings
+from ..study.line.placed import PlacedPart
+from ..study.line.slipping import parts_of_runs
+from ..study.record import StudyRecord
+from ..study.verdict import START, STEADY
+from . import blocks as b
+from . import figure as fig
+from .cited import cited, number, quantity_rows, table
+from .pictures import Pictures
+from .runs import by_side, over_runs
+
+PICTURES = Pictures()
+_BESIDE = 3
+"""Number of runs beside each other in the figure."""
+_KINDS = (
+    (CouplingFindings, CouplingAnswers, CouplingAnalysis.name, "fluid coupling"),
+    (BeltFindings, BeltAnswers, BeltAnalysis.name, "V-belt"),
+)
+"""The findings and the answers of each part, the name of its analysis, and its noun."""
+
+
+def blocks(study: StudyRecord) -> Iterator[b.Block]:
+    """The tables and the figures of both parts."""
+    for kind, declared, name, noun in _KINDS:
+        findings = kind.found_in(study)
+        if findings is None:
+            continue
+        x = cited(findings, f"findings.{name}")
+        yield b.Table(quantity_rows(x), title=f"The {noun}")
+        if isinstance(findings, BeltFindings):
+            yield from table(
+                cited(findings, f"findings.{name}").loads,
+                ("load over the rated torque", lambda row: number(row.load)),
+                ("slip", lambda row: number(row.slip)),
+                ("efficiency", lambda row: number(row.efficiency)),
+                title="The V-belt over its load, at the rated speed",
+                form="long",
+            )
+        runs = by_side(study, findings.answers)
+        rows = (
+            b.TableRow((v.description, *(number(getattr(x.answers[run], v.name)) for run in runs)))
+            for v in Layout(declared).variables
+        )
+        yield over_runs(study, runs, rows, f"Load of the {noun}")
+    yield from PICTURES.figures(study)
+
+
+@PICTURES.declare(CouplingFindings.found_in, "coupling_torque.png")
+def _characteristic(study: StudyRecord) -> fig.Figure:
+    """The torque of the fluid coupling over its slip, at three speeds of the motor."""
+    findings, placed = CouplingFindings.of_study(study), _part(study, "fluid_coupling")
+    slip, speed = np.linspace(0.0, 1.0, 201), placed.table.rated_speed
+    curves = tuple(
+        fig.Curve(
+            f"motor at {share:.0%} of its rated speed",
+            slip,
+            torque(numpy_(), placed.parameters, share * speed, share * speed * (1.0 - slip))[0],
+            look,
+        )
+        for look, share in enumerate((1.0, 0.75, 0.5))
+    )
+    marks = (
+        fig.Mark(findings.answers[STEADY].slip_mean, "mean slip of steady running", look="reference"),
+        fig.Mark(findings.rated_torque, "rated torque", axis="y"),
+    )
+    axes = fig.Axis("slip", "1", "percent", low=0.0, high=1.0), fig.Axis("torque", "N.m", low=0.0)
+    return fig.Figure(
+        "coupling-torque",
+        "The torque of the fluid coupling",
+        "Torque of the fluid coupling over its slip, with the motor at its rated speed and below.",
+        ((fig.Panel(*axes, (*curves, *marks)),),),
+        half=True,
+    )
+
+
+@PICTURES.declare(lambda study: [kind.found_in(study) for kind, *_ in _KINDS if kind.found_in(study)])
+def _speeds(study: StudyRecord) -> Iterator[fig.Figure]:
+    """The speed before and behind each part, over time."""
+    for part in study.drive.line:
+        if part.slips:
+            yield _speeds_of(study, part)
+
+
+def _speeds_of(study: StudyRecord, part: PlacedPart) -> fig.Figure:
+    noun = {"fluid_coupling": "fluid coupling"}.get(part.name, part.name)
+    panels = []
+    for name, run in parts_of_runs(study, part):
+        if name != STEADY:
+            time = run.time - (0.0 if name == START else study.event[name])
+            curves = (
+                fig.Curve(f"before the {noun}", time, run.speed),
+                fig.Curve(f"behind the {noun}, at the shaft before it", time, run.driven, 1),
+            )
+            x = fig.Axis("time", "s", low=float(time[0]), high=float(time[-1]))
+            panels.append(fig.Panel(x, fig.Axis("speed", "rad/s", "speed"), curves, study.title_of(name)))
+    rows = tuple(
+        (*panels[k : k + _BESIDE], *(None for _ in range(k + _BESIDE - len(panels) if k else 0)))
+        for k in range(0, len(panels), _BESIDE)
+    )
+    return fig.Figure(
+        f"{part.name.replace('_', '-')}-speeds",
+        f"The slip of the {noun}",
+        f"Speed of the shafts before and behind the {noun} over time, in the start and in each event.",
+        rows,
+        level=True,
+    )
+
+
+def _part(study: StudyRecord, name: str) -> PlacedPart:
+    part = study.drive.line.part(name)
+    assert part is not None
+    return part

@@ -1,0 +1,247 @@
+"""The V-belt between the motor, or its fluid coupling, and the gear or the machine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.engines import MATH
+from ...core.quantities import Value, declaration, quantity
+from ...drives.belt import belt_drive
+from ...drives.gear_ratios import UNITS
+from ...drives.gearing import KINDS
+from ...drives.v_belt import VBelt, VBeltData, bending, grip, rated_force, usual_pretension, wrap
+from ...reading.results import part, result
+from ..analysis import Analysis, Findings, Work
+from ..arrays import peak
+from ..conditions import is_one_of
+from ..event import Role
+from ..file_section import FileSection
+from ..record import StudyRecord
+from ..remark import note, warning
+from ..rules import Rule
+from .slip_plan import SlipPlan
+from .slipping import SlippingPart, parts_of_runs
+
+if TYPE_CHECKING:
+    from ..drive import Drive
+
+_IRON, _FILLED, _WIDTH = 7200.0, 0.5, 0.35
+"""A pulley: density of cast iron [kg/m3], share of a solid disc, width over the diameter of the motor's pulley."""
+SLIPS = 5.0
+"""Slip over the rated one from which on the belt slips through."""
+LOADS = (0.25, 0.5, 0.75, 1.0, 1.25)
+"""Loads for the table of the efficiency, over the rated torque."""
+
+
+@declaration
+class BeltTable(VBeltData):
+    """A V-belt from the motor's shaft to the gear or the machine."""
+
+    service_factor: Value = quantity(
+        "1", "factor on the rated torque for which the belt is tensioned", default=1.3, min=1.0, max=3.0
+    )
+
+
+@dataclass(frozen=True)
+class BeltPlan(SlipPlan):
+    """The belt of a study."""
+
+    name = "belt"
+    model = VBelt
+
+    def share(self, ratio: float) -> float:
+        """Its own ratio, or the whole one where one belt has it."""
+        if "ratio" in self.keys:
+            return float(self.table.ratio)
+        return ratio if 1.0 <= ratio <= UNITS["belt"][0].largest else KINDS["belt"].ratio
+
+    def completed(self, table: Any, ratio: float) -> Any:
+        """With the standard pulley of the motor, the usual distance and tension, and the inertia of the pulleys."""
+        table = replace(table, ratio=ratio)
+        if "diameter" not in self.keys:
+            belt = belt_drive(table.rated_power, table.rated_speed, ratio, table.service_factor)
+            table = replace(table, diameter=belt.small)
+        if "distance" not in self.keys:
+            table = replace(table, distance=table.diameter * (1.0 + ratio))
+        defaults = {
+            "pretension": usual_pretension(table, table.service_factor),
+            "J_motor": pulley_inertia(table.diameter, table.diameter),
+            "J_driven": pulley_inertia(table.diameter * ratio, table.diameter),
+        }
+        return replace(table, **{key: x for key, x in defaults.items() if key not in self.keys})
+
+    def stall_torque(self, table: Any) -> float:
+        """The belt slips through, and bends."""
+        return float(0.5 * table.diameter * grip(MATH, table, table.rated_speed) + bending(MATH, table))
+
+
+def pulley_inertia(diameter: float, small: float) -> float:
+    """Inertia of a pulley of that diameter [m] beside a motor's pulley of the diameter `small` [m], in kg m2."""
+    return math.pi / 32.0 * _IRON * _FILLED * _WIDTH * small * diameter**4
+
+
+@declaration
+class BeltAnswers:
+    """The load of the belt in a run. It slips through from 5 times the rated slip on."""
+
+    force_peak: Value = quantity("N", "force of the belt, peak")
+    grip_largest: Value = quantity("1", "largest force over the grip", kind="percent")
+    slip_mean: Value = quantity("1", "slip, mean", kind="percent")
+    slipping_time: Value = quantity("s", "time in which it slips through")
+    tight_strand_peak: Value = quantity("N", "tight strand, peak")
+    shaft_force_mean: Value = quantity("N", "radial force on either shaft, mean")
+    shaft_force_peak: Value = quantity("N", "radial force on either shaft, peak")
+    loss_mean: Value = quantity("W", "power turned into heat, mean")
+    heat: Value = quantity("J", "heat")
+
+
+@result
+class BeltLoad:
+    """The belt at a constant load and the rated speed."""
+
+    load: float = quantity("1", "load over the rated torque", kind="percent")
+    slip: float = quantity("1", "slip", kind="percent")
+    efficiency: float = quantity("1", "efficiency", kind="percent")
+
+
+@result
+class BeltFindings(Findings):
+    """By run, the load of the belt; its dimensions; its efficiency over the load."""
+
+    small_pulley: float = quantity("m", "pitch diameter of the motor's pulley", kind="millimetres")
+    large_pulley: float = quantity("m", "pitch diameter of the driven pulley", kind="millimetres")
+    wrap: float = quantity("rad", "wrap of the smaller pulley")
+    speed: float = quantity("m/s", "speed of the belt at the motor's rated speed")
+    pretension: float = quantity("N", "tension of a strand at rest, of all belts together")
+    static_force: float = quantity("N", "radial force on either shaft at rest")
+    slip_torque: float = quantity("N.m", "torque at the motor's shaft at which it slips through")
+    loads: tuple[BeltLoad, ...] = part("efficiency over load", default=())
+    answers: Mapping[str, BeltAnswers] = part("load of the belt, by run", default_factory=dict)
+
+    def remark(self, study: StudyRecord) -> None:
+        """The runs in which the belt slips through."""
+        for name, answers in self.answers.items():
+            if answers.slipping_time:
+                event = study.config.events.get(name)
+                code = _PROTECTS if event is not None and event.role is Role.SHOCK else _SLIPS
+                study.say(
+                    code,
+                    name,
+                    title=study.title_of(name),
+                    time=answers.slipping_time,
+                    torque=self.slip_torque,
+                    heat=answers.heat,
+                )
+
+
+_SLIPS_THROUGH = (
+    "{title}: the belt slips through for {time}, at {torque} at the motor's shaft.",
+    "It turns {heat} into heat.",
+)
+_SIZES = {"s": "time", "N.m": "torque", "J": "heat"}
+_SLIPS = warning(
+    "belt-slips",
+    *_SLIPS_THROUGH,
+    remedy="More tension (belt.pretension), more belts or larger pulleys hold it, and load both shafts more.",
+    sizes=_SIZES,
+)
+_PROTECTS = note("belt-slips-in-overload", *_SLIPS_THROUGH, sizes=_SIZES)
+
+
+def at_loads(table: BeltTable) -> tuple[BeltLoad, ...]:
+    """The belt at the `LOADS`, as far as it carries them."""
+    radius, bend, rated = 0.5 * table.diameter, bending(MATH, table), table.rated_power / table.rated_speed
+    limit, rated_pull = grip(MATH, table, table.rated_speed), rated_force(MATH, table)
+    creep, rows = table.rated_slip * math.sqrt((limit / rated_pull) ** 2 - 1.0), []
+    for load in LOADS:
+        share = (load * rated - bend) / radius / limit
+        if 0.0 < share < 1.0:
+            slip = creep * share / math.sqrt(1.0 - share * share)
+            rows.append(BeltLoad(load, slip, (1.0 - slip) * share * limit * radius / (load * rated)))
+    return tuple(rows)
+
+
+class BeltAnalysis(Analysis):
+    """The load of the belt in each run."""
+
+    name = "belt_slip"
+    needs_runs = True
+
+    @staticmethod
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
+        """Whether the drive has one."""
+        return drive.line.part(BeltPlan.name) is not None
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> BeltFindings:
+        """The load in each run."""
+        placed = study.drive.line.part(BeltPlan.name)
+        assert placed is not None
+        table, answers = placed.table, {}
+        for name, run in parts_of_runs(study, placed):
+            x = run.variables
+            slipping = np.abs(run.speed - run.driven) > SLIPS * table.rated_slip * table.rated_speed
+            answers[name] = BeltAnswers(
+                force_peak=peak(x["force"]),
+                grip_largest=peak(x["grip"]),
+                slip_mean=run.mean(run.slip),
+                slipping_time=run.sum(slipping.astype(float)),
+                tight_strand_peak=peak(x["tight_strand"]),
+                shaft_force_mean=run.mean(x["shaft_force"]),
+                shaft_force_peak=peak(x["shaft_force"]),
+                loss_mean=run.mean(run.heat),
+                heat=run.sum(run.heat),
+            )
+        angle = wrap(MATH, table)
+        return BeltFindings(
+            small_pulley=table.diameter,
+            large_pulley=table.diameter * table.ratio,
+            wrap=angle,
+            speed=0.5 * table.diameter * table.rated_speed,
+            pretension=table.pretension,
+            static_force=2.0 * table.pretension * math.sin(0.5 * angle),
+            slip_torque=placed.stall_torque,
+            loads=at_loads(table),
+            answers=answers,
+        )
+
+
+class BeltPart(SlippingPart):
+    """The part, with the table [belt]."""
+
+    def rules(self) -> Iterable[Rule]:
+        """Sizing takes the rest of the ratio for the gear, not for a second belt."""
+        yield from super().rules()
+        refusal = 'is the belt; take sizing.gear_kind = "none", or the kind of the gear behind it'
+        yield Rule(self.name, is_one_of("sizing.gear_kind", "belt"), refusal)
+
+    name = BeltPlan.name
+    order = 6
+    model = VBelt
+    plan_type = BeltPlan
+    analysis = BeltAnalysis
+    tables = {  # noqa: RUF012
+        "belt": FileSection(
+            BeltTable,
+            optional=True,
+            title="V-belt",
+            follows={
+                "ratio": "the whole ratio of the drive up to 6.3, else 3; a gear behind the belt has the rest",
+                "rated_power": "the motor's, by its nameplate",
+                "rated_speed": "the motor's, by its nameplate",
+                "diameter": "the standard pulley of a narrow V-belt for the rated torque times service_factor",
+                "distance": "both diameters together",
+                "pretension": "makers' rule for service_factor times the rated torque",
+                "J_motor": "cast iron pulley, half of a solid disc",
+                "J_driven": "cast iron pulley, half of a solid disc",
+            },
+        )
+    }
+
+
+PART = BeltPart()

@@ -1,0 +1,234 @@
+"""Fluid coupling and V-belt in a study: their place in the drive, the values that follow, the refusals, and both
+examples by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command import chainunit
+
+from chainunit import InputError
+from chainunit.capabilities.energy.running import run_steadily
+from chainunit.reading.result_entries import ResultEntries
+from chainunit.study.choice import drive_of
+from chainunit.study.config import parse
+from chainunit.study.rig import Rig
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+MILL = """
+event = []
+[system]
+motor = "IE3 4-pole 0.37 kW, 71M"
+"""
+POWER, SPEED = 370.0, 1424.0 * math.pi / 30.0
+
+
+def drive(text):
+    return drive_of(parse(MILL + text))
+
+
+# -- the place in the drive
+
+
+def test_the_ratio_makes_up_for_the_slip():
+    """The motor turns the machine at the speed that is asked for, behind 3 % of slip at the rated torque."""
+    bare, slipping = drive(""), drive("[fluid_coupling]\nrated_slip = '6 %'\n")
+    p = slipping.line.parts[0].parameters
+    assert (p.rated_power, p.rated_speed) == (POWER, pytest.approx(SPEED, rel=1e-12))
+    lost = 1.0 - slipping.ratio / bare.ratio
+    # the mean torque is a share of the rated one, and so is the slip
+    mean = (1500.0 - bare.ratio * 3.0 * 30.0 / math.pi) / (1500.0 - 1424.0)
+    assert lost == pytest.approx(0.06 * mean, rel=0.02) and lost > 0.002
+    assert slipping.line.stall_torque == pytest.approx(2.0 * POWER / SPEED, rel=1e-9)
+
+
+def test_a_belt_has_its_part_of_the_ratio_and_the_gear_the_rest():
+    whole, split = drive("[gear]\nratio = 6\n[belt]\n"), drive("[gear]\nratio = 60\n[belt]\nratio = 4\n")
+    # one belt has a ratio of 6, and then there is no gear that loses anything
+    assert whole.line.ratio == 6.0 and whole.gear_loss == 0.0
+    assert split.line.ratio == 4.0 and split.driven_machine.ratio == pytest.approx(15.0)
+    # a gear of 15 has two stages of 98 %
+    assert split.gear_loss == pytest.approx(1.0 / 0.98**2 - 1.0, rel=1e-12)
+    p = split.line.parts[0].parameters
+    assert p.distance == pytest.approx(5.0 * p.diameter, rel=1e-12)
+    # the motor's pulley is a standard one
+    assert p.diameter == 0.063
+
+
+def test_the_gear_turns_with_the_driven_shaft():
+    """Inertia, drag and loss of the gear, given at the motor's shaft, are those of the driven pulley."""
+    gear = "[gear]\nratio = 60\nJ = 0.002\nd = 0.001\nefficiency = 0.9\n"
+    bare, split = drive(gear), drive(gear + "[fluid_coupling]\n[belt]\nratio = 4\nJ_driven = 0.03\n")
+    first, last = split.geared_line.parts
+    assert (first.name, last.name) == ("fluid_coupling", "belt")
+    assert first.parameters.gear.loss == 0.0 and last.parameters.gear.loss == pytest.approx(1.0 / 0.9 - 1.0)
+    assert last.parameters.J_driven == pytest.approx(0.03 + 0.002 * 16.0, rel=1e-12)
+    assert last.parameters.gear.d == pytest.approx(0.001 * 16.0, rel=1e-12)
+    motor = split.fmu_parameters
+    assert motor.gear.loss == 0.0 and motor.rotor == split.parameters.rotor
+    # the inertia at the motor is that of rotor, gear and both parts
+    belts = last.parameters.J_motor + 0.03 / 16.0
+    wheels = first.parameters.J_motor + first.parameters.J_driven
+    assert split.rotor_inertia == pytest.approx(bare.rotor_inertia + belts + wheels, rel=1e-12)
+
+
+def test_a_study_without_such_a_part_has_the_gear_at_the_rotor():
+    bare = drive("[gear]\nJ = 0.002\nd = 0.001\n")
+    p = bare.fmu_parameters
+    assert p.rotor.J == bare.parameters.rotor.J + 0.002 and p.rotor.d == bare.parameters.rotor.d + 0.001
+    assert p.gear.loss == bare.gear_loss > 0.0 and bare.geared_line.parts == ()
+
+
+# -- refusals
+
+
+@pytest.mark.parametrize(
+    ("text", "refusal"),
+    [
+        ("[driveline]\n[belt]\n", r"driveline: takes what is before it for rigid, and \[belt\] slips"),
+        (
+            "[fluid_coupling]\npeak_factor = 0.9\n",
+            r"fluid_coupling.peak_factor = 0.9: must be >= 1.1 and <= 5",
+        ),
+        (
+            "[fluid_coupling]\ntemperature = '150 degC'\n",
+            r"fluid_coupling.plug_temperature = 413.15 K: must be > fluid_coupling.temperature",
+        ),
+    ],
+)
+def test_a_file_is_refused(text, refusal):
+    with pytest.raises(InputError, match=refusal):
+        parse(MILL + text)
+
+
+def test_a_motor_without_nameplate_needs_the_rated_power():
+    config = parse("event = []\n[fluid_coupling]\n")
+    with pytest.raises(InputError, match=r"fluid_coupling.rated_power: is that of the motor's nameplate"):
+        drive_of(config)
+    given = parse("event = []\n[fluid_coupling]\nrated_power = '500 W'\nrated_speed = '150 rad/s'\n")
+    assert drive_of(given).line.parts[0].parameters.rated_power == 500.0
+
+
+def test_a_belt_that_is_too_slack_is_refused_with_its_least_tension():
+    with pytest.raises(InputError, match=r"belt\.pretension = 20 N: the belt slips .*must be > "):
+        drive("[gear]\nratio = 60\n[belt]\nratio = 4\npretension = 20\n")
+
+
+def test_sizing_has_no_second_belt():
+    with pytest.raises(InputError, match=r"belt: is the belt; take sizing.gear_kind"):
+        parse("event = []\n[belt]\n[sizing]\ngear_kind = 'belt'\n")
+
+
+# -- energy
+
+
+@pytest.mark.second
+def test_the_account_of_energy_closes_with_both_parts():
+    """The electric power goes to motor, line, gear and machine; the gear, which turns with the belt, counts once."""
+    config = parse(MILL + "[gear]\nratio = 52\nd = 0.0005\n[fluid_coupling]\n[belt]\nratio = 4\n")
+    slipping = drive_of(config)
+    load = run_steadily(Rig(config.operation, slipping, None), slipping, config.feed, None)
+    losses = load.losses
+    assert abs(losses.missing) < 2e-3 * losses.electric
+    turns = load.turns
+    heat = sum(np.mean(turns[f"{name}.dissipated_power"].values) for name in ("fluid_coupling", "belt"))
+    assert (
+        losses.gear == pytest.approx(np.mean(turns["belt.gear_loss"].values), rel=0.01) and losses.gear > 0.0
+    )
+    assert losses.line == pytest.approx(heat - losses.gear, rel=0.01) and losses.line > losses.gear
+
+
+# -- the examples
+
+
+def result_of(name, folder):
+    process = chainunit("study", EXAMPLES / f"{name}.toml", "-o", "out", "--all", cwd=folder)
+    assert process.returncode == 0, process.stderr
+    result = ResultEntries(json.loads((folder / "out" / "result.json").read_text("utf-8")))
+    with xr.open_dataset(folder / "out" / "result.nc", group="jam") as run:
+        return result, run.load(), process.stdout
+
+
+@pytest.mark.second
+def test_the_mill_with_a_fluid_coupling_by_hand(tmp_path):
+    """The motor turns on while the mill is jammed: the coupling takes its stall torque at the speed of the motor."""
+    result, jam, text = result_of("mill_with_fluid_coupling", tmp_path)
+    rated, w_rated, w_0 = 15e3 / (1476.0 * math.pi / 30.0), 1476.0 * math.pi / 30.0, 1500.0 * math.pi / 30.0
+    stall = 2.0 * rated
+    # the slip of the motor in proportion to its torque
+    w = w_0 - (w_0 - w_rated) * stall * 0.97 / rated
+    torque = stall * (w / w_rated) ** 2
+    assert float(jam["fluid_coupling.tau"][-1]) == pytest.approx(torque, rel=0.02)
+    assert float(jam["motor.w"][-1]) == pytest.approx(w, rel=0.01)
+    # the law itself, at the speed and slip of the run
+    last = {name: float(jam[f"fluid_coupling.{name}"][-1]) for name in ("tau", "slip", "dissipated_power")}
+    speed = float(jam["motor.w"][-1])
+    b, s = 0.03 * 1.0 / (1.0 - 0.06), last["slip"] / speed
+    assert last["tau"] == pytest.approx(stall * (1.0 + b) * s / (s + b) * (speed / w_rated) ** 2, rel=2e-3)
+    assert last["dissipated_power"] == pytest.approx(torque * w, rel=0.03)
+    assert abs(float(jam["fluid_coupling.driven.w"][-1])) < 0.02 * w
+    findings = result["coupling_slip"]
+    jammed, steady = findings["answers"]["jam"], findings["answers"]["steady"]
+    assert findings["stall_torque"]["value"] == pytest.approx(stall, rel=1e-9)
+    assert jammed["plug_time"]["value"] == pytest.approx(40e3 * 70.0 / (torque * w), rel=0.03)
+    assert jammed["heat"]["value"] == pytest.approx(
+        np.trapezoid(jam["fluid_coupling.dissipated_power"], jam["time"]), rel=0.02
+    )
+    assert steady["slip_mean"]["value"] == pytest.approx(0.018, rel=0.03)
+    assert "fusible plug" in text and "IEC 60034-12" not in text
+    assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())
+
+
+@pytest.mark.second
+def test_the_belt_that_slips_by_hand(tmp_path):
+    """Grip, slip and forces on the shafts; in the jam the motor keeps its speed and the belt slips through."""
+    result, jam, text = result_of("belt_slips", tmp_path)
+    w, r = 1476.0 * math.pi / 30.0, 0.1
+    wrap = math.pi - 2.0 * math.asin(0.5 * 0.2 / 1.2)
+    m, tension = math.exp(0.92 * wrap), 900.0 - 0.6 * (r * w) ** 2
+    bending = (1.0 - 0.95 / 0.99) * 15e3 / w
+    limit = 2.0 * tension * (m - 1.0) / (m + 1.0) * r + bending
+    findings = result["belt_slip"]
+    assert findings["slip_torque"]["value"] == pytest.approx(limit, rel=1e-9)
+    assert findings["static_force"]["value"] == pytest.approx(1800.0 * math.sin(0.5 * wrap), rel=1e-9)
+    assert findings["wrap"]["value"] == pytest.approx(wrap, rel=1e-12)
+    stuck = jam.isel(time=int(np.argmin(np.abs(jam["belt.driven.w"].values))))
+    assert float(stuck["belt.tau"]) == pytest.approx(limit, rel=0.01)
+    assert float(stuck["motor.w"]) > 0.95 * w and abs(float(stuck["belt.driven.w"])) < 1.0
+    jammed, steady = findings["answers"]["jam"], findings["answers"]["steady"]
+    assert jammed["slipping_time"]["value"] > 1.0 and steady["slipping_time"]["value"] == 0.0
+    assert steady["slip_mean"]["value"] == pytest.approx(0.004, rel=0.15)
+    assert steady["shaft_force_mean"]["value"] == pytest.approx(
+        2.0 * tension * math.sin(0.5 * wrap), rel=0.01
+    )
+    # the efficiency of the data at full load, less at part load
+    loads = {row["load"]["value"]: row["efficiency"]["value"] for row in findings["loads"]}
+    assert loads[1.0] == pytest.approx(0.95, rel=1e-6) and loads[0.25] < 0.86 < loads[0.5]
+    (shaft,) = (row for row in result["checks"]["rows"] if row["title"] == "overhung load of the shaft")
+    assert shaft["value"]["value"] == pytest.approx(2.0 * tension * math.sin(0.5 * wrap), rel=0.01)
+    assert "the belt slips through" in text
+    assert all(x["value"] < 1e-3 for x in result["certificate"]["jam"].values())
+
+
+@pytest.mark.slow
+def test_sizing_takes_the_line_into_its_trials(tmp_path):
+    """The chosen drive has coupling, belt and gear; the machine has its speed in spite of the slip, and the motor is
+    at its speed before the machine, so that its start is short."""
+    text = "event = []\n[fluid_coupling]\nrated_slip = '6 %'\n[belt]\nratio = 3\n"
+    text += "[sizing]\npoles_least = 4\npoles_most = 4\n"
+    (tmp_path / "mill.toml").write_text(text, "utf-8")
+    process = chainunit("study", "mill.toml", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    result = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text("utf-8")))
+    assert "V-belt of 3 before a two-stage helical gear of" in process.stdout.replace("\n", " ")
+    assert list(result["fmus"]) == ["machine", "belt", "fluid_coupling", "motor"]
+    assert result["answers"]["steady"]["speed_mean"]["value"] == pytest.approx(3.0, rel=0.03)
+    steady = result["coupling_slip"]["answers"]["steady"]
+    assert 0.0 < steady["slip_mean"]["value"] < 0.06
+    chosen = result["sizing"]["candidates"][result["sizing"]["chosen"]]
+    assert chosen["checks"]["start"]["value"]["value"] < result["answers"]["steady"]["speed_mean"]["value"]
