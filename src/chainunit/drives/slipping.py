@@ -89,6 +89,7 @@ def slipping(law: Law, ratio: Callable[[Any], Any], parameters: type, *parts: Pa
             self.held = slope(law(engine, p, w, Dual(driven, self.a))[0])
 
     def outputs(xp: Any, p: Any, u: Any, x: Any, s: SlipPoint) -> SlipOutputs:
+        """The load port of the motor, the slip, the driven shaft, and the heat."""
         tau, w2 = s.tau + p.J_motor * u.a, u.w * u.w
         small2 = W_SMALL * W_SMALL
         return SlipOutputs(

@@ -127,6 +127,7 @@ def only_whole_turns(drive: Drive, run: Dataset, most: float = math.inf) -> Data
 
     The last row is interpolated linearly; in periodic running it equals the first.
     """
+    import xarray as xr
 
     turned = _turns(drive, run)
     turns = min(_whole(turned), most)
@@ -138,7 +139,7 @@ def only_whole_turns(drive: Drive, run: Dataset, most: float = math.inf) -> Data
     def closed(x: Any) -> Any:
         return np.append(x[:last], x[last - 1] + share * (x[last] - x[last - 1]))
 
-    return Dataset(
+    return xr.Dataset(
         {name: ("time", closed(x.values), x.attrs) for name, x in run.data_vars.items()},
         {"time": ("time", closed(run["time"].values), run["time"].attrs)},
         run.attrs,
