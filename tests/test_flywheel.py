@@ -251,3 +251,31 @@ def test_sizing_finds_the_inertia_and_takes_the_place(key):
     assert isinstance(read.plans["sizing"], SizingPlan)
     with pytest.raises(InputError, match="sizing tries flywheels of the motor or of the machine"):
         config.parse(SIZED.format('place = "driveline"') + LINE)
+
+
+# --- behind a belt that slips
+
+BELT = "[belt]\nratio = 4\n"
+
+
+def test_on_the_driven_pulley_it_is_the_inertia_of_the_pulley():
+    """A drive whose driven pulley has the inertia of flywheel and pulley moves in the same way."""
+    rig, wheel = run(2.0, 'place = "belt"', more=BELT, end=0.6)
+    pulley = rig_of(0.0, 'place = "belt"', more=BELT).drive.line.parts[0].inertia
+    _, heavy = run(0.0, more=f"{BELT}J_driven = {2.0 + pulley!r}\n", end=0.6)
+    assert rig.drive.flywheel_ratio == 4.0 and pulley > 0.0
+    for name in ("motor.w", "belt.driven.tau", "machine.tau"):
+        np.testing.assert_allclose(
+            wheel[name], heavy[name], rtol=1e-9, atol=1e-9 * np.max(np.abs(heavy[name]))
+        )
+
+
+def test_behind_belt_and_gear_the_gear_carries_its_torque():
+    """The torque of the gear is that of the machine, and what speeds up the flywheel."""
+    rig, steady = run(300.0, MACHINE, more=BELT, end=1.0)
+    a = np.gradient(steady["flywheel.driven.w"].values, steady["time"].values)
+    expected = steady["machine.tau"].values + 300.0 * a
+    off = gear_torque(rig.drive, steady) - expected
+    # the difference quotient misses the first jerks of the start
+    assert np.max(np.abs(off[50:-2])) < 2e-3 * np.max(np.abs(expected))
+    assert np.max(np.abs(300.0 * a[50:])) > 0.2 * np.max(np.abs(expected))
