@@ -71,7 +71,7 @@ BLOCKS = [
 ]
 RIGHT = [
     *(
-        re.sub(r'"(linkages|catalogue)/', rf'"{ROOT.as_posix()}/examples/\1/', file.read_text("utf-8"))
+        re.sub(r'"(linkages|loads|catalogue)/', rf'"{ROOT.as_posix()}/examples/\1/', file.read_text("utf-8"))
         for file in sorted((ROOT / "examples").glob("*.toml"))
     ),
     *map(example, EXAMPLES),
