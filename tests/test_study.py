@@ -81,6 +81,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "stability.png",
         "resonance.png",
         "ratio.png",
+        "coupling_torque.png",
         "observer.png",
         "force_over_stroke.png",
     }

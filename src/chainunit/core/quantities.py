@@ -60,6 +60,7 @@ TYPES: dict[str, str] = {
     "m/s": "Velocity",
     "m/s2": "Acceleration",
     "kg": "Mass",
+    "kg/m": "LinearDensity",
     "kg.m2": "MomentOfInertia",
     "kg.m2/rad": "MomentOfInertiaSlope",
     "N": "Force",

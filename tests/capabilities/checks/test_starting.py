@@ -21,6 +21,7 @@ from chainunit.capabilities.checks.tables import StartingTable
 from chainunit.drives.catalogue import catalogue
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.config import parse
+from chainunit.study.line.placed import Line
 from chainunit.study.permitted_starts import StartingData, permitted_starts, start_torques
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
@@ -108,7 +109,7 @@ def test_the_inertia_that_a_standard_has_every_motor_start(monkeypatch, inertia,
     plate = next(m.nameplate for m in catalogue() if m.designation == "IE3 4-pole 11 kW, 160M")
     flywheel, rotor = 0.01, SimpleNamespace(J=plate.J + 0.01)
     study = SimpleNamespace(
-        drive=SimpleNamespace(foreign=None, fmu_parameters=SimpleNamespace(rotor=rotor)),
+        drive=SimpleNamespace(foreign=None, line=Line(), fmu_parameters=SimpleNamespace(rotor=rotor)),
         plate=SimpleNamespace(nameplate=dataclasses.replace(plate, starts=0.0)),
         config=SimpleNamespace(drive=SimpleNamespace(start=start)),
         steady=None,
