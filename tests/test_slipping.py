@@ -45,7 +45,7 @@ def belt(**values):
         "pretension": 520.0,
     }
     return VBelt.parameter_layout.from_names(
-        {**rated, "mass": 0.4, "J_motor": 0.003, "J_driven": 0.15} | values
+        {**rated, "mass_per_length": 0.4, "J_motor": 0.003, "J_driven": 0.15} | values
     )
 
 
@@ -63,8 +63,8 @@ def belt_force(p, w1, w2):
     r, v = 0.5 * p.diameter, 0.5 * p.diameter * w1
     wrap = math.pi - 2.0 * math.asin((p.ratio - 1.0) * p.diameter / 2.0 / p.distance)
     grip = 2.0 * math.tanh(0.5 * p.friction * wrap)
-    most = grip * (p.pretension - p.mass * v * v)
-    at_rated = grip * (p.pretension - p.mass * (r * p.rated_speed) ** 2)
+    most = grip * (p.pretension - p.mass_per_length * v * v)
+    at_rated = grip * (p.pretension - p.mass_per_length * (r * p.rated_speed) ** 2)
     rated = p.rated_power / p.rated_speed / r * p.efficiency / (1.0 - p.rated_slip)
     # at the rated slip s the force is F = at_rated s/hypot(s, c)
     c = p.rated_slip * math.sqrt((at_rated / rated) ** 2 - 1.0)
@@ -106,7 +106,7 @@ def test_the_torque_of_a_coupling_has_the_four_numbers_of_its_data_sheet():
 
 def test_a_steady_belt_by_hand():
     """Slip, efficiency and force on the shafts at the rated torque; the limit by Euler and Eytelwein."""
-    p = belt(ratio=3.0, mass=0.0)
+    p = belt(ratio=3.0, mass_per_length=0.0)
     w, r = 150.0, 0.056
     driven = w * 0.99 / 3.0
     tau, passed = v_belt.torques(MATH, p, w, driven)
@@ -130,10 +130,10 @@ def test_a_steady_belt_by_hand():
 
 def test_the_tension_by_the_rule_of_makers_holds_five_to_one():
     """At half a turn of wrap the tight strand carries five times as much as the slack one."""
-    p = belt(ratio=1.0, mass=0.0)
+    p = belt(ratio=1.0, mass_per_length=0.0)
     pull = 4e3 / 150.0 / 0.056
     assert v_belt.usual_pretension(p, 1.0) == pytest.approx(0.75 * pull, rel=1e-9)
-    fast = belt(ratio=1.0, mass=0.5)
+    fast = belt(ratio=1.0, mass_per_length=0.5)
     assert v_belt.usual_pretension(fast, 1.0) == pytest.approx(
         0.75 * pull + 0.5 * (0.056 * 150.0) ** 2, rel=1e-9
     )

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..core.model import FmuData
 from ..core.quantities import Value, declaration, quantity
 from .slipping import Slipping, slipping
 
@@ -99,4 +100,5 @@ FluidCoupling = slipping(
         "load port and shows one"
     ),
     internal_step=_internal_step,
+    fmu_data=FmuData(sizes={"w": 60.0}),  # near the rated speed
 )

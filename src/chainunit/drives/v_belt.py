@@ -4,7 +4,7 @@ The belt creeps under load, in proportion to it at first, and slips through wher
 smaller wrap (Euler and Eytelwein), from which the belt speed v takes the centrifugal part:
 
     F = F_grip s/sqrt(s^2 + c^2 (w^2 + (w_share speed)^2)),    s = w - ratio w_driven
-    F_grip = 2 (pretension - mass v^2) (m - 1)/(m + 1),        m = exp(friction wrap)
+    F_grip = 2 (pretension - mass_per_length v^2) (m - 1)/(m + 1),        m = exp(friction wrap)
 
 c is such that the slip at the rated torque is the rated one. `friction` is that of the groove, mu/sin(half its
 angle). The torque that bends the belt around the pulleys does not depend on the load, so that the efficiency falls
@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.engines import MATH
-from ..core.model import Part, Requirement
+from ..core.model import FmuData, Part, Requirement
 from ..core.quantities import Value, declaration, quantity
 from .slipping import Slipping, slipping
 
@@ -55,7 +55,7 @@ class VBeltData:
         min=0.1,
         max=5.0,
     )
-    mass: Value = quantity("kg/m", "mass of all belts per length", default=0.0, min=0.0, max=100.0)
+    mass_per_length: Value = quantity("kg/m", "mass of all belts per length", default=0.0, min=0.0, max=100.0)
     rated_slip: Value = quantity(
         "1", "slip at the rated torque", default=0.01, min=0.001, max=0.05, kind="percent"
     )
@@ -100,7 +100,7 @@ def _radius(xp: Any, p: Any) -> Any:
 def _pressing(xp: Any, p: Any, w: Any) -> Any:
     """Tension of a strand at the speed `w` of the motor that presses on the pulleys [N]."""
     v = _radius(xp, p) * w
-    return xp.maximum(p.pretension - p.mass * v * v, 0.0)
+    return xp.maximum(p.pretension - p.mass_per_length * v * v, 0.0)
 
 
 def grip(xp: Any, p: Any, w: Any) -> Any:
@@ -138,7 +138,10 @@ def torques(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
 
 def forces(xp: Any, p: Any, w: Any, driven: Any) -> BeltForces:
     """The strands at the speeds of both pulleys [rad/s]."""
-    pull, centrifugal = force(xp, p, w, driven), p.mass * (_radius(xp, p) * w) * (_radius(xp, p) * w)
+    pull, centrifugal = (
+        force(xp, p, w, driven),
+        p.mass_per_length * (_radius(xp, p) * w) * (_radius(xp, p) * w),
+    )
     pressing, half = _pressing(xp, p, w), 0.5 * xp.abs(pull)
     tight, slack = pressing + half, xp.maximum(pressing - half, 0.0)
     return BeltForces(
@@ -155,7 +158,7 @@ def usual_pretension(p: VBeltData, factor: float) -> float:
     with the factor K of the wrap, 1 at half a turn, and the centrifugal part."""
     K = 1.25 * (1.0 - math.exp(-_NOMINAL * wrap(MATH, p)))
     v = 0.5 * p.diameter * p.rated_speed
-    return float(factor * p.rated_power / v * (2.5 - K) / (2.0 * K) + p.mass * v * v)
+    return float(factor * p.rated_power / v * (2.5 - K) / (2.0 * K) + p.mass_per_length * v * v)
 
 
 def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -164,7 +167,7 @@ def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
     yield p.distance, 0.5 * p.diameter * (1.0 + p.ratio), math.inf
     yield p.efficiency, 0.0, 1.0 - p.rated_slip
     carried = _LEAST_GRIP * rated_force(xp, p) / (2.0 * _euler(xp, p.friction, wrap(xp, p)))
-    yield p.pretension, p.mass * v * v + carried, math.inf
+    yield p.pretension, p.mass_per_length * v * v + carried, math.inf
 
 
 def _internal_step(xp: Any, p: Any) -> Any:
@@ -199,9 +202,10 @@ VBelt = slipping(
             "N",
             "the belt slips through at the rated torque",
             ("rated_power", "rated_speed", "diameter", "friction"),
-            depends=("ratio", "distance", "mass", "efficiency", "rated_slip"),
+            depends=("ratio", "distance", "mass_per_length", "efficiency", "rated_slip"),
         ),
     ),
     requirements=_limits,
     internal_step=_internal_step,
+    fmu_data=FmuData(sizes={"w": 60.0}),  # near the rated speed
 )

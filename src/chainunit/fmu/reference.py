@@ -297,7 +297,9 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
             inertia = _inertia(interface, torque)
             courses = _load(sizes.get(torque, _PUSH * inertia), inertia)
         elif terminal.kind == FLANGE:
-            courses = _shaft(interface, terminal.members.get("phi", ""))
+            courses = _shaft(
+                interface, terminal.members.get("phi", ""), sizes.get(terminal.members.get("w", ""), _RUN)
+            )
             if (torque := terminal.members.get("tau", "")) in inputs and model.state_layout:
                 # with a usual torque the states of a light shaft would run away
                 sizes[torque] = min(_size(inputs[torque], sizes), _PUSH * _inertia(interface, torque))
@@ -309,18 +311,21 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
     return lambda t: {name: course(t) for name, course in all_courses.items()}
 
 
-_SHAFT: dict[str, Callable[[float], float]] = {
-    "phi": lambda t: _RUN * (t - 0.5 * math.sin(2.0 * t)),
-    "w": lambda t: _RUN * (1.0 - math.cos(2.0 * t)),
-    "a": lambda t: 2.0 * _RUN * math.sin(2.0 * t),
-}
+def _from_rest(run: float) -> dict[str, Callable[[float], float]]:
+    """The motion of a shaft from rest, uneven, with the mean speed `run`."""
+    return {
+        "phi": lambda t: run * (t - 0.5 * math.sin(2.0 * t)),
+        "w": lambda t: run * (1.0 - math.cos(2.0 * t)),
+        "a": lambda t: 2.0 * run * math.sin(2.0 * t),
+    }
 
 
-def _shaft(interface: Interface, phi: str) -> dict[str, Callable[[float], float]]:
-    """The motion of a shaft: it runs from rest, or swings if the input `phi` has bounds."""
+def _shaft(interface: Interface, phi: str, run: float) -> dict[str, Callable[[float], float]]:
+    """The motion of a shaft: it runs from rest with the mean speed `run` [rad/s, m/s], or swings if the input `phi`
+    has bounds."""
     bounds = [v.quantity for v in interface.inputs if v.name == phi]
     if not bounds or not math.isfinite(bounds[0].high - bounds[0].low):
-        return _SHAFT
+        return _from_rest(run)
     middle, reach = 0.5 * (bounds[0].low + bounds[0].high), 0.45 * (bounds[0].high - bounds[0].low)
     return {
         "phi": lambda t: middle + reach * math.sin(2.0 * t),
@@ -338,8 +343,8 @@ def _load(tau: float, inertia: float) -> dict[str, Callable[[float], float]]:
         "tau_bias_dw": lambda t: 0.002 * tau * (1.0 + 0.5 * math.sin(5.0 * t)),
         "J": lambda t: inertia * (1.0 + 0.3 * math.sin(6.0 * t)),
         "dJ_dphi": lambda t: 0.001 * inertia * math.cos(6.0 * t),
-        "phi0": _SHAFT["phi"],
-        "w0": _SHAFT["w"],
+        "phi0": _from_rest(_RUN)["phi"],
+        "w0": _from_rest(_RUN)["w"],
     }
 
 
