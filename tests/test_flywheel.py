@@ -15,7 +15,7 @@ from chainunit.core import engines
 from chainunit.core.ports import LoadPort
 from chainunit.drives.flywheel import Flywheel
 from chainunit.drives.gear import Gear
-from chainunit.study import config
+from chainunit.study import config, start_runs
 from chainunit.study.choice import drive_of
 from chainunit.study.drive_fmus import coasting_parameters
 from chainunit.study.line.shaft import rigid_torque, two_masses
@@ -279,3 +279,17 @@ def test_behind_belt_and_gear_the_gear_carries_its_torque():
     # the difference quotient misses the first jerks of the start
     assert np.max(np.abs(off[50:-2])) < 2e-3 * np.max(np.abs(expected))
     assert np.max(np.abs(300.0 * a[50:])) > 0.2 * np.max(np.abs(expected))
+
+
+def test_starts_with_a_flywheel_behind_belt_and_gear_have_the_torque_of_the_gear():
+    """They record few outputs: the torque of the gear was not among them."""
+    rig = rig_of(300.0, MACHINE, more=BELT)
+    assert "flywheel.tau" in start_runs._read(rig)
+    assert "flywheel.tau" not in start_runs._read(rig_of(0.0, more=BELT))
+
+
+def test_feed_forward_is_refused_beside_a_flywheel_behind_the_gear():
+    with pytest.raises(
+        InputError, match="feed_forward: counts the machine without a flywheel; set"
+    ):
+        config.parse('feed_forward = true\nstart = "inverter"\n[flywheel]\nJ = 1.0\nplace = "machine"\n')

@@ -3,6 +3,7 @@ examples by hand."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -11,9 +12,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from scipy.optimize import brentq
 
 from chainunit import InputError
 from chainunit.capabilities.energy.running import run_steadily
+from chainunit.core.engines import MATH
+from chainunit.drives import v_belt
+from chainunit.drives.belt import _diameters
 from chainunit.reading.result_entries import ResultEntries
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
@@ -192,7 +197,8 @@ def test_the_belt_that_slips_by_hand(tmp_path):
     wrap = math.pi - 2.0 * math.asin(0.5 * 0.2 / 1.2)
     m, tension = math.exp(0.92 * wrap), 900.0 - 0.6 * (r * w) ** 2
     bending = (1.0 - 0.95 / 0.99) * 15e3 / w
-    limit = 2.0 * tension * (m - 1.0) / (m + 1.0) * r + bending
+    # with the rotor the belt comes to rest, and the whole tension presses on the pulleys
+    limit = 2.0 * 900.0 * (m - 1.0) / (m + 1.0) * r + bending
     findings = result["belt_slip"]
     assert findings["slip_torque"]["value"] == pytest.approx(limit, rel=1e-9)
     assert findings["static_force"]["value"] == pytest.approx(1800.0 * math.sin(0.5 * wrap), rel=1e-9)
@@ -232,3 +238,28 @@ def test_sizing_takes_the_line_into_its_trials(tmp_path):
     assert 0.0 < steady["slip_mean"]["value"] < 0.06
     chosen = result["sizing"]["candidates"][result["sizing"]["chosen"]]
     assert chosen["checks"]["start"]["value"]["value"] < result["answers"]["steady"]["speed_mean"]["value"]
+
+
+def test_a_belt_without_ratio_has_the_whole_ratio_of_a_machine_near_the_speed_of_the_motor():
+    for ratio in (0.5, 0.98, 1.0, 6.0):
+        plan = next(plan for plan in parse("[belt]\n").drive.line if plan.name == "belt")
+        assert plan.share(ratio) == ratio
+        table = plan.completed(dataclasses.replace(plan.table, rated_power=5e3, rated_speed=150.0), ratio)
+        # the smaller pulley is a standard one
+        small = min(table.diameter, table.diameter * ratio)
+        assert min(abs(small / size - 1.0) for size in _diameters("R40")) < 1e-9
+
+
+def test_the_rated_torque_has_the_rated_slip():
+    p = v_belt.VBelt.Parameters()
+    slip = brentq(
+        lambda slip: v_belt.force(MATH, p, p.rated_speed, p.rated_speed * (1.0 - slip) / p.ratio)
+        - v_belt.rated_force(MATH, p),
+        1e-4, 0.1,
+    )  # fmt: skip
+    assert slip == pytest.approx(p.rated_slip, rel=1e-9)
+
+
+def test_the_question_names_the_belt():
+    assert drive("[gear]\nratio = 4\n[belt]\nratio = 4\n").ratio_noun == "belt"
+    assert drive("[gear]\nratio = 60\n[belt]\nratio = 4\n").ratio_noun == "belt and gear"

@@ -1,7 +1,8 @@
 """A V-belt between a pulley on the motor's shaft and a driven one, with the slip and the tension of its strands.
 
 The belt creeps under load, in proportion to it at first, and slips through where the load exceeds the grip of the
-smaller wrap (Euler and Eytelwein), from which the belt speed v takes the centrifugal part:
+smaller wrap (Euler and Eytelwein), from which the belt speed v takes the centrifugal part; a belt that slips has the
+speed of the slower pulley:
 
     F = F_grip s/sqrt(s^2 + c^2 (w^2 + (w_share speed)^2)),    s = w - ratio w_driven
     F_grip = 2 (pretension - mass_per_length v^2) (m - 1)/(m + 1),        m = exp(friction wrap)
@@ -97,15 +98,25 @@ def _radius(xp: Any, p: Any) -> Any:
     return 0.5 * p.diameter
 
 
-def _pressing(xp: Any, p: Any, w: Any) -> Any:
-    """Tension of a strand at the speed `w` of the motor that presses on the pulleys [N]."""
-    v = _radius(xp, p) * w
-    return xp.maximum(p.pretension - p.mass_per_length * v * v, 0.0)
+def _centrifugal(xp: Any, p: Any, w: Any, driven: Any) -> Any:
+    """Tension of a strand that does not press on the pulleys [N], at their speeds [rad/s]."""
+    v = _radius(xp, p) * xp.minimum(xp.abs(w), p.ratio * xp.abs(driven))
+    return p.mass_per_length * v * v
 
 
-def grip(xp: Any, p: Any, w: Any) -> Any:
-    """Force at which the belt slips through [N] at the speed `w` of the motor [rad/s]."""
-    return 2.0 * _pressing(xp, p, w) * _euler(xp, p.friction, wrap(xp, p))
+def _pressing(xp: Any, p: Any, w: Any, driven: Any) -> Any:
+    """Tension of a strand that presses on the pulleys [N], at their speeds [rad/s]."""
+    return xp.maximum(p.pretension - _centrifugal(xp, p, w, driven), 0.0)
+
+
+def grip(xp: Any, p: Any, w: Any, driven: Any) -> Any:
+    """Force at which the belt slips through [N], at the speeds of the pulleys [rad/s]."""
+    return 2.0 * _pressing(xp, p, w, driven) * _euler(xp, p.friction, wrap(xp, p))
+
+
+def rated_grip(xp: Any, p: Any) -> Any:
+    """Force at which the belt slips through at the rated speed [N]."""
+    return grip(xp, p, p.rated_speed, p.rated_speed / p.ratio)
 
 
 def rated_force(xp: Any, p: Any) -> Any:
@@ -119,15 +130,15 @@ def bending(xp: Any, p: Any) -> Any:
 
 
 def _creep(xp: Any, p: Any) -> Any:
-    """The number c of the law."""
-    reserve = grip(xp, p, p.rated_speed) / rated_force(xp, p)
-    return p.rated_slip * xp.sqrt(reserve * reserve - 1.0)
+    """The number c of the law: at the rated speed the rated torque has the rated slip."""
+    reserve = rated_grip(xp, p) / rated_force(xp, p)
+    return p.rated_slip * xp.sqrt((reserve * reserve - 1.0) / (1.0 + W_SHARE * W_SHARE))
 
 
 def force(xp: Any, p: Any, w: Any, driven: Any) -> Any:
     """Force of the belt [N] at the speeds of both pulleys [rad/s]."""
     lag, c, least = w - p.ratio * driven, _creep(xp, p), W_SHARE * p.rated_speed
-    return grip(xp, p, w) * lag / xp.sqrt(lag * lag + c * c * (w * w + least * least))
+    return grip(xp, p, w, driven) * lag / xp.sqrt(lag * lag + c * c * (w * w + least * least))
 
 
 def torques(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
@@ -138,15 +149,12 @@ def torques(xp: Any, p: Any, w: Any, driven: Any) -> tuple[Any, Any]:
 
 def forces(xp: Any, p: Any, w: Any, driven: Any) -> BeltForces:
     """The strands at the speeds of both pulleys [rad/s]."""
-    pull, centrifugal = (
-        force(xp, p, w, driven),
-        p.mass_per_length * (_radius(xp, p) * w) * (_radius(xp, p) * w),
-    )
-    pressing, half = _pressing(xp, p, w), 0.5 * xp.abs(pull)
+    pull, centrifugal = force(xp, p, w, driven), _centrifugal(xp, p, w, driven)
+    pressing, half = _pressing(xp, p, w, driven), 0.5 * xp.abs(pull)
     tight, slack = pressing + half, xp.maximum(pressing - half, 0.0)
     return BeltForces(
         force=pull,
-        grip=xp.abs(pull) / xp.maximum(grip(xp, p, w), 1e-9),
+        grip=xp.abs(pull) / xp.maximum(grip(xp, p, w, driven), 1e-9),
         tight_strand=tight + centrifugal,
         slack_strand=slack + centrifugal,
         shaft_force=xp.sqrt(tight * tight + slack * slack - 2.0 * tight * slack * xp.cos(wrap(xp, p))),
@@ -172,7 +180,7 @@ def _limits(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
 
 def _internal_step(xp: Any, p: Any) -> Any:
     """At most 0.25 ms, and half of the time in which the driven pulley alone follows that of the motor."""
-    steepest = grip(xp, p, 0.0) * _radius(xp, p) / (_creep(xp, p) * W_SHARE * p.rated_speed)
+    steepest = grip(xp, p, 0.0, 0.0) * _radius(xp, p) / (_creep(xp, p) * W_SHARE * p.rated_speed)
     return xp.minimum(2.5e-4, 0.5 * p.J_driven / (p.ratio * p.ratio * steepest))
 
 

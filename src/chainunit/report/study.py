@@ -92,7 +92,7 @@ def _motion(study: StudyRecord) -> list[b.Block]:
 
 
 _GIVEN_DRIVE = (
-    "What does the motor of {} have to give? It turns the {driver} through a gear of ratio {}, in normal running "
+    "What does the motor of {} have to give? It turns the {driver} through a {} of ratio {}, in normal running "
     "at {}."
 )
 
@@ -102,7 +102,11 @@ def _question(study: StudyRecord) -> Iterator[b.Block]:
     noun = f"this {study.noun}" if study.noun[:1].islower() else f'the machine "{study.noun}"'
     if study.proposal is None:
         question = filled(
-            of_driver(_GIVEN_DRIVE, study.driver_noun), noun, exact(ratio(study)), asked_speed(study)
+            of_driver(_GIVEN_DRIVE, study.driver_noun),
+            noun,
+            study.drive.ratio_noun,
+            exact(ratio(study)),
+            asked_speed(study),
         )
     else:
         question = filled(of_driver(study.proposal.question, study.driver_noun), noun, asked_speed(study))

@@ -102,6 +102,13 @@ class Drive:
         return "gear" in self.transmission
 
     @property
+    def ratio_noun(self) -> str:
+        """The parts that have the ratio, in a noun."""
+        if self.line.part("belt") is None:
+            return "gear"
+        return "belt and gear" if self.is_geared else "belt"
+
+    @property
     def ratio(self) -> float:
         """Motor turns per crank turn."""
         return self.machine.ratio
@@ -129,11 +136,6 @@ class Drive:
     def flywheel_ratio(self) -> float:
         """Turns of the motor per turn of the flywheel."""
         return self.flywheel_shaft.ratio(self.line, self.ratio)
-
-    @property
-    def inertia_behind(self) -> float:
-        """Inertia of the flywheel at the motor's shaft if it is on another one [kg m2], else 0."""
-        return (self.added_inertia - self.inertia_on_rotor) / self.flywheel_ratio**2
 
     @cached_property
     def fmu_parameters(self) -> Any:

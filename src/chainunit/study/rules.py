@@ -152,6 +152,8 @@ def _of_flywheel() -> Iterator[Rule]:
     """Rules of the shaft of the flywheel."""
     refusal = 'is of a shaft geared to the machine; add flywheel.place = "machine", or leave it out'
     yield Rule("flywheel.turns", ~is_one_of("flywheel.place", MACHINE), refusal)
+    refusal = f'counts the machine without a flywheel; set flywheel.place = "{MOTOR}", or leave it out'
+    yield Rule("feed_forward", FLYWHEEL_BEHIND, refusal, is_one_of("feed_forward", True))
     names = [part.name for part in parts_of_line()]
     for name in names:
         refusal = f"names a part of the line that is not there; add [{name}], or give {MOTOR} or {MACHINE}"

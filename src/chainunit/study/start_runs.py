@@ -140,7 +140,10 @@ def _read(rig: Rig) -> list[str]:
     """The outputs that the numbers of a start and the peak of any torque of `PeakOf` follow from."""
     drive = rig.drive
     motor = [f"motor.{name}" for name in ("tau", "w", "a", "heat", drive.motor.current)]
-    names = dict.fromkeys([drive.crank_output("w")[0], *motor, *CURVE, *torque_names(drive.machine_bond)])
+    # a flywheel between gear and machine has the torque of the gear
+    wheel = ["flywheel.tau"] if drive.geared_line.part("flywheel") else []
+    torques = *torque_names(drive.machine_bond), *wheel
+    names = dict.fromkeys([drive.crank_output("w")[0], *motor, *CURVE, *torques])
     return [full for full in names if rig.gives(full)]
 
 

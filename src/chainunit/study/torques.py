@@ -35,9 +35,12 @@ def on_coupling(drive: Drive, run: Dataset) -> float:
 def gear_torque(drive: Drive, run: Dataset) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where
     driveline or flywheel are there, else at the crank."""
-    if drive.line.before_gear is not None:
-        wheel = drive.geared_line.part("flywheel")
-        return run["flywheel.tau"].values * wheel.ratio if wheel else crank_torque(drive, run)
+    slips = drive.line.before_gear is not None
+    wheel = drive.geared_line.part("flywheel")
+    if wheel is not None and (slips or wheel.ratio != 1.0):
+        return run["flywheel.tau"].values * wheel.ratio
+    if slips:
+        return crank_torque(drive, run)
     behind_gear = bool(drive.whole_line) and drive.driven_machine.ratio == 1.0
     return run[drive.motor_torque].values * drive.ratio if behind_gear else crank_torque(drive, run)
 

@@ -120,13 +120,15 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
     )
 
 
-def _ripple(findings: FlywheelFindings, running: list[Wheel]) -> fig.Panel:
-    """The ripple of the speed over the inertia on the motor's shaft."""
+def _ripple(findings: FlywheelFindings, running: list[Wheel]) -> fig.Panel | None:
+    """The ripple of the speed over the inertia on the motor's shaft; None of a load that causes none."""
     inertia = np.array([wheel.answers.inertia for wheel in running])
     sizes = [wheel.answers.speed_ripple for wheel in running]
     most = 1.3 * max(inertia[-1], findings.inertia(findings.flywheel_by_hand))
     ends = np.array([min(inertia[0], findings.bare), most])
     by_hand = [findings.by_hand((J - findings.bare) * findings.ratio**2) for J in ends]
+    if min(*sizes, *by_hand) <= 0.0:
+        return None
     items: list[fig.Item] = [
         fig.Curve("by hand, dE/(J w2)", ends, by_hand, 1),
         fig.Curve("co-simulated", inertia, sizes, marker="o"),

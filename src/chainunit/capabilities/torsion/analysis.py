@@ -95,7 +95,7 @@ class TorsionAnalysis(Analysis):
         config, drive, modes = study.config, study.drive, study.statics.modes
         plan: TorsionPlan = config.plans["torsion"]
         assert modes is not None
-        turn, ratio = study.statics.normal, drive.driven_machine.ratio
+        turn, ratio = study.statics.normal, drive.ratio / drive.line.ratio
         speed = float(config.run.crank_speed * ratio)
         if not config.file.gives("torsion") and speed < SLOW * modes.k_least:
             study.say(_LEFT_OUT, speed=speed, k_least=modes.k_least)

@@ -64,8 +64,11 @@ def of_study(
     if runs:
         chosen += runs.quantities
         J = variable_of(FlywheelTable, "J")
+        part = drive.geared_line.part("flywheel")
         role, placed = ("added", ()) if drive.flywheel_shaft.is_motor else ("", ("flywheel.J_wheel",))
-        chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", (), placed, role))
+        # on a driven pulley it is a part of the inertia of the pulley
+        if part is not None or drive.flywheel_shaft.is_motor:
+            chosen.append(LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", (), placed, role))
     # names of other files are as in the study file, beside which the copy lies
     folder = Path(config.file.source).parent
     copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)

@@ -14,7 +14,7 @@ from ...core.quantities import Value, declaration, quantity
 from ...drives.belt import belt_drive
 from ...drives.gear_ratios import UNITS
 from ...drives.gearing import KINDS
-from ...drives.v_belt import VBelt, VBeltData, bending, grip, rated_force, usual_pretension, wrap
+from ...drives.v_belt import VBelt, VBeltData, bending, grip, rated_force, rated_grip, usual_pretension, wrap
 from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
@@ -58,14 +58,18 @@ class BeltPlan(SlipPlan):
         """Its own ratio, or the whole one where one belt has it."""
         if "ratio" in self.keys:
             return float(self.table.ratio)
-        return ratio if 1.0 <= ratio <= UNITS["belt"][0].largest else KINDS["belt"].ratio
+        largest = UNITS["belt"][0].largest
+        return ratio if 1.0 / largest <= ratio <= largest else KINDS["belt"].ratio
 
     def completed(self, table: Any, ratio: float) -> Any:
         """With the standard pulley of the motor, the usual distance and tension, and the inertia of the pulleys."""
         table = replace(table, ratio=ratio)
         if "diameter" not in self.keys:
-            belt = belt_drive(table.rated_power, table.rated_speed, ratio, table.service_factor)
-            table = replace(table, diameter=belt.small)
+            # the standard pulleys are chosen for the smaller one, which turns faster
+            step = max(ratio, 1.0 / ratio)
+            speed = table.rated_speed * max(1.0, 1.0 / ratio)
+            belt = belt_drive(table.rated_power, speed, step, table.service_factor)
+            table = replace(table, diameter=belt.small if ratio >= 1.0 else belt.small / ratio)
         if "distance" not in self.keys:
             table = replace(table, distance=table.diameter * (1.0 + ratio))
         defaults = {
@@ -77,7 +81,7 @@ class BeltPlan(SlipPlan):
 
     def stall_torque(self, table: Any) -> float:
         """The belt slips through, and bends."""
-        return float(0.5 * table.diameter * grip(MATH, table, table.rated_speed) + bending(MATH, table))
+        return float(0.5 * table.diameter * grip(MATH, table, table.rated_speed, 0.0) + bending(MATH, table))
 
 
 def pulley_inertia(diameter: float, small: float) -> float:
@@ -119,7 +123,7 @@ class BeltFindings(Findings):
     speed: float = quantity("m/s", "speed of the belt at the motor's rated speed")
     pretension: float = quantity("N", "tension of a strand at rest, of all belts together")
     static_force: float = quantity("N", "radial force on either shaft at rest")
-    slip_torque: float = quantity("N.m", "torque at the motor's shaft at which it slips through")
+    slip_torque: float = quantity("N.m", "largest torque that it takes from the motor's shaft, with the machine at rest")
     loads: tuple[BeltLoad, ...] = part("efficiency over load", default=())
     answers: Mapping[str, BeltAnswers] = part("load of the belt, by run", default_factory=dict)
 
@@ -156,7 +160,7 @@ _PROTECTS = note("belt-slips-in-overload", *_SLIPS_THROUGH, sizes=_SIZES)
 def at_loads(table: BeltTable) -> tuple[BeltLoad, ...]:
     """The belt at the `LOADS`, as far as it carries them."""
     radius, bend, rated = 0.5 * table.diameter, bending(MATH, table), table.rated_power / table.rated_speed
-    limit, rated_pull = grip(MATH, table, table.rated_speed), rated_force(MATH, table)
+    limit, rated_pull = rated_grip(MATH, table), rated_force(MATH, table)
     creep, rows = table.rated_slip * math.sqrt((limit / rated_pull) ** 2 - 1.0), []
     for load in LOADS:
         share = (load * rated - bend) / radius / limit
