@@ -289,7 +289,5 @@ def test_starts_with_a_flywheel_behind_belt_and_gear_have_the_torque_of_the_gear
 
 
 def test_feed_forward_is_refused_beside_a_flywheel_behind_the_gear():
-    with pytest.raises(
-        InputError, match="feed_forward: counts the machine without a flywheel; set"
-    ):
+    with pytest.raises(InputError, match="feed_forward: counts the machine without a flywheel; set"):
         config.parse('feed_forward = true\nstart = "inverter"\n[flywheel]\nJ = 1.0\nplace = "machine"\n')

@@ -263,3 +263,15 @@ def test_the_rated_torque_has_the_rated_slip():
 def test_the_question_names_the_belt():
     assert drive("[gear]\nratio = 4\n[belt]\nratio = 4\n").ratio_noun == "belt"
     assert drive("[gear]\nratio = 60\n[belt]\nratio = 4\n").ratio_noun == "belt and gear"
+
+
+def test_a_belt_whose_pulleys_touch_is_refused_with_the_least_distance():
+    with pytest.raises(
+        InputError, match=r"belt\.distance = 50 mm: must be > .* mm, half of both pulleys; leave it out"
+    ):
+        drive("[gear]\nratio = 6\n[belt]\ndistance = '50 mm'\n")
+
+
+def test_a_belt_has_its_own_pulley_on_the_motor_shaft():
+    with pytest.raises(InputError, match=r"motor_shaft\.pulley_diameter: is of a belt without a table"):
+        parse(MILL + "[belt]\n[motor_shaft]\noverhung_load = '1 kN'\npulley_diameter = '200 mm'\n")

@@ -397,6 +397,10 @@ def test_the_live_page_has_both_motions(name):
     ("law", "message"),
     [
         ('phi = "1.5 * phi"', "drivers.other.phi: moves by 1.5 turns in a turn of the first driver"),
+        ('phi = "phi**2"', "give a law with the same place at 0 and 360 deg"),
+        ('phi = "phi * (2 * pi - phi)"', "drivers.other.phi: its speed jumps after a turn of the first driver"),
+        ('link = "left"', "drivers.other.link: left is the link of [driver]; name another one"),
+        ('range = "40 mm"\nstart = 1', "drivers.other.range: "),
         ('phi = "2 * phi"\nby = "belt"', 'drivers.other.by: is "belt"; must be "gear"'),
         ('phi = "2 * phi"\nrange = [0, 1]', "drivers.other.range: follows from the law in phi"),
         ('phi = "2 * w"', "drivers.other.phi: is \"2 * w\"; w is no parameter"),
@@ -404,14 +408,17 @@ def test_the_live_page_has_both_motions(name):
         ('phi = "max(left.B.y)"', "drivers.other.phi: "),
         ("", 'drivers.other.range: is missing; a driver that is an input of its own needs one, such as ["-20 deg"'),
         ('range = ["0 deg", "90 deg"]\nby = "gear"', "drivers.other.by: belongs to a driver with a law"),
-        ('range = ["0 deg", "90 deg"]\nstart = 2', "drivers.other.start: is 2; must be within"),
+        ('range = ["0 deg", "90 deg"]\nstart = 2', 'drivers.other.start: is 2; must be within drivers.other.range, ["0 deg"'),
         ('range = ["0 deg", "90 deg"]\nstart = "80 deg"', "this is with other at"),
         ('phi = "phi"\njoint = "C"', "drivers.other.joint: is \"C\", which is a pin"),
         ('phi = "phi"\nlaw = 3', "drivers.other.law: "),
     ],
 )  # fmt: skip
 def test_a_wrong_driver_is_refused(law, message):
-    data = toml(FIVE_BAR.format(law=law))
+    if law.startswith("link"):
+        data = toml(FIVE_BAR.format(law='phi = "phi"').replace('link = "right"', law))
+    else:
+        data = toml(FIVE_BAR.format(law=law))
     if "this is with" in message:
         data["links"]["upper"]["points"]["C"] = [0.8, 0]
     if "joint" in law:
@@ -419,6 +426,18 @@ def test_a_wrong_driver_is_refused(law, message):
     with pytest.raises(InputError) as caught:
         linkage_from(data, "machine")
     assert message in str(caught.value)
+    assert str(caught.value).count("drivers.other.start") <= 1 and not (
+        "mm" in law and "start" in str(caught.value)
+    )
+
+
+def test_a_further_driver_in_the_table_of_the_first_is_told_its_place():
+    data = toml(FIVE_BAR.format(law='phi = "phi"'))
+    data["driver"]["right"] = data.pop("drivers")["other"]
+    with pytest.raises(
+        InputError, match=r"driver\.right: is a table; a driver besides the first one is \[drivers\.right\]"
+    ):
+        linkage_from(data, "machine")
 
 
 def test_what_a_machine_with_two_inputs_cannot_do():

@@ -392,6 +392,9 @@ class _LinkageReader(LoadReader):
         joints: list[dict[str, Any]],
     ) -> dict[str, Any]:
         """A driver besides the first one: it follows that by a law, or is an input of its own."""
+        if table.get("link", "") == first.get("link") and "joint" not in table:
+            self.fault(f"{key}.link", f"{first['link']} is the link of [driver]; name another one")
+            return {"name": name}
         entry, span = self.driver(key, table, joints)
         entry |= {"name": name}
         if not entry.get("link"):
@@ -410,8 +413,10 @@ class _LinkageReader(LoadReader):
             low, high = span or (0.0, 0.0)
             with self.at(f"{key}.start"):
                 start = self.number(f"{key}.start", table.get("start", 0.5 * (low + high)), unit)
-                if not low <= start <= high:
-                    raise InputError(f"is {shown(table['start'])}; must be within {key}.range")
+                if low < high and not low <= start <= high:
+                    raise InputError(
+                        f"is {shown(table['start'])}; must be within {key}.range, {shown(table['range'])}"
+                    )
                 entry |= {"start": start}
             return entry | {"span": [low, high]}
         for other in ("range", "start"):
@@ -440,6 +445,10 @@ class _LinkageReader(LoadReader):
     ) -> tuple[dict[str, Any], list[float] | None]:
         """The driver in a table, and its range; None for one that turns all the way round."""
         if key == "driver":
+            further = [name for name, entry in table.items() if isinstance(entry, Mapping)]
+            for name in further:
+                self.fault(f"{key}.{name}", f"is a table; a driver besides the first one is [drivers.{name}]")
+            table = {name: entry for name, entry in table.items() if name not in further}
             self.keys(key, table, _DRIVER_KEYS)
         if "joint" in table:
             return self.slide(key, table, joints)
@@ -594,11 +603,27 @@ class _LinkageReader(LoadReader):
             turns = whole / WHOLE
             if span is None and not abs(whole if entry["linear"] else math.sin(0.5 * whole)) < BACK:
                 moved = f"{whole:.6g} m" if entry["linear"] else f"{turns:.6g} turns"
-                raise InputError(
-                    f"moves by {moved} in a turn of the first driver, and must come back after it: "
-                    + ("" if entry["linear"] else "take the slower of both for [driver], or ")
-                    + "let [driver] swing by a range"
+                speeds = [float(point.rates[0]) for point in course_places]
+                is_even = not entry["linear"] and max(speeds) - min(speeds) < BACK * max(map(abs, speeds))
+                remedy = (
+                    "take the slower of both for [driver]"
+                    if is_even
+                    else "give a law with the same place at 0 and 360 deg"
                 )
+                raise InputError(
+                    f"moves by {moved} in a turn of the first driver, and must come back after it: {remedy}, or "
+                    "let [driver] swing by a range"
+                )
+            rates = [[float(rate) for rate in point.rates[:2]] for point in course_places]
+            for quantity, course_rates in zip(
+                ("speed", "acceleration"), zip(*rates, strict=True), strict=True
+            ):
+                first, last, largest = course_rates[0], course_rates[-1], max(map(abs, course_rates))
+                if span is None and abs(last - first) > 1e-6 * largest:
+                    raise InputError(
+                        f"its {quantity} jumps after a turn of the first driver, from {last:.4g} to {first:.4g} "
+                        "times that of the first one; must be the same at 0 and 360 deg, as of sin(phi) or 2 * phi"
+                    )
             if not entry["linear"]:
                 entry["rate"] = max(1.0, *(abs(float(point.rates[0])) for point in course_places))
 

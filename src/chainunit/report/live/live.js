@@ -484,7 +484,7 @@
       else if (found.opened) [text, mark] = ["The torque limiter opens before the event: in the start, or in steady running.", "bad"];
       else if (!found.run) [text, mark] = ["The motor does not come to steady running with this load: it stalls, falls far behind, or turns ever slower or faster.", "bad"];
       else if (found.run.tripped !== undefined) [text, mark] = [`The torque limiter opens ${model.digits(found.run.tripped)} s after the begin.`, "partly"];
-      else if (found.measures.stall_time !== null) [text, mark] = [`The motor stalls ${model.digits(found.measures.stall_time)} s after the begin.`, "bad"];
+      else if (found.measures.stall_time !== null) [text, mark] = [`The ${data.runs.slips ? data.turn.driver + " stands" : "motor stalls"} ${model.digits(found.measures.stall_time)} s after the begin.`, "bad"];
       else if (mean < (1 - data.runs.speed_deviation) * w && data.runs.reference) [text, mark] = [`The motor does not reach the speed that is asked for: it turns the ${data.turn.driver} at ${shown(mean, unit.speed_least)}.`, "bad"];
       else if (event && !event.from_rest && found.measures.speed_least < 0.1 * w) [text, mark] = [`The ${data.turn.driver} is held up, and the motor turns it on again.`, "partly"];
       box.textContent = text;

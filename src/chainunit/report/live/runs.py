@@ -132,6 +132,7 @@ def live_runs(
             "added": float(drive.inertia_on_rotor),
             "rest": float(drive.gear_at_rotor),
         },
+        "slips": drive.line.before_gear is not None,
         "events": [_event(rig, event) for event in taken],
         "results": list(_results(drive, units, "machine.rocker.tau" in columns)),
     }

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.engines import MATH
+from ...core.errors import InputError
 from ...core.quantities import Value, declaration, quantity
 from ...drives.belt import belt_drive
 from ...drives.gear_ratios import UNITS
@@ -18,7 +19,7 @@ from ...drives.v_belt import VBelt, VBeltData, bending, grip, rated_force, rated
 from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
-from ..conditions import is_one_of
+from ..conditions import given, is_one_of
 from ..event import Role
 from ..file_section import FileSection
 from ..record import StudyRecord
@@ -70,8 +71,15 @@ class BeltPlan(SlipPlan):
             speed = table.rated_speed * max(1.0, 1.0 / ratio)
             belt = belt_drive(table.rated_power, speed, step, table.service_factor)
             table = replace(table, diameter=belt.small if ratio >= 1.0 else belt.small / ratio)
+        both = table.diameter * (1.0 + ratio)
         if "distance" not in self.keys:
-            table = replace(table, distance=table.diameter * (1.0 + ratio))
+            table = replace(table, distance=both)
+        if not table.distance > 0.5 * both:
+            raise InputError(
+                f"belt.distance = {1e3 * table.distance:.4g} mm: must be > {500.0 * both:.4g} mm, half of both pulleys; "
+                f"leave it out for {1e3 * both:.4g} mm",
+                key="belt.distance",
+            )
         defaults = {
             "pretension": usual_pretension(table, table.service_factor),
             "J_motor": pulley_inertia(table.diameter, table.diameter),
@@ -123,7 +131,9 @@ class BeltFindings(Findings):
     speed: float = quantity("m/s", "speed of the belt at the motor's rated speed")
     pretension: float = quantity("N", "tension of a strand at rest, of all belts together")
     static_force: float = quantity("N", "radial force on either shaft at rest")
-    slip_torque: float = quantity("N.m", "largest torque that it takes from the motor's shaft, with the machine at rest")
+    slip_torque: float = quantity(
+        "N.m", "largest torque that it takes from the motor, with the machine at rest"
+    )
     loads: tuple[BeltLoad, ...] = part("efficiency over load", default=())
     answers: Mapping[str, BeltAnswers] = part("load of the belt, by run", default_factory=dict)
 
@@ -223,6 +233,10 @@ class BeltPart(SlippingPart):
         yield from super().rules()
         refusal = 'is the belt; take sizing.gear_kind = "none", or the kind of the gear behind it'
         yield Rule(self.name, is_one_of("sizing.gear_kind", "belt"), refusal)
+        for key in ("pulley_diameter", "tension_factor"):
+            yield Rule(
+                f"motor_shaft.{key}", given(self.name), "is of a belt without a table; [belt] has its own"
+            )
 
     name = BeltPlan.name
     order = 6

@@ -29,6 +29,8 @@ class FlywheelShaft:
     @property
     def words(self) -> str:
         """The shaft in words."""
+        if self.place == MACHINE and self.turns != 1.0:
+            return f"shaft of the machine that turns {self.turns:g} times as fast as the crank"
         if self.place in (MOTOR, MACHINE):
             return f"{self.place} shaft"
         return f"shaft behind the {self.place.replace('_', ' ')}"
