@@ -408,7 +408,7 @@ def test_the_live_page_has_both_motions(name):
         ('phi = "max(left.B.y)"', "drivers.other.phi: "),
         ("", 'drivers.other.range: is missing; a driver that is an input of its own needs one, such as ["-20 deg"'),
         ('range = ["0 deg", "90 deg"]\nby = "gear"', "drivers.other.by: belongs to a driver with a law"),
-        ('range = ["0 deg", "90 deg"]\nstart = 2', 'drivers.other.start: is 2; must be within drivers.other.range, ["0 deg"'),
+        ('range = ["0 deg", "90 deg"]\nstart = 2', 'must be within drivers.other.range, ["0 deg"'),
         ('range = ["0 deg", "90 deg"]\nstart = "80 deg"', "this is with other at"),
         ('phi = "phi"\njoint = "C"', "drivers.other.joint: is \"C\", which is a pin"),
         ('phi = "phi"\nlaw = 3', "drivers.other.law: "),

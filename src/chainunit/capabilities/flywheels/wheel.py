@@ -26,7 +26,7 @@ class FlywheelAnswers:
     speed_mean: Value = same_measure("speed_mean")
     speed_least: Value = same_measure("speed_least")
     speed_ripple: Value = same_measure("speed_ripple")
-    motor_ripple: Value = quantity("1", "ripple of the motor's speed, before the shaft line", kind="percent")
+    motor_ripple: Value = quantity("1", "ripple of the motor's speed", kind="percent")
     by_hand: Value = quantity("1", "ripple by hand, dE/(J w2)", kind="percent")
     motor_torque_peak: Value = same_measure("motor_torque_peak")
     motor_torque_rms: Value = same_measure("motor_torque_rms")

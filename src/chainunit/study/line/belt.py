@@ -76,8 +76,8 @@ class BeltPlan(SlipPlan):
             table = replace(table, distance=both)
         if not table.distance > 0.5 * both:
             raise InputError(
-                f"belt.distance = {1e3 * table.distance:.4g} mm: must be > {500.0 * both:.4g} mm, half of both pulleys; "
-                f"leave it out for {1e3 * both:.4g} mm",
+                f"belt.distance = {1e3 * table.distance:.4g} mm: must be > {500.0 * both:.4g} mm, half of both "
+                f"pulleys; leave it out for {1e3 * both:.4g} mm",
                 key="belt.distance",
             )
         defaults = {
