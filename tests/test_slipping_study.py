@@ -7,6 +7,7 @@ import dataclasses
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,14 +16,26 @@ from command import chainunit
 from scipy.optimize import brentq
 
 from chainunit import InputError
+from chainunit.capabilities.checks.coupling import inertias
 from chainunit.capabilities.energy.running import run_steadily
+from chainunit.capabilities.handover.sizing import largest_load_inertia
+from chainunit.capabilities.handover.studied import StudiedDrive
+from chainunit.capabilities.sizing.alternatives import on_motor_side
+from chainunit.capabilities.sizing.protection import Obstacle, Setting
 from chainunit.core.engines import MATH
 from chainunit.drives import v_belt
 from chainunit.drives.belt import _diameters
+from chainunit.drives.v_belt import bending, torques
 from chainunit.reading.result_entries import ResultEntries
+from chainunit.study import readings
+from chainunit.study.analyses import GearAnalysis
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
+from chainunit.study.coupling import at_motor_shaft
+from chainunit.study.permitted_starts import starting_data
 from chainunit.study.rig import Rig
+from chainunit.study.torques import on_coupling
+from chainunit.study.verdict import STEADY
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MILL = """
@@ -87,6 +100,132 @@ def test_a_study_without_such_a_part_has_the_gear_at_the_rotor():
     p = bare.fmu_parameters
     assert p.rotor.J == bare.parameters.rotor.J + 0.002 and p.rotor.d == bare.parameters.rotor.d + 0.001
     assert p.gear.loss == bare.gear_loss > 0.0 and bare.geared_line.parts == ()
+
+
+# -- torques and inertias of both sides
+
+
+def columns(time, **values):
+    """A run with these variables, whose names have _ in place of the first dot."""
+    shape = np.shape(time)
+    return xr.Dataset(
+        {name.replace("_", ".", 1): ("time", np.broadcast_to(x, shape)) for name, x in values.items()},
+        {"time": time},
+    )
+
+
+WORM = "[gear]\nratio = 60\nefficiency = 0.7\nJ = 0.002\nd = 0.001\n"
+
+
+def test_the_loss_of_a_gear_behind_a_belt_counts_once():
+    """The torque of the motor's shaft, less the bending of the belt, comes to the crank through the gear alone."""
+    belt = drive(WORM + "[belt]\nratio = 4\n")
+    bend = bending(MATH, belt.line.parts[0].parameters)
+    crank = (2.0 - bend) * belt.ratio * 0.7
+    run = columns([0.0, 1.0], motor_tau=[1.0, 2.0])
+    assert bend > 0.05 and on_coupling(belt, run) == pytest.approx(crank, rel=1e-12)
+    assert at_motor_shaft(SimpleNamespace(drive=belt), crank) == pytest.approx(2.0, rel=1e-12)
+    # the belt takes its load from the same shaft
+    config = parse(MILL + WORM + f"[belt]\nratio = 4\n[coupling]\ntrip_torque = {crank}\n")
+    guards = Rig(config.operation, drive_of(config), None).guards
+    assert guards == {"motor.tau": pytest.approx(2.0, rel=1e-12)}
+    # without a part that slips the motor's torque is the one behind the loss
+    bare = drive(WORM)
+    assert on_coupling(bare, run) == 2.0 * bare.ratio
+    assert at_motor_shaft(SimpleNamespace(drive=bare), 2.0 * bare.ratio) == pytest.approx(2.0 / 0.7)
+
+
+def test_the_largest_torque_at_the_crank_is_without_the_bending_of_the_belt(monkeypatch):
+    belt = drive(WORM + "[belt]\nratio = 4\n")
+    p, run = belt.line.parts[0].parameters, columns([0.0, 1.0])
+    monkeypatch.setattr(readings, "motor_pull_out", lambda *args: 1e3)
+    # the driven pulley stands while the belt slips through at the rated speed of the motor
+    _, passed = torques(MATH, p, p.rated_speed, 0.0)
+    reached = passed * 15.0 * 0.7
+    assert readings.pull_out_torque(belt, run, 300.0) == pytest.approx(reached, rel=1e-3)
+    monkeypatch.setattr(readings, "motor_pull_out", lambda *args: 3.0)
+    weak = (3.0 - bending(MATH, p)) * belt.ratio * 0.7
+    assert readings.pull_out_torque(belt, run, 300.0) == pytest.approx(weak, rel=1e-12)
+
+
+def test_a_coupling_before_the_flywheel_accelerates_what_is_on_the_rotor():
+    """The gear behind the belt is not on the rotor: its inertia, drag and loss are in the torque of the shaft."""
+    wheel = "[flywheel]\nJ = 0.01\n"
+    belt, bare = drive(WORM + wheel + "[belt]\nratio = 4\n"), drive(WORM + wheel)
+    run = columns([0.0, 1.0], motor_tau=2.0, motor_a=50.0, motor_w=100.0)
+    assert on_motor_side(belt, run) == pytest.approx(belt.at_crank(2.0 + 0.01 * 50.0), rel=1e-12)
+    more = (0.012 * 50.0 + 0.001 * 100.0) * 0.7
+    assert on_motor_side(bare, run) == pytest.approx((2.0 + more) * bare.ratio, rel=1e-12)
+
+
+def test_a_limiter_that_the_line_cannot_open_is_not_recommended():
+    jam = {"jam": 400.0}
+    assert Setting(200.0, 0.0, 600.0, 1000.0, jam, line=300.0).torque == 250.0
+    slips = Setting(200.0, 0.0, 240.0, 1000.0, jam, line=240.0)
+    assert slips.torque is None and slips.obstacle is Obstacle.MOTOR
+
+
+def test_permitted_starts_count_what_the_motor_brings_to_its_speed():
+    """Behind the fluid coupling the machine comes later: rotor and pump wheel, and the time of the motor alone."""
+    coupled = drive("[fluid_coupling]\nJ_motor = 0.003\nJ_driven = 0.5\n")
+    time = np.linspace(0.0, 4.0, 401)
+    speed = 150.0 * np.minimum(time, 1.0)
+    start = columns(time, motor_w=speed, motor_air_gap_tau=np.where(time <= 1.0, 5.0, 1.0))
+    steady = columns([0.0, 1.0], machine_J=2.0)
+    more = {"per_hour": 10.0, "bare": 1000.0, "current": 0.5}
+    data = starting_data(coupled, coupled.nameplate, start, steady, **more)
+    inertia = coupled.fmu_parameters.rotor.J + 0.003
+    assert data.inertia == pytest.approx(inertia, rel=1e-12)
+    assert data.motor_torque == pytest.approx(5.0, rel=1e-12)
+    assert data.counter_torque == pytest.approx(5.0 - inertia * 150.0, rel=1e-9)
+    # a belt brings the machine up with the motor
+    belt = drive("[belt]\nratio = 4\n")
+    data = starting_data(belt, belt.nameplate, start, steady, **more)
+    assert data.inertia == pytest.approx(
+        float(belt.fmu_parameters.rotor.J + belt.whole_line.at_motor(2.0)), rel=1e-12
+    )
+    assert data.motor_torque == pytest.approx(2.0, rel=0.01)
+
+
+def test_a_flexible_coupling_at_the_crank_has_pulleys_and_gear_before_it():
+    belt, turns = drive(WORM + "[belt]\nratio = 4\nJ_driven = 0.03\n"), columns([0.0, 1.0], machine_J=0.4)
+    before, behind = inertias(belt, turns, is_on_crank=True)
+    assert behind == pytest.approx(0.4 * 15.0**2, rel=1e-9)
+    p = belt.line.parts[0].parameters
+    at_rotor = belt.parameters.rotor.J + p.J_motor + 0.002 + 0.03 / 16.0
+    assert before == pytest.approx(at_rotor * belt.ratio**2, rel=1e-9)
+    at_motor = inertias(belt, turns, is_on_crank=False)
+    assert sum(at_motor) == pytest.approx((before + behind) / belt.ratio**2, rel=1e-12)
+    assert at_motor[0] == belt.parameters.rotor.J
+
+
+def test_the_handover_has_the_gear_behind_a_belt_once():
+    def handed(**tables):
+        entries = {"gear": {"J": {"value": 0.002}}, "flywheel": {"J": {"value": 0.01}}, **tables}
+        return StudiedDrive(SimpleNamespace(data=entries), None, np.array([0.1, 0.3]), None, None)
+
+    assert largest_load_inertia(handed()) == pytest.approx(0.312, rel=1e-12)
+    assert largest_load_inertia(handed(belt={"ratio": {"value": 4.0}})) == pytest.approx(0.31, rel=1e-12)
+
+
+def test_the_drag_of_a_gear_behind_a_belt_is_that_at_the_driven_speed():
+    belt, bare = drive(WORM + "[belt]\nratio = 4\n"), drive(WORM)
+    variables = {"belt_gear_loss": 90.0, "belt_driven.w": 30.0, "belt_power": 200.0, "belt_tau": 2.0}
+    run = columns([0.0, 1.0], motor_w=150.0, motor_tau=2.0, machine_power=200.0, **variables)
+
+    def without_load(turning):
+        window = SimpleNamespace(mean=lambda reading: float(np.mean(reading(turning, run))), warm=300.0)
+        study = SimpleNamespace(
+            drive=turning,
+            steady=run,
+            findings={},
+            answers={STEADY: SimpleNamespace(power_mean=200.0)},
+            window=lambda *args: window,
+        )
+        return GearAnalysis.find(study, None).loss.without_load
+
+    assert without_load(belt) == pytest.approx(0.001 * 16.0 * 30.0**2, rel=1e-12)
+    assert without_load(bare) == pytest.approx(0.001 * 150.0**2, rel=1e-12)
 
 
 # -- refusals

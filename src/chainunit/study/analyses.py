@@ -14,7 +14,7 @@ from ..reading.results import part, result
 from .analysis import Analysis, Findings, Work
 from .drive import Drive
 from .measures import read_measure
-from .readings import gear_loss, shaft_power
+from .readings import gear_drag, gear_loss, shaft_power
 from .record import StudyRecord
 from .registry import registered
 from .remark import note
@@ -140,12 +140,11 @@ class GearAnalysis(Analysis):
         if STEADY not in study.answers:
             return None
         window = study.window(Phase.STEADY, study.steady)
-        squared = window.mean(lambda drive, run: run[drive.motor_speed].values ** 2)
         warm = [findings.gear_loss for findings in study.findings.values() if findings.gear_loss is not None]
         total, net = warm[0] if warm else window.mean(gear_loss), study.answers[STEADY].power_mean
         if net is None:
             return None
-        without_load = min(total, study.drive.gear_friction * squared)
+        without_load = min(total, window.mean(gear_drag))
         return GearFindings(
             GearLoss(
                 whole=total,

@@ -190,8 +190,8 @@ def pull_out(study: StudyRecord) -> float:
 
 
 def at_motor_shaft(study: StudyRecord, torque: float) -> float:
-    """Torque at the motor's shaft [N m] for one at the crank [N m], with the loss of the gear by load."""
-    return torque / study.drive.ratio * (1.0 + study.drive.gear_loss)
+    """Torque at the motor's shaft [N m] for one at the crank [N m], see `Drive.at_motor_shaft`."""
+    return float(study.drive.at_motor_shaft(torque))
 
 
 LESS_TORQUE = 0.1

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -39,6 +39,14 @@ class AbsentError(InputError):
 
 def _component(machine: Machine) -> ModelComponent:
     return ModelComponent(machine.model, machine.p)
+
+
+class TurningGear(NamedTuple):
+    """Inertia `J` [kg m2], drag `d` [N m s/rad] and `Transmission.loss` of a gear, at the motor's shaft."""
+
+    J: float = 0.0
+    d: float = 0.0
+    loss: float = 0.0
 
 
 @briefly_shown
@@ -142,22 +150,39 @@ class Drive:
         """Parameters of the motor's FMU: the parameters of the motor, with gear and the flywheel on its shaft in the
         rotor."""
         p = self.parameters
-        # behind a part that slips the gear turns with the driven shaft, see `geared_line`
-        slips = self.line.before_gear is not None
-        inertia, friction, loss = (0.0, 0.0, 0.0) if slips else self._gear
-        if self.inertia_on_rotor or inertia or friction:
-            J = p.rotor.J + inertia + self.inertia_on_rotor
-            p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + friction))
-        return replace(p, gear=replace(p.gear, loss=loss)) if loss or slips else p
+        gear, slips = self.gear_at_rotor, self.line.before_gear is not None
+        if self.inertia_on_rotor or gear.J or gear.d:
+            J = p.rotor.J + gear.J + self.inertia_on_rotor
+            p = replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + gear.d))
+        return replace(p, gear=replace(p.gear, loss=gear.loss)) if gear.loss or slips else p
 
     @property
-    def _gear(self) -> tuple[float, float, float]:
-        return self.gear_inertia, self.gear_friction, self.gear_loss
+    def _gear(self) -> TurningGear:
+        return TurningGear(self.gear_inertia, self.gear_friction, self.gear_loss)
 
     @property
-    def gear_at_rotor(self) -> float:
-        """Inertia of the gear that turns with the rotor, at its shaft [kg m2]."""
-        return self.gear_inertia if self.line.before_gear is None else 0.0
+    def gear_at_rotor(self) -> TurningGear:
+        """The gear if it turns with the rotor; nothing behind a part that slips, see `geared_line`."""
+        return self._gear if self.line.before_gear is None else TurningGear()
+
+    @property
+    def loss_behind_port(self) -> float:
+        """`Transmission.loss` of the gear between `motor_torque` and the crank: 0 if the gear is at the rotor."""
+        return self.gear_loss - self.gear_at_rotor.loss
+
+    def at_crank(self, torque: Any) -> Any:
+        """The torque at the crank [N m] that a `motor_torque` [N m] gives while the motor drives: the line takes its
+        drag from it, and a gear behind a part that slips its loss. The loss of a gear at the rotor is not in
+        `motor_torque`."""
+        return (torque - self.line.drag) * self.ratio / (1.0 + self.loss_behind_port)
+
+    def at_port(self, torque: Any) -> Any:
+        """The `motor_torque` [N m] that gives a `torque` at the crank [N m], see `at_crank`."""
+        return torque * (1.0 + self.loss_behind_port) / self.ratio + self.line.drag
+
+    def at_motor_shaft(self, torque: Any) -> Any:
+        """The torque on the motor's shaft before every gear [N m] that gives a `torque` at the crank [N m]."""
+        return self.at_port(torque) * (1.0 + self.gear_at_rotor.loss)
 
     @property
     def rotor_inertia(self) -> float:

@@ -17,7 +17,7 @@ from ..drives.nameplate import Nameplate
 from ..reading.results import result
 from .arrays import Dataset
 from .drive import Drive
-from .readings import load_inertia
+from .readings import load_inertia, motor_run_up
 
 
 def standard_inertia(
@@ -39,7 +39,9 @@ class StartingData:
     per_hour: Value = quantity("1", "starts an hour that are asked for")
     bare: Value = quantity("1", "permitted starts an hour of the bare rotor, Z0")
     rotor_inertia: Value = quantity("kg.m2", "inertia of the rotor")
-    inertia: Value = quantity("kg.m2", "mean inertia at the motor's shaft, with that of the rotor")
+    inertia: Value = quantity(
+        "kg.m2", "mean inertia that the motor starts, at its shaft, with that of the rotor"
+    )
     motor_torque: Value = quantity("N.m", "mean torque of the motor in the start, MH")
     counter_torque: Value = quantity("N.m", "mean counter torque in the start, ML")
     current: Value = quantity("A", "RMS current of steady running")
@@ -80,14 +82,17 @@ def starting_data(
     bare: float,
     current: float,
 ) -> StartingData:
-    """The data of a `start` from rest until the motor has its speed, and of `steady` running after it.
+    """The data of a `start` from rest until the machine has its speed, and of `steady` running after it. Before a
+    part that decouples the start ends with `motor_run_up`.
 
     Parameters
     ----------
     per_hour, bare : starts an hour that are asked for, and permitted starts an hour of the bare rotor
     current : RMS current of running [A]
     """
-    inertia = float(drive.fmu_parameters.rotor.J + np.mean(load_inertia(drive, steady)))
+    moved = np.mean(drive.whole_line.in_run_up(steady["machine.J"].values))
+    inertia = float(drive.fmu_parameters.rotor.J + moved)
+    start = start.sel(time=slice(None, motor_run_up(drive, start, float(start["time"].values[-1]))))
     time, torque, speed = (start[name].values for name in ("time", "motor.air_gap_tau", "motor.w"))
     motor, counter = start_torques(time, torque, speed, inertia)
     return StartingData(

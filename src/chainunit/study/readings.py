@@ -69,7 +69,14 @@ def gear_loss(drive: Drive, run: Dataset) -> Any:
     if (part := drive.line.before_gear) is not None:
         return run[f"{part.name}.gear_loss"].values
     torque, w = run["motor.tau"].values, run["motor.w"].values
-    return lost_torque(np, drive.gear_loss, torque, w) * w + drive.gear_friction * w * w
+    return lost_torque(np, drive.gear_loss, torque, w) * w + gear_drag(drive, run)
+
+
+def gear_drag(drive: Drive, run: Dataset) -> Any:
+    """Power that the drag of the gear takes [W], shape (time,): at the speed of the shaft that turns the gear."""
+    if (part := drive.geared_line.before_gear) is not None:
+        return part.parameters.gear.d * run[f"{part.name}.driven.w"].values ** 2
+    return drive.gear_friction * run[drive.motor_speed].values ** 2
 
 
 def crank_torque(drive: Drive, run: Dataset) -> Any:
@@ -183,7 +190,7 @@ def pull_out_torque(drive: Drive, run: Dataset, T: float) -> float:
     a run until it stalls, with the winding at `T` [K], or that a part of the line passes on at most; see
     `Motor.pull_out`."""
     torque = min(motor_pull_out(drive, run, T), drive.line.stall_torque)
-    return torque / (1.0 + drive.gear_loss) * drive.ratio
+    return float(drive.at_crank(torque / (1.0 + drive.gear_at_rotor.loss)))
 
 
 def motor_run_up(drive: Drive, run: Dataset, started: float | None) -> float | None:

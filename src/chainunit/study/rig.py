@@ -72,7 +72,7 @@ class Rig:
     def guards(self) -> dict[str, float]:
         """The variable on the motor's shaft at which a torque limiter opens, with its limit."""
         coupling = self.operation.coupling
-        return {self.drive.motor_torque: coupling.trip_torque / self.drive.ratio} if coupling else {}
+        return {self.drive.motor_torque: self.drive.at_port(coupling.trip_torque)} if coupling else {}
 
     @cached_property
     def inputs(self) -> dict[str, tuple[str, float]]:

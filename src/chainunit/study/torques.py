@@ -29,7 +29,7 @@ PeakOf = Callable[[Drive, Dataset], float]
 def on_coupling(drive: Drive, run: Dataset) -> float:
     """Peak torque in a run on a coupling that sits on the motor shaft behind rotor and added inertia, at the crank
     [N m]: the torque of the motor less the one that accelerates the inertia on its side."""
-    return peak(run[drive.motor_torque].values) * drive.ratio
+    return float(drive.at_crank(peak(run[drive.motor_torque].values)))
 
 
 def gear_torque(drive: Drive, run: Dataset) -> Any:

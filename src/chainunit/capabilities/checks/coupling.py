@@ -34,6 +34,8 @@ from .tables import OF_ROW, FlexibleCouplingTable
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ...study.drive import Drive
+
 _TURN = 2.0 * math.pi
 FREQUENCY = 10.0
 """Frequency [Hz] up to which the permitted alternating torque holds; above it the heat of the elastic part counts."""
@@ -250,6 +252,15 @@ def check_coupling(checks: Checks, coupling: CouplingCheck, table: FlexibleCoupl
         checks.check(rule, "coupling", "checks.flexible_coupling", coupling, limit, why, run=run)
 
 
+def inertias(drive: Drive, turns: xr.Dataset, is_on_crank: bool) -> tuple[float, float]:
+    """Mean inertia before the coupling and behind it [kg m2], at its shaft. Behind a part that slips, wheels, pulleys
+    and gear are before a coupling on the crank's shaft."""
+    ratio, part = drive.ratio if is_on_crank else 1.0, drive.geared_line.before_gear
+    before = drive.geared_line.up_to(part).at_motor(0.0) if is_on_crank and part else 0.0
+    whole = float(np.mean(load_inertia(drive, turns)))
+    return float(drive.fmu_parameters.rotor.J + before) * ratio**2, float(whole - before) * ratio**2
+
+
 def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> CouplingCheck | None:
     """The coupling of a study, and its `checks`. Of those of a catalogue it is the one that the file names, or the
     cheapest that carries the torque."""
@@ -269,13 +280,14 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> CouplingCheck |
     def torque_of(run: xr.Dataset) -> Any:
         return gear_torque(drive, run) if is_on_crank else torque_before_gear(drive, run)
 
+    before, behind = inertias(drive, turns, is_on_crank)
     torque, (most, run) = torque_of(turns), largest(study, torque_of)
     duty = CouplingDuty(
         mean=mean(turns, torque),
         rms=math.sqrt(mean(turns, torque**2)),
         largest=most,
-        drive_inertia=float(drive.fmu_parameters.rotor.J) * ratio**2,
-        load_inertia=float(np.mean(load_inertia(drive, turns))) * ratio**2,
+        drive_inertia=before,
+        load_inertia=behind,
         speed=largest(study, lambda run: run[drive.motor_speed].values)[0] / ratio,
     )
 

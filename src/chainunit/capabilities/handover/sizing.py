@@ -18,7 +18,9 @@ from ...core.errors import printable
 from ...core.quantities import finite
 from ...reading.results import GIVEN, InUnit, part, result
 from ...study.line.flywheel import MOTOR
+from ...study.line.slipping import SlippingPart
 from ...study.record import LOAD_CYCLE
+from ...study.registry import parts_of_line
 from .studied import StudiedDrive
 from .tables import text_of
 
@@ -108,9 +110,18 @@ def by_name(parts: Parts) -> Iterator[tuple[str, InUnit | str | None]]:
     return ((f"{name}.{key}", value) for name, values in parts.items() for key, value in values.items())
 
 
+def largest_load_inertia(study: StudiedDrive) -> float:
+    """The largest inertia of the load over the turn, with gear and flywheel, at the motor's shaft [kg m2]. That of
+    the machine has a flywheel on another shaft already, and a gear behind a part that slips."""
+    slipping = [part.name for part in parts_of_line() if isinstance(part, SlippingPart)]
+    paths = () if any(name in study.result.data for name in slipping) else ("gear/J",)
+    if study.text("flywheel/place") in ("", MOTOR):
+        paths = (*paths, "flywheel/J", "sizing/flywheel/J")
+    return float(np.max(study.inertia)) + sum(study.number(path) or 0.0 for path in paths)
+
+
 def _values(study: StudiedDrive) -> Iterator[Value]:
-    """All values by the parts of the drive. The inertia of the load is the largest over the turn, with gear and
-    flywheel, at the motor's shaft; that of the machine has a flywheel on another shaft already."""
+    """All values by the parts of the drive."""
     number, text, time = study.number, study.text, study.steady.time
     steady, check = "answers/steady/", "sizing/candidates/0/checks/"
     period, speed = float(time[-1]), study.steady.speed
@@ -125,10 +136,7 @@ def _values(study: StudiedDrive) -> Iterator[Value]:
         yield "application.mains_voltage", "V", number("motor/supply.V")
         yield "application.mains_frequency", "Hz", number("motor/supply.f")
 
-    is_on_motor = text("flywheel/place") in ("", MOTOR)
-    paths = ("gear/J", *(("flywheel/J", "sizing/flywheel/J") if is_on_motor else ()))
-    beside = (number(path) or 0.0 for path in paths)
-    load, rotor = float(np.max(study.inertia)) + sum(beside), number("motor/rotor.J")
+    load, rotor = largest_load_inertia(study), number("motor/rotor.J")
     mean = number(f"{steady}supply_power_mean")  # known only if the running lasts
     yield "drive.load_inertia", "kg.m2", load
     yield "drive.rotor_inertia", "kg.m2", rotor

@@ -218,7 +218,7 @@ def draw(plan: RandomPlan, operation: OperatingConditions, number: int) -> Draw:
 
 def point(rig: Rig, chance: Draw, duration: float) -> RunPoint:
     """The run of a rig with these random quantities, for the `duration` [s] from the event on."""
-    return RunPoint(rig, chance.event, duration, chance.offset, chance.trip_torque / rig.drive.ratio)
+    return RunPoint(rig, chance.event, duration, chance.offset, rig.drive.at_port(chance.trip_torque))
 
 
 def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:

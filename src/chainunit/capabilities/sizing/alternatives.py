@@ -320,7 +320,7 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     times in which it slips."""
     rig = from_angle(rig, start.angle)
     drive = rig.drive
-    capacity, speed = setting / drive.ratio, rig.operation.crank_speed * drive.ratio
+    capacity, speed = drive.at_port(setting), rig.operation.crank_speed * drive.ratio
     inertia = float(np.min(cycle(drive.machine, rig.operation.crank_speed, rig.operation.feed).outputs.J))
     smooth = max(_SMOOTH * speed, capacity / (_FASTEST * inertia))
     p = SlipClutch.Parameters(phi_start=drive.parameters.phi_start, setting=capacity, w_smooth=smooth)
@@ -367,10 +367,10 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenM
     numbers = WayNumbers.of(
         setting=capacity,
         running=setting.running,
-        start=peak(run["clutch.tau"].values) * rig.drive.ratio,
+        start=float(rig.drive.at_crank(peak(run["clutch.tau"].values))),
         slip_time=run.attrs["slip_time"],
         slip_energy=float(np.trapezoid(run["clutch.dissipated_power"].values, run["time"].values)),
-        slip_power=capacity * study.config.run.crank_speed,
+        slip_power=rig.drive.at_port(capacity) * rig.drive.ratio * study.config.run.crank_speed,
     )
     return Alternative(Way.SLIP_CLUTCH, numbers, setting.opened_by(capacity))
 
@@ -394,9 +394,8 @@ def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
         run = from_event_on(study, name)
         if "machine.rocker.tau" not in run:
             return None
-        passed = np.flatnonzero(
-            np.abs(run[study.drive.motor_torque].values) * study.drive.ratio > setting.least
-        )
+        torque = study.drive.at_crank(np.abs(run[study.drive.motor_torque].values))
+        passed = np.flatnonzero(torque > setting.least)
         end = int(passed[0]) + 1 if passed.size else None
         peaks.append(peak(run["machine.rocker.tau"].values[:end]))
     return max(peaks, default=None)
@@ -404,11 +403,11 @@ def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
 
 def on_motor_side(drive: Drive, run: xr.Dataset) -> float:
     """Peak torque in a run on a coupling between rotor and flywheel on the motor's shaft, at the crank [N m]: that
-    behind the inertia, and the torque that accelerates it and the gear and overcomes the drag, as the gear passes it
-    on."""
-    inertia = drive.inertia_on_rotor + drive.gear_inertia
-    more = inertia * run["motor.a"].values + drive.gear_friction * run["motor.w"].values
-    return peak(run["motor.tau"].values + more / (1.0 + drive.gear_loss)) * drive.ratio
+    behind the inertia, and the torque that accelerates it and the gear at the rotor and overcomes the drag of this
+    gear, as the gear passes it on."""
+    gear = drive.gear_at_rotor
+    more = (drive.inertia_on_rotor + gear.J) * run["motor.a"].values + gear.d * run["motor.w"].values
+    return float(drive.at_crank(peak(run["motor.tau"].values + more / (1.0 + gear.loss))))
 
 
 def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
@@ -417,7 +416,7 @@ def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternat
         return None
     events = _loaded_starts(study)
     longest = longest_start(rig.operation.ramp_end, study.start.start_time)
-    before = rig.drive.inertia_on_rotor + rig.drive.gear_inertia
+    before = rig.drive.inertia_on_rotor + rig.drive.gear_at_rotor.J
     starts = starts_from_all(rig, longest, events, on_motor_side, before)
     if any(start.start_time is None for start in starts):
         return None

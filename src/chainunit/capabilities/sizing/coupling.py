@@ -39,6 +39,7 @@ def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCouplin
         start=hardest_start(study).torque,
         motor=pull_out(study),
         gear=study.config.drive.gear.torque_limit,
+        line=study.drive.at_crank(study.drive.line.stall_torque),
         overloads={} if normal else {n: peak for n, peak in shocks.items() if n not in wrong},
         disturbances={n: x for n, x in peaks_in_events(study, Role.DISTURBANCE).items() if n not in wrong},
         wrong=normal or [n for n in wrong if n in shocks],
@@ -74,7 +75,7 @@ def effects(
         runs = {name: from_event_on(study, name) for name in names}
     by_shock = {}
     for name, run in runs.items():
-        time, torque = run["time"].values, np.abs(run[drive.motor_torque].values) * drive.ratio
+        time, torque = run["time"].values, drive.at_crank(np.abs(run[drive.motor_torque].values))
         passed = np.flatnonzero(torque > setting)
         if not passed.size:
             continue

@@ -88,6 +88,8 @@ class Setting:
     gear: float
     overloads: Mapping[str, float]
     disturbances: Mapping[str, float] = field(default_factory=dict)
+    line: float = math.inf
+    """largest torque that a part which slips takes: a coupling that is set higher never opens"""
     effects: Mapping[str, CouplingEffect] = field(default_factory=dict)
     """the effect of the least setting in each overload that opens it; empty until it was tried"""
     wrong: Sequence[str] = ()
@@ -123,7 +125,7 @@ class Setting:
         return {name: peak for name, peak in self.overloads.items() if peak > setting}
 
     def _protects(self, setting: float) -> bool:
-        return setting < self.gear and bool(self.opened_by(setting))
+        return setting < min(self.gear, self.line) and bool(self.opened_by(setting))
 
     @property
     def obstacle(self) -> Obstacle | None:

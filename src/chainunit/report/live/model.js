@@ -480,7 +480,7 @@ const liveModel = (data, equations) => {
     // a run until the coupling that opens passes no torque, see chainunit.study.transients.release
     cut(run) {
       if (this.trip === null) return run;
-      const limit = this.trip / this.ratio, motor = run[this.of.names.motor_torque];
+      const { loss, drag } = this.of.behind_port, limit = (this.trip * (1 + loss)) / this.ratio + drag, motor = run[this.of.names.motor_torque];
       const row = motor.findIndex((x) => Math.abs(x) >= limit);
       if (row < 0) return run;
       let tripped = run.time[row];

@@ -89,7 +89,11 @@ class BeltPlan(SlipPlan):
 
     def stall_torque(self, table: Any) -> float:
         """The belt slips through, and bends."""
-        return float(0.5 * table.diameter * grip(MATH, table, table.rated_speed, 0.0) + bending(MATH, table))
+        return float(0.5 * table.diameter * grip(MATH, table, table.rated_speed, 0.0)) + self.drag(table)
+
+    def drag(self, table: Any) -> float:
+        """The torque that bends the belt."""
+        return float(bending(MATH, table))
 
 
 def pulley_inertia(diameter: float, small: float) -> float:

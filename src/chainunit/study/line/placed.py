@@ -33,6 +33,8 @@ class PlacedPart:
     """whether a motor comes to its speed before the machine does, as its torque grows with the speed"""
     stall_torque: float = math.inf
     """largest torque that it takes from the motor's shaft while the machine stands [N m]"""
+    drag: float = 0.0
+    """torque that it takes from the motor's shaft and does not pass on [N m]"""
 
     @property
     def component(self) -> ModelComponent:
@@ -99,6 +101,10 @@ class Line:
         """Whether a motor comes to its speed before the machine does."""
         return any(part.decouples for part in self)
 
+    def up_to(self, part: PlacedPart) -> Line:
+        """The parts up to this one, with it."""
+        return Line(self.parts[: self.parts.index(part) + 1])
+
     @property
     def stall_torque(self) -> float:
         """Largest torque that the line takes from the motor's shaft while the machine stands [N m]."""
@@ -106,6 +112,14 @@ class Line:
         for part in self:
             least, ratio = min(least, part.stall_torque / ratio), ratio * part.ratio
         return least
+
+    @property
+    def drag(self) -> float:
+        """Torque that the line takes from the motor's shaft and does not pass on [N m]."""
+        ratio, drag = 1.0, 0.0
+        for part in self:
+            drag, ratio = drag + part.drag / ratio, ratio * part.ratio
+        return drag
 
     def behind(self, part: PlacedPart) -> Line:
         """The line with one more part, behind the others."""
@@ -143,3 +157,11 @@ class Line:
         for part in reversed(self.parts):
             inertia = (inertia + part.inertia) / part.ratio**2 + part.inertia_before
         return inertia
+
+    def in_run_up(self, inertia: Any) -> Any:
+        """The inertia at the motor's shaft [kg m2] with which the motor comes to its speed: that `at_motor`, or as
+        far as the first part that decouples, with its wheel on the motor's side."""
+        place = next((k for k, part in enumerate(self.parts) if part.decouples), None)
+        if place is None:
+            return self.at_motor(inertia)
+        return Line(self.parts[:place]).at_motor(self.parts[place].inertia_before)

@@ -42,6 +42,10 @@ class SlipPlan(ABC):
     def stall_torque(self, table: Any) -> float:
         """Largest torque that it takes from the motor's shaft while the machine stands [N m]."""
 
+    def drag(self, table: Any) -> float:
+        """Torque that it takes from the motor's shaft and does not pass on [N m]."""
+        return 0.0
+
     def rated(self, plate: Nameplate | None) -> dict[str, float]:
         """Its rated power [W] and speed [rad/s]: those of the file, or of the motor.
 
@@ -95,4 +99,5 @@ class SlipPlan(ABC):
             slips=True,
             decouples=self.decouples,
             stall_torque=stall,
+            drag=self.drag(table),
         )
