@@ -881,7 +881,8 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
     drive = SizedDrive(best, False, "crank", None, False, protection=protection)
     assert drive.sentence.startswith("Motor: M, ratio 50 (worm gear); ") and drive.sentence.endswith(ending)
     best.drive.flywheel_shaft = FlywheelShaft("machine", 9.0)
-    assert "; flywheel on the shaft of the machine that turns 9 times as fast as the crank 0.300 kg m²" in drive.sentence
+    shaft = "shaft of the machine that turns 9 times as fast as the crank"
+    assert f"; flywheel on the {shaft} 0.300 kg m²" in drive.sentence
 
 
 def test_a_relay_of_a_star_delta_starter_has_its_place():
