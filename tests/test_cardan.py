@@ -200,7 +200,7 @@ def test_free_vibration_with_the_true_joint(point):
     assert 2.0 * math.pi / period == pytest.approx(point["k_time_domain_true_joint_amp1e4"], rel=1e-5)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [pytest.param(0.0, marks=pytest.mark.slow), 30.0])
 def test_energy_over_a_thousand_periods(speed):
     """Undamped, with joints of 30 degrees, at rest and rotating."""

@@ -113,7 +113,7 @@ def test_the_inertia_stands_at_its_place():
     assert "J_added" not in coasting_parameters(motor)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_behind_a_gear_without_loss_it_is_the_same_as_before_it():
     _, before = run(0.4)
     rig, behind = run(0.4 * RATIO**2, MACHINE)

@@ -163,7 +163,7 @@ def test_another_engine_finds_the_torque(name, torque, loop, bench, tmp_path, mo
     assert rows and all(0.0 < row["torque"] < torque and 0.0 < row["loop"] < loop for row in rows)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_road_of_a_number_is_short(bench, tmp_path):
     """From a file to C; a number that is nowhere has no road."""
     road = bench("road")

@@ -313,7 +313,7 @@ def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
                 runner.check_scheduler(address)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_scheduler_with_two_workers_makes_the_same_store(unbroken, tmp_path):
     """Processes of their own, as on other machines; then one of them ends."""
     pytest.importorskip("distributed")

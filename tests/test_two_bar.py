@@ -75,6 +75,7 @@ def test_the_range_of_zeta_has_both_its_ends(comparison):
     assert "zeta" not in " ".join(statement(comparison)).replace("mu and zeta", "")
 
 
+@pytest.mark.slow
 def test_command(tmp_path):
     command = [sys.executable, "-m", "papers", "two-bar", tmp_path / "out"]
     process = subprocess.run(command, cwd=EXAMPLES, capture_output=True, text=True)

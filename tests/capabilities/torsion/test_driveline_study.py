@@ -655,6 +655,7 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
         assert [remark.code for remark in study.remarks] == [] if found else ["torsion-left-out"]
 
 
+@pytest.mark.slow
 def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     """A motor that gives a constant torque, as the analysis takes it, in the FMUs of the study."""
     found = findings(SMALL)
