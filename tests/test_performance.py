@@ -161,20 +161,3 @@ def test_another_engine_finds_the_torque(name, torque, loop, bench, tmp_path, mo
     other = bench("other_engines")
     rows = other.ENGINES[name](other.Rods(), 1000)
     assert rows and all(0.0 < row["torque"] < torque and 0.0 < row["loop"] < loop for row in rows)
-
-
-@pytest.mark.slow
-def test_the_road_of_a_number_is_short(bench, tmp_path):
-    """From a file to C; a number that is nowhere has no road."""
-    road = bench("road")
-    most = {
-        "machine of a study file": (28, 120),
-        "system of a study file": (34, 220),
-        "linkage file": (30, 500),
-    }
-    for name, command in road.commands(tmp_path).items():
-        found = road.road(command)
-        files, moves = most[name]
-        assert {"fmu/native/generate.py", "core/printing/c_forms.py"} <= set(found.files)
-        assert len(found.files) <= files and found.moves <= moves, (name, len(found.files), found.moves)
-    assert road.road(["export", "DcMotor", "-o", str(tmp_path / "it.fmu")]).moves == 0

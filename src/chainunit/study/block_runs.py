@@ -215,9 +215,6 @@ class BlockRuns:
             changes=self._changes,
         )
 
-    def close(self) -> None:
-        """See `EventSimulation`; nothing is left to close."""
-
     def runs(self, points: Sequence[RunPoint]) -> Iterator[EventRun]:
         """The runs of the points, in order."""
         maker = self._from_rest if self._start is None else self._from_start

@@ -147,7 +147,7 @@ def description(name: str) -> str:
 
 
 _CHOSEN = ("gear.efficiency", BOOST, SLIP)
-"""Values that follow from a proposed drive where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
+"""Values that follow from a proposed drive where the file leaves them out, see `as_used` of `catalogue_drive`."""
 
 
 def origin_of(study: StudyRecord, name: str) -> str:

@@ -138,7 +138,7 @@ def relay_findings(
     trip_class : name of its class; empty for the class `least`, or the heaviest
     runs : by event, the time since it began [s] and the current [A], shape (n,), the RMS current before [A], and the
         one that flows after it if it passes [A]
-    least : the least class that all starts need, by `chainunit.study.relay.start_class`
+    least : the least class that all starts need, see `chainunit.study.relay`
     """
     n, named = numbers, {relay_class.name: relay_class for relay_class in CLASSES}
     classes = {
