@@ -167,20 +167,20 @@ def test_a_limiter_that_the_line_cannot_open_is_not_recommended():
 
 def test_permitted_starts_count_what_the_motor_brings_to_its_speed():
     """Behind the fluid coupling the machine comes later: rotor and pump wheel, and the time of the motor alone."""
-    coupled = drive("[fluid_coupling]\nJ_motor = 0.003\nJ_driven = 0.5\n")
+    coupled, plate = drive("[fluid_coupling]\nJ_motor = 0.003\nJ_driven = 0.5\n"), parse(MILL).plate.nameplate
     time = np.linspace(0.0, 4.0, 401)
     speed = 150.0 * np.minimum(time, 1.0)
     start = columns(time, motor_w=speed, motor_air_gap_tau=np.where(time <= 1.0, 5.0, 1.0))
     steady = columns([0.0, 1.0], machine_J=2.0)
     more = {"per_hour": 10.0, "bare": 1000.0, "current": 0.5}
-    data = starting_data(coupled, coupled.nameplate, start, steady, **more)
+    data = starting_data(coupled, plate, start, steady, **more)
     inertia = coupled.fmu_parameters.rotor.J + 0.003
     assert data.inertia == pytest.approx(inertia, rel=1e-12)
     assert data.motor_torque == pytest.approx(5.0, rel=1e-12)
     assert data.counter_torque == pytest.approx(5.0 - inertia * 150.0, rel=1e-9)
     # a belt brings the machine up with the motor
     belt = drive("[belt]\nratio = 4\n")
-    data = starting_data(belt, belt.nameplate, start, steady, **more)
+    data = starting_data(belt, plate, start, steady, **more)
     assert data.inertia == pytest.approx(
         float(belt.fmu_parameters.rotor.J + belt.whole_line.at_motor(2.0)), rel=1e-12
     )

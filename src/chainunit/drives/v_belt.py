@@ -131,8 +131,14 @@ def bending(xp: Any, p: Any) -> Any:
 
 def _creep(xp: Any, p: Any) -> Any:
     """The number c of the law: at the rated speed the rated torque has the rated slip."""
-    reserve = rated_grip(xp, p) / rated_force(xp, p)
-    return p.rated_slip * xp.sqrt((reserve * reserve - 1.0) / (1.0 + W_SHARE * W_SHARE))
+    pull, limit = rated_force(xp, p), rated_grip(xp, p)
+    return p.rated_slip / pull * xp.sqrt((limit * limit - pull * pull) / (1.0 + W_SHARE * W_SHARE))
+
+
+def slip_at(xp: Any, p: Any, pull: Any) -> Any:
+    """Slip at the rated speed with the force `pull` of the belt [N], below its grip: the law solved for it."""
+    limit = rated_grip(xp, p)
+    return _creep(xp, p) * pull * xp.sqrt((1.0 + W_SHARE * W_SHARE) / (limit * limit - pull * pull))
 
 
 def force(xp: Any, p: Any, w: Any, driven: Any) -> Any:

@@ -98,13 +98,12 @@ def catalogue_drive(
         transmission=transmission_of(tables, ratio, offer),
         star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
         flywheel_shaft=tables.flywheel_shaft,
-        nameplate=plate,
     )
-    return with_slipping_parts(drive, tables)
+    return with_slipping_parts(drive, tables, plate)
 
 
-def with_slipping_parts(drive: Drive, tables: DriveTables) -> Drive:
-    """The drive with the parts of its line that slip.
+def with_slipping_parts(drive: Drive, tables: DriveTables, plate: Nameplate | None = None) -> Drive:
+    """The drive with the parts of its line that slip; `plate` is that of a motor of the catalogue.
 
     Raises
     ------
@@ -112,7 +111,7 @@ def with_slipping_parts(drive: Drive, tables: DriveTables) -> Drive:
         where such a part does not fit the drive.
     """
     for plan in tables.line:
-        drive = replace(drive, line=drive.line.behind(plan.placed(drive.nameplate, drive.ratio)))
+        drive = replace(drive, line=drive.line.behind(plan.placed(plate, drive.ratio)))
     return drive
 
 

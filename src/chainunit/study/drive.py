@@ -17,7 +17,6 @@ from ..drives.contactor import CONTACTOR_EDGE, StarDelta
 from ..drives.gear import Gear
 from ..drives.gear_rating import GearRating
 from ..drives.motor import Motor
-from ..drives.nameplate import Nameplate
 from ..drives.speed_control import Tuning
 from ..machines.api import ChainUnitMachine
 from ..machines.machine import Machine
@@ -70,9 +69,6 @@ class Drive:
 
     line: Line = field(default_factory=Line)
     """its parts that have a table, without the flywheel and the gear; see `geared_line`"""
-
-    nameplate: Nameplate | None = None
-    """the nameplate of a motor of the catalogue"""
 
     added_inertia: float = 0.0
     """inertia of the flywheel at its own shaft [kg m2]"""

@@ -72,11 +72,18 @@ def gear_loss(drive: Drive, run: Dataset) -> Any:
     return lost_torque(np, drive.gear_loss, torque, w) * w + gear_drag(drive, run)
 
 
+def gear_speed(drive: Drive, run: Dataset) -> Any:
+    """Speed of the shaft that turns the gear [rad/s], shape (time,): the motor's, or that behind the parts that
+    slip."""
+    part = drive.line.before_gear
+    return run[drive.motor_speed if part is None else f"{part.name}.driven.w"].values
+
+
 def gear_drag(drive: Drive, run: Dataset) -> Any:
     """Power that the drag of the gear takes [W], shape (time,): at the speed of the shaft that turns the gear."""
-    if (part := drive.geared_line.before_gear) is not None:
-        return part.parameters.gear.d * run[f"{part.name}.driven.w"].values ** 2
-    return drive.gear_friction * run[drive.motor_speed].values ** 2
+    part = drive.geared_line.before_gear
+    drag = drive.gear_friction if part is None else part.parameters.gear.d
+    return drag * gear_speed(drive, run) ** 2
 
 
 def crank_torque(drive: Drive, run: Dataset) -> Any:

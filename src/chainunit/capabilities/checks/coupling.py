@@ -256,7 +256,7 @@ def inertias(drive: Drive, turns: xr.Dataset, is_on_crank: bool) -> tuple[float,
     """Mean inertia before the coupling and behind it [kg m2], at its shaft. Behind a part that slips, wheels, pulleys
     and gear are before a coupling on the crank's shaft."""
     ratio, part = drive.ratio if is_on_crank else 1.0, drive.geared_line.before_gear
-    before = drive.geared_line.up_to(part).at_motor(0.0) if is_on_crank and part else 0.0
+    before = drive.geared_line.up_to(part.name).at_motor(0.0) if is_on_crank and part else 0.0
     whole = float(np.mean(load_inertia(drive, turns)))
     return float(drive.fmu_parameters.rotor.J + before) * ratio**2, float(whole - before) * ratio**2
 

@@ -10,6 +10,7 @@ an exponent Teq is the largest torque of running.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ...drives.gearing import Transmission
 from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
-from ...study.readings import crank_angle, gear_loss, shaft_power, torque_before_gear
+from ...study.readings import crank_angle, gear_loss, gear_speed, shaft_power, torque_before_gear
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_peaks, gear_torque, running_peak
@@ -194,14 +195,12 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | Non
         most, run = starts.worst.quasi_static, START
     bearing = "" if plan.separate_bearing else driver_bearing(drive)
     equivalent = equivalent_torque(torque, crank_angle(drive, turns), table.exponent)
-    shaft = drive.line.before_gear
-    # behind a part that slips the shaft of the gear has a speed of its own
-    name = drive.motor_speed if shaft is None else f"{shaft.name}.driven.w"
-    power = shaft_power(drive, turns)
-    if shaft is not None:
-        power = torque * turns[name].values * drive.line.ratio / drive.ratio + gear_loss(drive, turns)
+    power, ratio = shaft_power(drive, turns), drive.ratio
+    if drive.line.before_gear is not None:
+        ratio /= drive.line.ratio
+        power = torque * gear_speed(drive, turns) / ratio + gear_loss(drive, turns)
     load = GearDuty(
-        ratio=drive.ratio / drive.line.ratio if shaft is not None else drive.ratio,
+        ratio=ratio,
         exponent=table.exponent or None,
         equivalent=equivalent,
         running=equivalent if table.exponent else running_peak(study, at_gear).torque,
@@ -210,7 +209,7 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | Non
         power=mean(turns, np.abs(power)),
         radial=peak(pin_force(drive, turns, bearing)) if bearing else None,
         largest_radial=largest_load(study.pins, bearing)[0] if bearing else None,
-        speed=largest(study, lambda run: run[name].values)[0],
+        speed=largest(study, partial(gear_speed, drive))[0],
     )
     gear = gear_check(load, rating, peak_factor_of(table, sold, tables.gear), run, bearing)
     separate = "the crank has bearings of its own (sizing.separate_bearing)"

@@ -79,7 +79,7 @@ def _table(study: StudyRecord, findings: FlywheelFindings) -> b.Table:
         ),
         (b.Column("flywheel"), *heads),
         title=line(
-            f"Flywheels on the {study.drive.flywheel_shaft.words}; permitted ripple of the speed ",
+            f"Flywheels on the {study.drive.flywheel_shaft.words(study.driver_noun)}; permitted ripple of the speed ",
             exact(x.permitted_fluctuation),
         ),
     )

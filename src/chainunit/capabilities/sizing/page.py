@@ -41,7 +41,7 @@ def answer(study: StudyRecord) -> Iterator[b.Block]:
     drive, x = findings.sized(study), cited(findings, "findings.sizing")
     sized, best = cited(drive, "findings.sizing"), x.candidates[0]
     gear = (_gear(findings.best, best), *_belt(sized.belt), *_gear_torque(sized))
-    ratio, shaft = exact(best.ratio, 4), findings.best.drive.flywheel_shaft.words
+    ratio, shaft = exact(best.ratio, 4), findings.best.drive.flywheel_shaft.words(study.driver_noun)
     cards = [
         b.Card(
             "Motor",

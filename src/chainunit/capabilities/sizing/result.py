@@ -249,7 +249,7 @@ class SizedDrive:
         best, protection = self.best, self.protection
         motor = "Insufficient motor" if self.insufficient else "Motor"
         ratio = number(best.ratio, "1", digits=4, full=False)
-        shaft = best.drive.flywheel_shaft.words
+        shaft = best.drive.flywheel_shaft.words(self.driver)
         parts = [
             f"{motor}: {best.designation}, ratio {ratio}{aside(best.gear_words)}",
             f"flywheel on the {shaft} {best.flywheel_words}" if best.disc else f"no flywheel on the {shaft}",

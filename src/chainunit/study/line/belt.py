@@ -15,7 +15,7 @@ from ...core.quantities import Value, declaration, quantity
 from ...drives.belt import belt_drive
 from ...drives.gear_ratios import UNITS
 from ...drives.gearing import KINDS
-from ...drives.v_belt import VBelt, VBeltData, bending, grip, rated_force, rated_grip, usual_pretension, wrap
+from ...drives.v_belt import VBelt, VBeltData, bending, grip, rated_grip, slip_at, usual_pretension, wrap
 from ...reading.results import part, result
 from ..analysis import Analysis, Findings, Work
 from ..arrays import peak
@@ -72,20 +72,19 @@ class BeltPlan(SlipPlan):
             belt = belt_drive(table.rated_power, speed, step, table.service_factor)
             table = replace(table, diameter=belt.small if ratio >= 1.0 else belt.small / ratio)
         both = table.diameter * (1.0 + ratio)
-        if "distance" not in self.keys:
-            table = replace(table, distance=both)
+        table = self.filled(table, distance=both)
         if not table.distance > 0.5 * both:
             raise InputError(
                 f"belt.distance = {1e3 * table.distance:.4g} mm: must be > {500.0 * both:.4g} mm, half of both "
                 f"pulleys; leave it out for {1e3 * both:.4g} mm",
                 key="belt.distance",
             )
-        defaults = {
-            "pretension": usual_pretension(table, table.service_factor),
-            "J_motor": pulley_inertia(table.diameter, table.diameter),
-            "J_driven": pulley_inertia(table.diameter * ratio, table.diameter),
-        }
-        return replace(table, **{key: x for key, x in defaults.items() if key not in self.keys})
+        return self.filled(
+            table,
+            pretension=usual_pretension(table, table.service_factor),
+            J_motor=pulley_inertia(table.diameter, table.diameter),
+            J_driven=pulley_inertia(table.diameter * ratio, table.diameter),
+        )
 
     def stall_torque(self, table: Any) -> float:
         """The belt slips through, and bends."""
@@ -158,7 +157,7 @@ class BeltFindings(Findings):
 
 
 _SLIPS_THROUGH = (
-    "{title}: the belt slips through for {time}, at {torque} at the motor's shaft.",
+    "{title}: the belt slips through for {time}, at up to {torque} at the motor's shaft.",
     "It turns {heat} into heat.",
 )
 _SIZES = {"s": "time", "N.m": "torque", "J": "heat"}
@@ -173,14 +172,12 @@ _PROTECTS = note("belt-slips-in-overload", *_SLIPS_THROUGH, sizes=_SIZES)
 
 def at_loads(table: BeltTable) -> tuple[BeltLoad, ...]:
     """The belt at the `LOADS`, as far as it carries them."""
-    radius, bend, rated = 0.5 * table.diameter, bending(MATH, table), table.rated_power / table.rated_speed
-    limit, rated_pull = rated_grip(MATH, table), rated_force(MATH, table)
-    creep, rows = table.rated_slip * math.sqrt((limit / rated_pull) ** 2 - 1.0), []
+    radius, rated, rows = 0.5 * table.diameter, table.rated_power / table.rated_speed, []
     for load in LOADS:
-        share = (load * rated - bend) / radius / limit
-        if 0.0 < share < 1.0:
-            slip = creep * share / math.sqrt(1.0 - share * share)
-            rows.append(BeltLoad(load, slip, (1.0 - slip) * share * limit * radius / (load * rated)))
+        pull = (load * rated - bending(MATH, table)) / radius
+        if 0.0 < pull < rated_grip(MATH, table):
+            slip = slip_at(MATH, table, pull)
+            rows.append(BeltLoad(load, slip, (1.0 - slip) * pull * radius / (load * rated)))
     return tuple(rows)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,8 +58,7 @@ class FluidCouplingPlan(SlipPlan):
     def completed(self, table: Any, ratio: float) -> Any:
         """With the inertia of a coupling of this size."""
         size = table.rated_power / table.rated_speed**3
-        defaults = {"J_motor": _PUMP * size, "J_driven": _TURBINE * size}
-        return replace(table, **{key: x for key, x in defaults.items() if key not in self.keys})
+        return self.filled(table, J_motor=_PUMP * size, J_driven=_TURBINE * size)
 
     def stall_torque(self, table: Any) -> float:
         """See `SlipPlan`."""

@@ -26,11 +26,10 @@ class FlywheelShaft:
         """Whether it is the motor's shaft."""
         return self.place == MOTOR
 
-    @property
-    def words(self) -> str:
-        """The shaft in words."""
+    def words(self, driver: str) -> str:
+        """The shaft in words, of a machine with this noun for its driver."""
         if self.place == MACHINE and self.turns != 1.0:
-            return f"shaft of the machine that turns {self.turns:g} times as fast as the crank"
+            return f"shaft of the machine that turns {self.turns:g} times as fast as the {driver}"
         if self.place in (MOTOR, MACHINE):
             return f"{self.place} shaft"
         return f"shaft behind the {self.place.replace('_', ' ')}"
@@ -41,7 +40,7 @@ class FlywheelShaft:
             return 1.0
         if self.place == MACHINE:
             return ratio / self.turns
-        return self._before(line).ratio
+        return line.up_to(self.place).ratio
 
     def mounted(self, line: Line, ratio: float, J: float) -> Line:
         """The `line` with a flywheel of the inertia `J` [kg m2], in a drive of that `ratio`; the line itself for a
@@ -50,16 +49,11 @@ class FlywheelShaft:
             return line
         if self.place == MACHINE:
             return line.behind(_placed(ratio / line.ratio, J, self.turns))
-        *before, part = self._before(line)
-        behind = line.parts[len(before) + 1 :]
+        *before, part = line.up_to(self.place)
+        _, behind = line.around(self.place)
         if part.slips:
             return Line((*before, part.with_inertia(J), *behind))
         return Line((*before, part, _placed(1.0, J, 1.0), *behind))
-
-    def _before(self, line: Line) -> Line:
-        """The line up to the part at whose driven shaft the flywheel sits."""
-        names = [part.name for part in line]
-        return Line(line.parts[: names.index(self.place) + 1])
 
 
 ON_MOTOR = FlywheelShaft()

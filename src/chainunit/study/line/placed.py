@@ -41,18 +41,17 @@ class PlacedPart:
         """Its component of the system."""
         return ModelComponent(self.model, self.parameters)
 
-    def with_gear(self, J: float, d: float, loss: float) -> PlacedPart:
-        """The part before a gear with this inertia [kg m2] and drag [N m s/rad] at its shaft on the motor's side, and
-        this `Transmission.loss`."""
-        p, square = self.parameters, self.ratio**2
-        gear = replace(p.gear, d=d * square, loss=loss)
-        p = replace(p, J_driven=self.inertia + J * square, gear=gear)
-        return replace(self, parameters=p, inertia=p.J_driven)
-
     def with_inertia(self, J: float) -> PlacedPart:
         """The part with the inertia `J` [kg m2] on its driven shaft, before the gear."""
         p = replace(self.parameters, J_driven=self.inertia + J)
         return replace(self, parameters=p, inertia=p.J_driven)
+
+    def with_gear(self, J: float, d: float, loss: float) -> PlacedPart:
+        """The part before a gear with this inertia [kg m2] and drag [N m s/rad] at its shaft on the motor's side, and
+        this `Transmission.loss`."""
+        part, square = self.with_inertia(J * self.ratio**2), self.ratio**2
+        gear = replace(part.parameters.gear, d=d * square, loss=loss)
+        return replace(part, parameters=replace(part.parameters, gear=gear))
 
     def turned(self, angle: float) -> PlacedPart:
         """The part that starts with its shaft on the motor's side turned by the `angle` [rad]."""
@@ -101,10 +100,6 @@ class Line:
         """Whether a motor comes to its speed before the machine does."""
         return any(part.decouples for part in self)
 
-    def up_to(self, part: PlacedPart) -> Line:
-        """The parts up to this one, with it."""
-        return Line(self.parts[: self.parts.index(part) + 1])
-
     @property
     def stall_torque(self) -> float:
         """Largest torque that the line takes from the motor's shaft while the machine stands [N m]."""
@@ -129,6 +124,10 @@ class Line:
         """The parts before the part of that name, and those behind it."""
         place = [part.name for part in self].index(name)
         return Line(self.parts[:place]), Line(self.parts[place + 1 :])
+
+    def up_to(self, name: str) -> Line:
+        """The parts up to the one of that name, with it."""
+        return Line(self.parts[: len(self.around(name)[0].parts) + 1])
 
     def turned(self, angle: float) -> Line:
         """The line that starts with the motor's shaft turned by the `angle` [rad]."""

@@ -34,6 +34,10 @@ class SlipPlan(ABC):
         """The part of the whole `ratio` of the drive that it has."""
         return 1.0
 
+    def filled(self, table: Any, **values: float) -> Any:
+        """The `table` with these `values` of the keys that the file leaves out."""
+        return replace(table, **{key: x for key, x in values.items() if key not in self.keys})
+
     @abstractmethod
     def completed(self, table: Any, ratio: float) -> Any:
         """The `table` with its rated power and speed, and its `ratio`, with the other values that follow."""
