@@ -41,6 +41,7 @@ KINDS = {
     "cylinder_lift": ["RRR"],
     "dwell_six_bar": ["RRR", "RRR"],
     "edge_trimmer": ["triad"],
+    "jaw_crusher_bearings": ["RRR", "RRR"],
     "knife_drive": ["RRR", "triad"],
     "level_luffing_crane": ["RRR"],
     "pump_jack": ["RRR"],
