@@ -17,6 +17,8 @@ from chainunit.study.measures import torque_reserve
         (44.2248, "N.m", "", ("44.2", "N\u00a0m"), "44.2 N m"),
         (9876.6, "N", "", ("9877", "N"), "9877 N"),
         (12345.6, "N", "", ("12.3", "kN"), "12.3 kN"),
+        (37901.0, "J", "", ("37.9", "kJ"), "37.9 kJ"),
+        (5271.0, "J", "", ("5271", "J"), "5271 J"),
         (-73458.0, "N.m", "", ("−73.5", "kN\u00a0m"), "-73.5 kN m"),
         (6e6, "N/m2", "", ("6.00", "MPa"), "6.00 MPa"),
         (0.0, "W", "", ("0", "W"), "0 W"),
@@ -74,7 +76,7 @@ def test_the_engineer_chooses_units():
         and number(0.5, "1", "percent", units=units) == "50.0 %"
     )
     for values, words in (
-        ({"mass": "t"}, "report.units.mass: unknown kind; must be one of speed, power, torque, force"),
+        ({"mass": "t"}, "report.units.mass: unknown kind; must be one of speed, power, torque, force, work"),
         ({"speed": "rpm"}, 'report.units.speed = "rpm": must be "rad/s" or "rev/min"'),
     ):
         with pytest.raises(InputError) as refusal:

@@ -61,7 +61,7 @@ DEFAULT_UNITS: Units = MappingProxyType(
     }
 )
 _SHOWN_IN: ContextVar[Units] = ContextVar("units of words", default=DEFAULT_UNITS)
-_KIND_OF = {"W": "power", "N.m": "torque", "N": "force", "N/m2": "stress"}
+_KIND_OF = {"W": "power", "N.m": "torque", "N": "force", "J": "work", "N/m2": "stress"}
 """By unit, the kind of a quantity that declares none."""
 _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "speed": {"rad/s": (1.0, 0.0), "rev/min": (30.0 / math.pi, 0.0)},
@@ -72,6 +72,7 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "hours": {"h": (1.0 / 3600.0, 0.0)},
     "torque": {"N.m": (1.0, 0.0), "kN.m": (1e-3, 0.0)},
     "force": {"N": (1.0, 0.0), "kN": (1e-3, 0.0)},
+    "work": {"J": (1.0, 0.0), "kJ": (1e-3, 0.0)},
     "millimetres": {"mm": (1e3, 0.0)},
     "stress": {"MPa": (1e-6, 0.0)},
     "pv": {"MPa m/s": (1e-6, 0.0)},
@@ -82,6 +83,7 @@ _BY_SIZE: Mapping[str, tuple[float, float, str]] = {
     "power": (0.0, 100.0, "W"),
     "torque": (1e4, math.inf, "kN.m"),
     "force": (1e4, math.inf, "kN"),
+    "work": (1e4, math.inf, "kJ"),
 }
 """By kind, from which size on, up to which, and in which unit a number is shown whose unit nobody chose."""
 _ROUNDING = 1e-9
