@@ -12,6 +12,7 @@ import pytest
 from command import chainunit
 from scipy.integrate import solve_ivp
 
+from chainunit import InputError
 from chainunit.drives.catalogue import high_slip_motors, motor_of_catalogue
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
@@ -77,6 +78,63 @@ def by_hand(designation, ratio, inertia):
     square = np.trapezoid(torque**2, time) / time[-1]
     mean = np.trapezoid(torque, time) / time[-1]
     return float(np.ptp(w) / (np.trapezoid(w, time) / time[-1])), math.sqrt(square) / mean
+
+
+FAN = EXAMPLE.parent / "fan_without_gear.toml"
+
+
+@pytest.mark.second
+def test_the_frequency_of_an_inverter_falls_with_the_torque():
+    """At the mean torque the motor has the speed of the study. By hand, with slips in proportion to the torque."""
+    text = FAN.read_text("utf-8").partition("[sizing]")[0]
+    text = text.replace(
+        '.toml"\n', '.toml"\nmotor = "IE3 4-pole 11 kW, 160M"\n[gear]\nratio = 1\n[starter]\ndroop = "8 %"\n'
+    )
+    read = config.parse(f'start = "inverter"\n{text}', str(FAN))
+    drive, asked = drive_of(read), read.run.crank_speed
+    plate = read.plate.nameplate
+    rig = Rig(read.operation, drive, None)
+    with rig.from_rest() as simulation:
+        run = simulation.run(6.0, rig.step).isel(time=-1)
+    load = float(run["motor.air_gap_tau"]) / plate.torque
+    assert 0.8 < load < 0.9
+    reference = drive.reference(asked)["motor.w_ref"]
+    fall = float(reference) / math.pi - float(run["motor.supply.frequency"])
+    assert fall == pytest.approx(0.08 * 50.0 * load, rel=1e-3)
+    slip = (plate.synchronous - plate.speed) / plate.synchronous
+    assert reference == pytest.approx(asked + (0.08 + slip) * plate.synchronous * load, rel=2e-3)
+    # the windings are colder than those of the nameplate, whose slip so is larger
+    assert float(run["motor.w"]) == pytest.approx(asked, rel=0.3 * slip)
+
+
+def test_a_droop_is_of_an_inverter_that_compensates_no_slip():
+    for text, refusal in (
+        ('start = "soft"\n[starter]\ndroop = 0.08\n', "starter.droop: is of an inverter"),
+        (
+            'start = "inverter"\n[starter]\ndroop = 0.08\ninverter = { slip = 0.1 }\n',
+            "starter.inverter.slip: works against",
+        ),
+    ):
+        with pytest.raises(InputError, match=refusal):
+            config.parse(f'event = []\n{text}[system]\nmotor = "IE3 4-pole 1.5 kW, 90L"\n')
+
+
+@pytest.mark.slow
+def test_the_press_takes_a_standard_motor_whose_inverter_has_a_droop(tmp_path):
+    text = EXAMPLE.read_text("utf-8").replace('motors = "high-slip"\n', "")
+    text = text.replace("linkages/", f"{EXAMPLE.parent.as_posix()}/linkages/")
+    text = text.replace("[gear]", 'ramp = "15 s"\n\n[starter]\ndroop = "8 %"\n\n[gear]', 1)
+    (tmp_path / "press.toml").write_text(f'start = "inverter"\n{text}', "utf-8")
+    process = chainunit("study", "press.toml", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    numbers = ResultEntries(json.loads((tmp_path / "out" / "result.json").read_text()))
+    best, steady = numbers["sizing"]["candidates"][0], numbers["answers"]["steady"]
+    assert best["motor"] == "IE3 4-pole 5.5 kW, 132S" and best["flywheel"]["J"]["value"] > 50.0
+    # the mean speed is the one that was asked for, though it falls by an eighth in a stroke
+    assert steady["speed_mean"]["value"] == pytest.approx(SPEED, rel=0.01)
+    whole = best["flywheel"]["J"]["value"] * TURNS**2 + motor_of_catalogue(best["motor"]).nameplate.J * 3600.0
+    assert steady["speed_ripple"]["value"] == pytest.approx(0.9 * WORK / (whole * SPEED**2), rel=0.1)
+    assert "inverter-droop" in {note["code"] for note in numbers["notes"]}
 
 
 @pytest.mark.slow

@@ -109,7 +109,8 @@ class InverterControl:
         default=0.05, min=0.0, max=0.5, tunable=True, kind="percent",
     )  # fmt: skip
     slip: Value = quantity(
-        "Hz/(N.m)", "slip compensation: frequency added per air-gap torque", default=0.0, min=0.0, tunable=True,
+        "Hz/(N.m)", "slip compensation: frequency added per air-gap torque; negative for a droop", default=0.0,
+        tunable=True,
     )  # fmt: skip
     limit: Value = quantity(
         "A", "current limit, RMS: at it the frequency is held back while the motor drives; 1 MA: none",

@@ -83,6 +83,9 @@ def catalogue_drive(
     is_free = gear_ratio is None and offer.kind != "belt" and tables.line_ratio(ratio) == 1.0
     if is_free and abs(ratio - 1.0) <= NO_GEAR:
         return catalogue_drive(tables, machine, turn, motor, ambient, 1.0, offer)
+    droop = tables.starter.droop if follows else 0.0
+    # beside the droop nothing makes up for the slip of the motor
+    fall = (droop + 1.0) * synchronous - rated_speed if droop else 0.0
     p = with_starter(tables, p, plate)
     if ambient is not None:
         p = replace(p, ambient=replace(p.ambient, T=ambient))
@@ -98,6 +101,7 @@ def catalogue_drive(
         transmission=transmission_of(tables, ratio, offer),
         star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
         flywheel_shaft=tables.flywheel_shaft,
+        droop_speed=fall * mean / rated_torque,
     )
     return with_slipping_parts(drive, tables, plate)
 
@@ -139,14 +143,15 @@ def _is_made(tables: DriveTables, offer: GearOffer) -> bool:
 
 def with_starter(tables: DriveTables, p: Any, plate: Nameplate) -> Any:
     """The parameters `p` of a motor that starts on line, with the starter of the study. An inverter compensates the
-    rated slip of the motor with the boost of `usual_boost`, unless the file gives them."""
+    rated slip of the motor, or has its droop, and the boost of `usual_boost`, unless the file gives them."""
     control = asdict(tables.starter.inverter)
     follows = tables.start == "inverter"
     if follows and BOOST not in tables.given:
         control["boost"] = usual_boost(p, plate)
     if follows and SLIP not in tables.given:
         slip_hz = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi)
-        control["slip"] = slip_hz / plate.torque
+        droop_hz = tables.starter.droop * plate.frequency
+        control["slip"] = (-droop_hz if droop_hz else slip_hz) / plate.torque
     soft = tables.starter.soft_start if tables.start == "soft" else p.soft_start
     if tables.start == "star-delta":
         preferred = tables.starter.star_delta.preferred
@@ -165,9 +170,10 @@ def usual_boost(p: Any, plate: Nameplate) -> float:
 def with_inertia(tables: DriveTables, drive: Drive, added: float) -> Drive:
     """The drive with a flywheel of that inertia at its own shaft [kg m2]. Slip compensation raises the frequency in
     each peak of the load, where the flywheel has to slow down to give its energy: with one there is none, unless the
-    file gives it."""
+    file gives it, or a droop in its place."""
     drive = replace(drive, added_inertia=added)
-    if not added or tables.start != "inverter" or drive.rated_current is None or SLIP in tables.given:
+    kept = SLIP in tables.given or tables.starter.droop
+    if not added or tables.start != "inverter" or drive.rated_current is None or kept:
         return drive
     inverter = replace(drive.parameters.inverter, slip=0.0)
     return replace(drive, parameters=replace(drive.parameters, inverter=inverter))

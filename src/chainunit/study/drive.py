@@ -96,6 +96,9 @@ class Drive:
     star_delta: StarDelta | None = None
     """the starter of a motor that starts in star; None for another start"""
 
+    droop_speed: float = 0.0
+    """speed by which a motor with a droop falls at the mean torque [rad/s]: its reference stands as much higher"""
+
     foreign: FmuComponent | None = None
     """the motor, if it is a foreign FMU; then `motor` is `Motor` itself, of which only the terminals are
     known, and there are no `parameters`"""
@@ -335,12 +338,16 @@ class Drive:
             "motor.star": Profile(1.0, ((begin + 0.75 * pause, 0.2 * pause, 0.0),)),
         }
 
+    def reference_speed(self, crank_speed: float) -> float:
+        """The speed reference of the motor for this mean crank speed [rad/s]."""
+        return crank_speed * self.ratio + self.droop_speed
+
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
         """The signal of the speed reference for this crank speed [rad/s], after a `ramp` from rest [s] if one
         is given."""
         if not self.follows:
             return {}
-        w = crank_speed * self.ratio
+        w = self.reference_speed(crank_speed)
         if ramp is None:
             return {"motor.w_ref": w} | ({"model.a": 0.0} if self.feed_forward else {})
         rise = Profile(0.0, ((0.0, ramp, w),))

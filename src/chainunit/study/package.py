@@ -40,7 +40,7 @@ def study_system(drive: Drive, operation: OperatingConditions) -> System:
     has the second machine that the control uses."""
     start = drive.loads(operation.feed) if drive.foreign_machine else {}
     if "w_ref" in drive.graph.components["motor"].connectors:
-        start["motor.w_ref"] = operation.crank_speed * drive.ratio
+        start["motor.w_ref"] = drive.reference_speed(operation.crank_speed)
     for name, machine in (("machine", drive.driven_machine), ("model", drive.machine)):
         if name in drive.graph.components and not drive.foreign_machine:
             # a connected input needs no start value, but an FMU that runs alone needs one

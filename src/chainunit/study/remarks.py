@@ -544,6 +544,11 @@ _SLIP = note(
     "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip).",
     sizes={"Hz/(N.m)": "slip"},
 )
+_DROOP = note(
+    "inverter-droop",
+    "The frequency of the inverter falls by {droop} at the rated torque of the motor (starter.droop).",
+    sizes={("1", "percent"): "droop"},
+)
 _RATED_SUFFICES = note(
     "inverter-with-rated-current",
     "An inverter with the rated current of the motor, {rated}, suffices for running, all starts and all events. It "
@@ -570,13 +575,15 @@ def _on_rotor(study: StudyRecord) -> None:
 
 
 def _on_inverter(study: StudyRecord) -> None:
-    """Note the slip compensation, and the inverter to order by the currents of all starts and events."""
+    """Note slip compensation or droop, and the inverter to order by the currents of all starts and events."""
     rated_current = study.drive.rated_current
     if rated_current is None or study.config.drive.start != "inverter":
         return
     if SLIP not in study.config.file.given:
-        slip = study.drive.parameters.inverter.slip
-        if slip:
+        slip, droop = study.drive.parameters.inverter.slip, study.config.drive.starter.droop
+        if droop:
+            study.say(_DROOP, droop=droop)
+        elif slip:
             study.say(_SLIP, slip=slip)
         else:
             study.say(_NO_SLIP)

@@ -180,6 +180,10 @@ def _of_motors() -> Iterator[Rule]:
     for key in ("J", "fluctuation", "compare"):
         yield Rule(f"flywheel.{key}", chosen, "sizing finds its own; leave out one of the two")
     yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), refusal, switched_on)
+    refusal = 'is of an inverter; set start = "inverter", or leave it out'
+    yield Rule("starter.droop", ~is_one_of("start", "inverter"), refusal)
+    refusal = "works against the droop (starter.droop); leave out one of the two"
+    yield Rule("starter.inverter.slip", given("starter.droop"), refusal)
     keys = " or ".join([*(f"[{table}]" for table in choosing_tables()), "system.motor"])
     for name in ("gear", "start", "starter", "catalogue"):
         refusal = f"is of a motor of the catalogue; add {keys}, or leave it out"

@@ -118,6 +118,14 @@ class Starter:
         min=1.0,
         max=5.0,
     )
+    droop: Value = quantity(
+        "1",
+        "fall of the frequency of an inverter at the rated torque of the motor, so that a flywheel gives its energy",
+        default=0.0,
+        min=0.0,
+        max=0.3,
+        kind="percent",
+    )
 
 
 SIMULATIONS = ("cs", "me")
@@ -234,7 +242,8 @@ SECTIONS: Mapping[str, FileSection] = {
         follows={
             "inverter.boost": "5 %, or the drop of the rated current across the stator if less; with [sizing] "
             "two or three times as much, if the machine does not start with less",
-            "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
+            "inverter.slip": "that of the rated slip of the motor; minus the droop, or none with a flywheel, against "
+            "which it works",
         },
     ),
     "flywheel": FileSection(
