@@ -104,7 +104,8 @@ def _one_key(table, key):
     if table.name == "optimize":
         return f"[optimize]\n{key.name} = {key.left_out}\n[optimize.free]\nr = {{ min = 0.1, max = 0.2 }}\n"
     if table.name in ("gear", "starter"):
-        system = '[system]\nmotor = "IE3 4-pole 0.75 kW, 80M"\n'
+        start = 'start = "inverter"\n' if key.name == "droop" else ""
+        system = f'{start}[system]\nmotor = "IE3 4-pole 0.75 kW, 80M"\n'
     if table.name == "torsion":
         system = "[driveline]\n"
     if table.name == "chain":
