@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..config import FileReading
-    from ..record import StudyRecord
+    from ..record import StudyRuns
 
 _RIGID = ("driveline", "observer", "watch", "identify")
 """Tables whose models have no slip between them and the motor."""
@@ -96,9 +96,9 @@ class SlipRun:
         return float(np.trapezoid(x, self.time))
 
 
-def parts_of_runs(study: StudyRecord, placed: PlacedPart) -> Iterator[tuple[str, SlipRun]]:
+def parts_of_runs(runs: StudyRuns, placed: PlacedPart) -> Iterator[tuple[str, SlipRun]]:
     """Steady running, the start-up, and each event from its begin on, with their names."""
-    pieces = {STEADY: study.steady, START: study.runs[START].sel(time=slice(None, study.steady_begin))}
-    pieces |= {name: from_event_on(study, name) for name in study.event if name in study.runs}
+    pieces = {STEADY: runs.steady, START: runs.series[START].sel(time=slice(None, runs.steady_begin))}
+    pieces |= {name: from_event_on(runs, name) for name in runs.event_times if name in runs.series}
     for name, run in pieces.items():
         yield name, SlipRun.read(placed, run)
