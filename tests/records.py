@@ -9,10 +9,15 @@ from chainunit.study.cycle import turns_by_load
 from chainunit.study.record import StudyFindings, StudyRecord, StudyRuns, StudySetup
 from chainunit.study.statics import statics
 
+PARTS = {"setup": StudySetup, "runs": StudyRuns, "findings": StudyFindings}
+
 
 def record_of(config, drive, proposal=None):
     turns = turns_by_load(config.machine, config.run.crank_speed, config.feed)
-    return StudyRecord(StudySetup(config, drive, statics(drive, turns, config.run.step), proposal))
+    setup = StudySetup(config, drive, statics(drive, turns, config.run.step), proposal)
+    return StudyRecord(
+        setup, StudyRuns(drive, config.operation, config.events), StudyFindings(drive.driver_noun)
+    )
 
 
 def changed(study, **changes):
@@ -20,21 +25,17 @@ def changed(study, **changes):
     if "config" in changes:
         changes |= {"operation": changes["config"].operation, "events": changes["config"].events}
     parts = {}
-    for name in ("setup", "runs", "findings"):
-        part = getattr(study, name)
-        own = {field.name for field in dataclasses.fields(part)}
-        parts[name] = dataclasses.replace(part, **{key: x for key, x in changes.items() if key in own})
-    assert changes.keys() <= {field.name for part in parts.values() for field in dataclasses.fields(part)}
-    other = StudyRecord(parts["setup"])
-    other.runs, other.findings = parts["runs"], parts["findings"]
-    return other
+    for name, kind in PARTS.items():
+        names = {field.name for field in dataclasses.fields(kind)} & changes.keys()
+        parts[name] = dataclasses.replace(getattr(study, name), **{key: changes[key] for key in names})
+    assert changes.keys() <= {field.name for kind in PARTS.values() for field in dataclasses.fields(kind)}
+    return StudyRecord(**parts)
 
 
 def like(**values):
     """A stand-in for a record that has these values alone: each in the parts with such a field or property."""
-    parts = {"setup": StudySetup, "runs": StudyRuns, "findings": StudyFindings}
-    names = {part: {*dir(kind), *(f.name for f in dataclasses.fields(kind))} for part, kind in parts.items()}
+    names = {part: {*dir(kind), *(f.name for f in dataclasses.fields(kind))} for part, kind in PARTS.items()}
     assert values.keys() <= set().union(*names.values())
     return SimpleNamespace(
-        **{part: SimpleNamespace(**{n: values[n] for n in values.keys() & names[part]}) for part in parts}
+        **{part: SimpleNamespace(**{n: values[n] for n in values.keys() & names[part]}) for part in PARTS}
     )

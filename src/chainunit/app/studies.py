@@ -398,9 +398,8 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         units in ``attrs``; ``runs["steady"]`` has the turns in steady running. The file result.nc holds the
         runs."""
         runs = {name: node.to_dataset() for name, node in series.tree(self.record).children.items()}
-        return Named(
-            runs | ({"steady": self.record.runs.steady} if "steady" in self.record.runs.answers else {})
-        )
+        ran = self.record.runs
+        return Named(runs | ({"steady": ran.steady} if "steady" in ran.answers else {}))
 
     @property
     def verdict(self) -> str:

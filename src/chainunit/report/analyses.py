@@ -43,8 +43,7 @@ def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
 
 def _turn(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
-    setup = study.setup
-    turn = TurnFindings.of_study(study.findings)
+    setup, turn = study.setup, TurnFindings.of_study(study.findings)
     bars = f", of {substitute}" if (substitute := setup.drive.machine.in_place) else ""
     lead = filled(
         f"Inverse dynamics at {{}} of the {setup.driver_noun}, without a motor{bars}.", asked_speed(setup)
@@ -103,8 +102,7 @@ def _reactions(turn: TurnFindings) -> fig.Panel:
 
 def _starts(study: StudyRecord) -> Iterator[b.Block]:
     """The worst start in a sentence, and a table of all starts."""
-    setup = study.setup
-    findings = StartFindings.found_in(study.findings)
+    setup, findings = study.setup, StartFindings.found_in(study.findings)
     if findings is None:
         return
     place = "output of the gear" if setup.drive.is_geared else setup.driver_noun

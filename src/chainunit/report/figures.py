@@ -103,31 +103,31 @@ def _group_title(runs: StudyRuns, names: list[str]) -> str:
     """The title of a panel with these runs."""
     if run_names.event_time(runs, names[0]) is None:
         return f"Start{'s' * (len(names) > 1)} and steady running"
-    sides = [runs.events[run].loaded_side for run in names if run_names.is_event(runs, run)]
+    sides = [runs.events[run].loaded_side for run in names if run in runs.events]
     return f"Overloads of the {sides[0]} side" if sides[0] else "Overloads"
 
 
 @PICTURES.declare(lambda study: study.setup.statics.cycles, "torque_angle.png")
 def _turn(study: StudyRecord) -> fig.Figure:
-    driver = study.setup.driver_noun
+    setup, driver, cycles = study.setup, study.setup.driver_noun, study.setup.statics.cycles
     torques: dict[str, Callable[[Cycle], Any]] = {driver: lambda c: c.crank_torque}
-    organs = bool(study.setup.drive.machine.model.sides)
+    organs = bool(setup.drive.machine.model.sides)
     if organs:
         torques["rocker"] = lambda c: c.outputs.rocker.tau
     items: dict[fig.Axis, list[fig.Item]] = {}
     for part, torque in torques.items():
         curves = items[fig.Axis(f"{part} torque", "N.m")] = []
-        for look, (name, c) in enumerate(study.setup.statics.cycles.items()):
+        for look, (name, c) in enumerate(cycles.items()):
             y = np.broadcast_to(torque(c), c.angle.shape)
             curves.append(fig.Curve(name, np.append(c.angle, 2.0 * math.pi), np.append(y, y[0]), look))
     return fig.Figure(
         "turn",
         of_driver("Torque over {a driver} turn at constant speed", driver),
-        f"{' and '.join(torques).capitalize()} torque over the {driver} angle: {', '.join(study.setup.statics.cycles)}.",
-        fig.stacked(angle_axis(study.setup), items.items()),
+        f"{' and '.join(torques).capitalize()} torque over the {driver} angle: {', '.join(cycles)}.",
+        fig.stacked(angle_axis(setup), items.items()),
         line(
             f"Inverse dynamics{' of two bars' * organs} at ",
-            asked_speed(study.setup),
+            asked_speed(setup),
             f" of the {driver}, without a motor.",
         ),
     )
@@ -136,8 +136,7 @@ def _turn(study: StudyRecord) -> fig.Figure:
 @PICTURES.declare(lambda study: run_names.has_steady_turns(study.runs), "power_turn.png")
 def _power(study: StudyRecord) -> fig.Figure:
     """The power at crank and motor over the last turn of steady running."""
-    setup = study.setup
-    drive, steady, driver = setup.drive, study.runs.steady, setup.driver_noun
+    drive, steady, driver = study.setup.drive, study.runs.steady, study.setup.driver_noun
     phi, speed = crank_motion(drive, steady)
     powers = {driver: crank_torque(drive, steady) * speed, "shaft of the motor": shaft_power(drive, steady)}
     if "motor.supply_power" in steady:
@@ -145,17 +144,13 @@ def _power(study: StudyRecord) -> fig.Figure:
     curves = [
         fig.Curve(name, *last_turn(phi, power), look) for look, (name, power) in enumerate(powers.items())
     ]
+    axes = angle_axis(study.setup), fig.Axis("power", "W")
+    panel = fig.Panel(*axes, (*curves, fig.Mark(0.0, axis="y", look="thin")))
     return fig.Figure(
         "power-turn",
         "Power over a turn in steady running",
         f"The power at {', '.join(powers)} over the {driver} angle in the last turn of steady running.",
-        (
-            (
-                fig.Panel(
-                    angle_axis(setup), fig.Axis("power", "W"), (*curves, fig.Mark(0.0, axis="y", look="thin"))
-                ),
-            ),
-        ),
+        ((panel,),),
         "Below zero the machine gives power back.",
     )
 
@@ -207,17 +202,11 @@ def _averages(steady: xr.Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
     "force_over_stroke.png",
 )
 def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
-    names = [
-        name
-        for name in run_names.motor_runs(study.runs)
-        if run_names.event_time(study.runs, name) is not None
-    ]
-    parts = {"steady": study.runs.steady} | {name: run_names.from_event(study.runs, name) for name in names}
-    runs = (
-        (run_names.title(study.runs, name), machine_state(study.setup.drive, part))
-        for name, part in parts.items()
-    )
-    return machine_picture.force_over_stroke(runs)
+    runs, drive = study.runs, study.setup.drive
+    names = [name for name in run_names.motor_runs(runs) if run_names.event_time(runs, name) is not None]
+    parts = {"steady": runs.steady} | {name: run_names.from_event(runs, name) for name in names}
+    states = ((run_names.title(runs, name), machine_state(drive, part)) for name, part in parts.items())
+    return machine_picture.force_over_stroke(states)
 
 
 @PICTURES.declare(lambda study: study.setup.statics.loops, "speed_loop.png")
@@ -436,7 +425,7 @@ def _reactions(study: StudyRecord) -> fig.Figure:
     reference = "steady" if "steady" in study.runs.pins else next(iter(study.runs.pins))
     steady, pins = study.runs.pins[reference], list(study.runs.pins[reference])
     largest = {pin: hardest_run(study.runs.pins, pin) for pin in pins}
-    of_run = run_names.title(study.runs, reference)
+    of_run, driver = run_names.title(study.runs, reference), study.setup.driver_noun
     places = np.arange(len(pins), dtype=float)
     bars: list[tuple[str, float, list[float | None], float, int, bool, tuple[str, ...]]] = [
         (f"{of_run}: peak", -0.2, [steady[pin]["peak"] for pin in pins], 0.38, 0, False, ()),
@@ -458,6 +447,6 @@ def _reactions(study: StudyRecord) -> fig.Figure:
         "Forces in the pins",
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
         ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
-        f"RMS is taken over whole {study.setup.driver_noun} turns of {of_run}. Beside a bar: the run of the largest peak.",
+        f"RMS is taken over whole {driver} turns of {of_run}. Beside a bar: the run of the largest peak.",
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

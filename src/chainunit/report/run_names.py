@@ -18,11 +18,6 @@ of the run in which it opened."""
 _TITLES = {"start_up": "start-up and steady running", "unfinished": "the run that stopped early"}
 
 
-def is_event(runs: StudyRuns, run: str) -> bool:
-    """Whether a run is an overload."""
-    return run in runs.events
-
-
 def groups(runs: StudyRuns, names: Collection[str]) -> list[list[str]]:
     """The overloads among `names`, in groups by the side that has to carry them."""
     return in_groups(runs.events, list(names))
@@ -30,7 +25,7 @@ def groups(runs: StudyRuns, names: Collection[str]) -> list[list[str]]:
 
 def short(runs: StudyRuns, run: str) -> str:
     """The name of a run in two or three words."""
-    return runs.events[run].short if is_event(runs, run) else run.replace("_", "-")
+    return runs.events[run].short if run in runs.events else run.replace("_", "-")
 
 
 def title(runs: StudyRuns, run: str) -> str:

@@ -78,26 +78,26 @@ def over_runs(
 
 def table_of_runs(study: StudyRecord) -> b.Table:
     """The table of all answers, with a column for each run."""
-    answers, unknown_names = study.runs.answers, study.runs.not_known
-    runs = by_side(study.runs, answers)
+    setup, runs, answers = study.setup, study.runs, study.runs.answers
+    names, unknown_names = by_side(runs, answers), runs.not_known
     rows = (
         b.TableRow(
-            (v.described(study.setup.driver_noun), *(number(study.runs, run, v.name) for run in runs)),
+            (v.described(setup.driver_noun), *(number(runs, run, v.name) for run in names)),
             form="long" if MEASURES[v.name].minor else "both",
         )
         for v in Layout(Answers).variables
         # a coupling that is absent or stayed shut has no row; an answer that the motor does not give has dashes
         if v.name in unknown_names
-        or any(finite(getattr(answers[run], v.name)) is not None for run in runs)
-        or (v.name == "recovery_time" and study.runs.returns and study.runs.overloads)
+        or any(finite(getattr(answers[run], v.name)) is not None for run in names)
+        or (v.name == "recovery_time" and runs.returns and runs.overloads)
     )
     head: Line = ()
     if "steady" in answers:
-        head = line(study.setup.driver_noun, " at ", number(study.runs, "steady", "speed_mean"))
-    if not study.runs.reaches:
-        head = filled("{}; {} NOT reached", head, asked_speed(study.setup))
-    title = f"Demands of each run on the drive{_doubt(study.setup)}"
-    return over_runs(study.runs, runs, rows, title, plain_line(head, study.setup.config.units))
+        head = line(setup.driver_noun, " at ", number(runs, "steady", "speed_mean"))
+    if not runs.reaches:
+        head = filled("{}; {} NOT reached", head, asked_speed(setup))
+    title = f"Demands of each run on the drive{_doubt(setup)}"
+    return over_runs(runs, names, rows, title, plain_line(head, setup.config.units))
 
 
 def _doubt(setup: StudySetup) -> str:
@@ -106,16 +106,18 @@ def _doubt(setup: StudySetup) -> str:
 
 def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
     """Of the table of all runs, steady running beside the overload with the largest crank torque, for one screen."""
-    runs = by_side(study.runs, study.runs.answers)
-    shown = [run for run in ("steady",) if run in runs] or runs[:1]
-    peaks = {run: study.runs.answers[run].crank_torque_peak for run in study.runs.overloads if run in runs}
+    runs, setup = study.runs, study.setup
+    names = by_side(runs, runs.answers)
+    shown = [run for run in ("steady",) if run in names] or names[:1]
+    peaks = {run: runs.answers[run].crank_torque_peak for run in runs.overloads if run in names}
     title = whole.title
     if peaks:
         shown.append(max(peaks, key=lambda run: abs(peaks[run])))
-        is_bare = study.setup.proposal is not None and study.setup.config.coupling is None
+        is_bare = setup.proposal is not None and setup.config.coupling is None
         bare = " (without torque limiter)" if is_bare else ""
-        title = f"Steady running beside the worst overload{bare}: {run_names.title(study.runs, shown[-1])}{_doubt(study.setup)}"
-    places = [0, *(1 + runs.index(run) for run in shown)]
+        worst = f"{run_names.title(runs, shown[-1])}{_doubt(setup)}"
+        title = f"Steady running beside the worst overload{bare}: {worst}"
+    places = [0, *(1 + names.index(run) for run in shown)]
     rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)
     columns = tuple(whole.columns[i] for i in places)
     return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")

@@ -53,19 +53,18 @@ def _rigid(setup: StudySetup, rigid: RigidLine) -> b.Judgement:
 def _shaft(study: StudyRecord) -> b.Table:
     """The table of the demands of each run on the driveline."""
     answers = cited(shaft_findings(study.findings), "findings.shaft").answers
-    runs = by_side(study.runs, answers)
+    names = by_side(study.runs, answers)
     rows = (
-        b.TableRow((v.description, *(number(getattr(answers[run], v.name)) for run in runs)))
+        b.TableRow((v.description, *(number(getattr(answers[run], v.name)) for run in names)))
         for v in Layout(ShaftAnswers).variables
     )
-    return over_runs(study.runs, runs, rows, "Torque in the driveline")
+    return over_runs(study.runs, names, rows, "Torque in the driveline")
 
 
 @PICTURES.declare(lambda study: shaft_findings(study.findings).answers, "driveline.png")
 def _driveline(study: StudyRecord) -> fig.Figure:
     """The torque in the driveline beside that in a rigid one, and its rainflow cycles."""
-    runs = study.runs
-    shaft = shaft_findings(study.findings)
+    runs, shaft = study.runs, shaft_findings(study.findings)
     largest = max(answers.range_largest for answers in shaft.answers.values())
     above, below = [], []
     for name in shaft.answers:

@@ -48,12 +48,12 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
                 title="The V-belt over its load, at the rated speed",
                 form="long",
             )
-        runs = by_side(study.runs, findings.answers)
+        names = by_side(study.runs, findings.answers)
         rows = (
-            b.TableRow((v.description, *(number(getattr(x.answers[run], v.name)) for run in runs)))
+            b.TableRow((v.description, *(number(getattr(x.answers[run], v.name)) for run in names)))
             for v in Layout(declared).variables
         )
-        yield over_runs(study.runs, runs, rows, f"Load of the {noun}")
+        yield over_runs(study.runs, names, rows, f"Load of the {noun}")
     yield from PICTURES.figures(study)
 
 

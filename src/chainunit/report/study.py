@@ -17,7 +17,7 @@ from ..reading.text import shown_in
 from ..study.event_table import random_runs
 from ..study.given import GivenSection, description, given_sections, origin_of, place_of
 from ..study.provenance import Heading
-from ..study.record import StudyFindings, StudyRecord, StudyRuns, StudySetup
+from ..study.record import StudyRecord, StudyRuns, StudySetup
 from ..study.result import speed_control
 from ..study.transients import DIFFERENCE
 from . import answer, figures, run_names, runs, shaft, slip
@@ -74,14 +74,10 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
 def _report(
     study: StudyRecord, result: Mapping[str, Any], sections: Iterable[b.Section], source: Line = ()
 ) -> b.Report:
-    config, failure = study.setup.config, _failure(study.findings)
-    return b.Report(
-        config.title, study.setup.kind, result, (), tuple(sections), source, failure, units=config.units
-    )
-
-
-def _failure(findings: StudyFindings) -> Line:
-    return () if findings.failure is None else cited(str(findings.failure), "failure")
+    config, failure = study.setup.config, study.findings.failure
+    reason = () if failure is None else cited(str(failure), "failure")
+    kind = f"{capital(study.setup.noun)}: forces, torque and overload"
+    return b.Report(config.title, kind, result, (), tuple(sections), source, reason, units=config.units)
 
 
 def _motion(study: StudyRecord) -> list[b.Block]:
@@ -197,10 +193,9 @@ def _contents(s: b.Source, setup: StudySetup, section: GivenSection) -> Iterator
 
 def _live(study: StudyRecord) -> Iterator[b.Block]:
     """The live machine of the study; none of a machine whose equations are not known."""
-    setup = study.setup
+    setup, config = study.setup, study.setup.config
     if setup.drive.foreign_machine:
         return
-    config = setup.config
     yield b.Live(
         lambda: of_study(config, setup.drive, config.drive, setup.proposal, study.findings.verdict),
         whole_of(stand_in(setup.drive)),

@@ -76,9 +76,8 @@ def _kept(record: StudyRecord, folder: Path) -> Iterator[Path]:
 
 
 def _shortfall(record: StudyRecord) -> str | None:
-    return record.setup.insufficient or (
-        None if record.runs.reaches else "The motor does not keep the speed asked for."
-    )
+    too_slow = None if record.runs.reaches else "The motor does not keep the speed asked for."
+    return record.setup.insufficient or too_slow
 
 
 TASK: Task[Config, StudyRecord] = Task(

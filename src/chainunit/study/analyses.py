@@ -35,9 +35,8 @@ class RippleWithout(Findings):
     def remark(self, study: StudyRecord) -> None:
         """The fluctuation with feed-forward beside it."""
         if self.ripple is not None:
-            study.findings.say(
-                _RIPPLE, STEADY, without=self.ripple, speed_ripple=study.runs.answers[STEADY].speed_ripple
-            )
+            ripple = study.runs.answers[STEADY].speed_ripple
+            study.findings.say(_RIPPLE, STEADY, without=self.ripple, speed_ripple=ripple)
 
 
 _RIPPLE = note(
@@ -142,11 +141,8 @@ class GearAnalysis(Analysis):
         if STEADY not in study.runs.answers:
             return None
         window = study.runs.window(Phase.STEADY, study.runs.steady)
-        warm = [
-            findings.gear_loss
-            for findings in study.findings.by_analysis.values()
-            if findings.gear_loss is not None
-        ]
+        losses = (findings.gear_loss for findings in study.findings.by_analysis.values())
+        warm = [loss for loss in losses if loss is not None]
         total, net = warm[0] if warm else window.mean(gear_loss), study.runs.answers[STEADY].power_mean
         if net is None:
             return None

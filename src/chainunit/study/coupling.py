@@ -21,10 +21,10 @@ from ..mechanism.sampled_quantities import ROUNDING, roots
 from ..reading.text import number
 from .event import Role
 from .readings import pull_out_torque
-from .record import StudyRecord, StudyRuns, StudySetup
+from .record import StudyRecord, StudyRuns
 from .remark import note, warning
 from .starts import StartFindings, transient_words
-from .torques import from_event_on, on_coupling, peaks_in_events, quasi_static_peak
+from .torques import on_coupling, peaks_in_events, quasi_static_peak
 from .turn import TurnAnalysis, TurnFindings
 from .verdict import START
 from .window import Phase
@@ -151,19 +151,13 @@ def start_peaks(study: StudyRecord) -> list[StartPeak]:
     """The largest torques on the coupling in the parts of the start: the start-up with the settling under a feed that
     comes later, starts from other crank angles, starts under load."""
     drive, events = study.setup.drive, study.setup.config.events
-    runs = {START: study.runs.series[START].sel(time=slice(None, study.runs.steady_begin))}
-    runs |= {
-        name: from_event_on(study.runs, name)
-        for name in study.runs.event_times
-        if name in study.runs.series and events[name].from_rest
-    }
+    starts = {name: run for name, run in study.runs.event_parts.items() if events[name].from_rest}
     parts = [
         StartPeak(quasi_static_peak(drive, run, on_coupling), on_coupling(drive, run), name)
-        for name, run in runs.items()
+        for name, run in {START: study.runs.rise, **starts}.items()
     ]
     if findings := StartFindings.found_in(study.findings):
-        starts = findings.starts
-        parts += [StartPeak(x.coupling_torque, x.coupling_transient, angle=x.angle) for x in starts]
+        parts += [StartPeak(x.coupling_torque, x.coupling_transient, angle=x.angle) for x in findings.starts]
     return parts
 
 
@@ -187,11 +181,6 @@ TRIPS_IN_TRANSIENT = (
 def pull_out(runs: StudyRuns) -> float:
     """Largest torque of the warm motor at the crank in steady running [N m]."""
     return pull_out_torque(runs.drive, runs.steady, runs.window(Phase.STEADY, runs.steady).warm)
-
-
-def at_motor_shaft(setup: StudySetup, torque: float) -> float:
-    """Torque at the motor's shaft [N m] for one at the crank [N m], see `Drive.at_motor_shaft`."""
-    return float(setup.drive.at_motor_shaft(torque))
 
 
 LESS_TORQUE = 0.1

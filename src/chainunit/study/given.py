@@ -70,8 +70,7 @@ def _choice(value: Any) -> Any:
 
 def given_sections(study: StudyRecord) -> list[GivenSection]:
     """All given values of a study; with them the study can be repeated."""
-    setup, runs = study.setup, study.runs
-    config = setup.config
+    setup, config, runs = study.setup, study.setup.config, study.runs
     sections = [
         GivenSection("", "Study", None, _of_study(config.file)),
         GivenSection("system", "System", None, _system(config.file.choices, is_chosen=config.motor is None)),

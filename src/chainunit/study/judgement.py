@@ -58,7 +58,7 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
         # the worst crank angle counts
         others = longest_of(findings.starts)
         time = None if others is None or time is None else max(time, others)
-    time = motor_run_up(setup.drive, runs.series[START].sel(time=slice(None, runs.steady_begin)), time)
+    time = motor_run_up(setup.drive, runs.rise, time)
     config, permitted = setup.config, setup.config.permitted_temperature[1]
     return given_motor(
         setup.drive, config.plate, permitted, steady.winding_temperature, steady.current_rms, time
@@ -146,8 +146,7 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
     does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
     another limit is exceeded, or no motor was found that suffices. The least reserve is given with its
     run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
-    setup, runs = study.setup, study.runs
-    steady = runs.answers.get(STEADY)
+    setup, runs, steady = study.setup, study.runs, study.runs.answers.get(STEADY)
     if steady is None:
         return None
     wrong = wrong_runs(runs)

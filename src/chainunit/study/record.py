@@ -57,11 +57,6 @@ class StudySetup:
     """the drive, where a capability chose it"""
 
     @property
-    def kind(self) -> str:
-        """The heading of a report on this kind of study."""
-        return f"{self.noun[:1].upper()}{self.noun[1:]}: forces, torque and overload"
-
-    @property
     def noun(self) -> str:
         """The common noun for the machine."""
         return self.drive.machine.model.noun
@@ -176,6 +171,17 @@ class StudyRuns:
             return self.started.turns
         return whole_turns(self.drive, run.sel(time=slice(self.steady_begin, None)), self.operation.run.turns)
 
+    @property
+    def rise(self) -> Dataset:
+        """The start-up until it counts as steady."""
+        return self.series["start_up"].sel(time=slice(None, self.steady_begin))
+
+    @property
+    def event_parts(self) -> dict[str, Dataset]:
+        """By event, the part of its run from its begin on."""
+        begins = {name: begin for name, begin in self.event_times.items() if name in self.series}
+        return {name: self.series[name].sel(time=slice(begin, None)) for name, begin in begins.items()}
+
     def window(
         self,
         phase: Phase,
@@ -231,13 +237,8 @@ class StudyRecord:
     """The record of a study in three, which `run_study` fills."""
 
     setup: StudySetup
-    runs: StudyRuns = field(init=False)
-    findings: StudyFindings = field(init=False)
-
-    def __post_init__(self) -> None:
-        setup = self.setup
-        self.runs = StudyRuns(setup.drive, setup.config.operation, setup.config.events)
-        self.findings = StudyFindings(setup.driver_noun)
+    runs: StudyRuns
+    findings: StudyFindings
 
     @property
     def currents_until_trip(self) -> Mapping[str, float]:
@@ -278,8 +279,7 @@ class Findings:
 
     def data(self, study: StudyRecord) -> dict[str, Any]:
         """Its part of result.json: its declared parts."""
-        data: dict[str, Any] = as_data(self, driver=study.setup.driver_noun)
-        return data
+        return as_data(self, driver=study.setup.driver_noun)
 
     def remark(self, study: StudyRecord) -> None:
         """Add to the study the remarks that the reader needs beside the numbers; by default they are enough."""

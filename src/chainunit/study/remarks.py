@@ -218,8 +218,7 @@ _NO_RESERVE = fault(
 
 def _on_limits(study: StudyRecord) -> None:
     """Warn where the motor exceeds a limit in its start or in steady running."""
-    runs, findings = study.runs, study.findings
-    steady = runs.answers[STEADY]
+    runs, findings, steady = study.runs, study.findings, study.runs.answers[STEADY]
     key, permitted = study.setup.config.permitted_temperature
     for name, check in motor_limits(study).items():
         if not check.over:
@@ -328,8 +327,7 @@ _NO_THERMAL = fault(
 
 def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     setup, runs, findings = study.setup, study.runs, study.findings
-    requested = setup.config.run.crank_speed
-    never = setup.drive.simulated_machine.model.never_repeats
+    requested, never = setup.config.run.crank_speed, setup.drive.simulated_machine.model.never_repeats
     refused = None if lasts(runs) else ""
     if not runs.reaches:
         from_here = any(not setup.config.events[name].from_rest for name in runs.overloads)
@@ -436,10 +434,10 @@ _HEAVY = warning(
 
 def _on_inertia(study: StudyRecord) -> None:
     """Warn of an inertia beyond the one that each motor brings up to speed."""
-    setup = study.setup
-    if setup.plate is None:
+    setup, plate = study.setup, study.setup.plate
+    if plate is None:
         return
-    limit = standard_inertia(setup.drive, setup.plate.nameplate, study.runs.steady, setup.config.drive.start)
+    limit = standard_inertia(setup.drive, plate.nameplate, study.runs.steady, setup.config.drive.start)
     if limit is not None and limit[0] > limit[1]:
         study.findings.say(_HEAVY, START, inertia=limit[0], most=limit[1])
 
@@ -480,17 +478,13 @@ _HAPPENINGS = {
 
 def _on_runs(study: StudyRecord) -> None:
     """A remark for each kind of happening in the runs, with all runs in which it occurred."""
-    happenings = [
-        (name, *happening) for name in study.runs.answers for happening in _happenings(study.runs, name)
-    ]
+    ran, drive = study.runs, study.runs.drive
+    happenings = [(name, *happening) for name in ran.answers for happening in _happenings(ran, name)]
     for code in dict.fromkeys(code for _, code, *_ in happenings):
         runs = {name: (text, sizes) for name, kind, text, sizes in happenings if kind == code}
-        where = (f"{study.runs.title_of(name)}{aside(text)}" for name, (text, _) in runs.items())
-        limit = (
-            {"passed": study.setup.drive.motor.current_limit(study.setup.drive.parameters)}
-            if code == "current-limit"
-            else {}
-        )
+        where = (f"{ran.title_of(name)}{aside(text)}" for name, (text, _) in runs.items())
+        passed = {"passed": drive.motor.current_limit(drive.parameters)}
+        limit = passed if code == "current-limit" else {}
         study.findings.say(
             _HAPPENINGS[code],
             *runs,
@@ -611,10 +605,8 @@ def _limited(study: StudyRecord) -> tuple[float | None, str]:
         return None, ""
     if stuck := [start for start in findings.limited if start.start_time is None]:
         where = " and ".join(number(start.angle, "rad") for start in stuck)
-        return (
-            findings.current_limit,
-            f"does not bring the {study.setup.driver_noun} to its speed from {where}",
-        )
+        driver = study.setup.driver_noun
+        return findings.current_limit, f"does not bring the {driver} to its speed from {where}"
     time = number(max(start.start_time or 0.0 for start in findings.limited), "s")
     return findings.current_limit, f"starts in up to {time}"
 

@@ -119,8 +119,7 @@ def as_dict(study: StudyRecord) -> ResultEntries:
 
 
 def _data(study: StudyRecord) -> StudyData:
-    setup, findings = study.setup, study.findings
-    drive, failure = setup.drive, findings.failure
+    setup, findings, failure = study.setup, study.findings, study.findings.failure
     return StudyData(
         heading=Heading.of(setup.config.title, setup.config.file),
         sentence=None if setup.proposal is None else setup.proposal.sentence(study),
@@ -132,7 +131,7 @@ def _data(study: StudyRecord) -> StudyData:
         slips=setup.config.file.slips,
         driver=setup.driver_noun,
         runs=_runs(study.runs),
-        findings=DriveFindings(setup.statics.loops, setup.statics.rigid_line, speed_control(drive)),
+        findings=DriveFindings(setup.statics.loops, setup.statics.rigid_line, speed_control(setup.drive)),
     )
 
 

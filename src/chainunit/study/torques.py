@@ -101,49 +101,37 @@ def all_feed_on(side: str) -> str:
     return f"all_feed_on_the_{side}"
 
 
-def from_event_on(runs: StudyRuns, name: str) -> Dataset:
-    """The part of a run from the begin of its event on."""
-    return runs.series[name].sel(time=slice(runs.event_times[name], None))
-
-
 def peaks_in_events(runs: StudyRuns, *roles: Role) -> dict[str, float]:
     """Peak torque on a coupling in each event with one of these `roles`, or in every event without `roles` [N m]."""
-    events = runs.events
     return {
-        name: on_coupling(runs.drive, from_event_on(runs, name))
-        for name in runs.event_times
-        if name in runs.series and (not roles or events[name].role in roles)
+        name: on_coupling(runs.drive, run)
+        for name, run in runs.event_parts.items()
+        if not roles or runs.events[name].role in roles
     }
 
 
 def gear_peaks(runs: StudyRuns) -> dict[str, float]:
     """Peak torque at the output of the gear in steady running, in the start-up and in each event [N m], by the name
     of the run. If the supply is switched, in starts and in disturbances, it is that by load and acceleration."""
-    events, rise = runs.events, runs.series["start_up"].sel(time=slice(None, runs.steady_begin))
-    peaks = {
-        STEADY: at_gear(runs.drive, runs.steady),
-        START: quasi_static_peak(runs.drive, rise),
-    }
-    for name in runs.event_times:
-        if name in runs.series:
-            is_switched = events[name].from_rest or events[name].role is Role.DISTURBANCE
-            peak_of = quasi_static_peak if is_switched else at_gear
-            peaks[name] = peak_of(runs.drive, from_event_on(runs, name))
+    peaks = {STEADY: at_gear(runs.drive, runs.steady), START: quasi_static_peak(runs.drive, runs.rise)}
+    for name, run in runs.event_parts.items():
+        is_switched = runs.events[name].from_rest or runs.events[name].role is Role.DISTURBANCE
+        peaks[name] = (quasi_static_peak if is_switched else at_gear)(runs.drive, run)
     return peaks
 
 
 def running_peak(study: StudyRecord, peak_of: PeakOf = on_coupling) -> DutyPeak:
     """The largest torque of normal duty without the starts: of steady running, of events that may last, and of the
     runs from which a drive was chosen."""
-    events = study.setup.config.events
+    runs, proposal = study.runs, study.setup.proposal
     lasting = [
-        (name, from_event_on(study.runs, name))
-        for name in study.runs.event_times
-        if name in study.runs.series and events[name].role is Role.DUTY and not events[name].from_rest
+        (name, run)
+        for name, run in runs.event_parts.items()
+        if runs.events[name].role is Role.DUTY and not runs.events[name].from_rest
     ]
-    peaks = [duty_peak(study.setup.drive, [(STEADY, study.runs.steady), *lasting], peak_of)]
-    if study.setup.proposal is not None and study.setup.proposal.duty is not None:
-        peaks.append(study.setup.proposal.duty)
+    peaks = [duty_peak(runs.drive, [(STEADY, runs.steady), *lasting], peak_of)]
+    if proposal is not None and proposal.duty is not None:
+        peaks.append(proposal.duty)
     return max(peaks, key=lambda peak: peak.torque)
 
 

@@ -80,16 +80,12 @@ _NOT_FELT = warning(
 
 def verdict_on(study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]) -> Verdict:
     """The verdict on the chains of a study; arguments are those of `chains`."""
-    runs: dict[str, Answers | None] = {
-        **study.runs.answers,
-        START: study.runs.start,
-        SETTLING: study.runs.settling,
-    }
-    folds = {name: a.fold_largest for name, a in runs.items() if a is not None}
-    slack = {name: a.slack_time for name, a in runs.items() if a is not None}
+    runs = study.runs
+    answers: dict[str, Answers | None] = {**runs.answers, START: runs.start, SETTLING: runs.settling}
+    folds = {name: a.fold_largest for name, a in answers.items() if a is not None}
+    slack = {name: a.slack_time for name, a in answers.items() if a is not None}
     residuals, turns = dict(residuals), math.inf
-    findings = ChainResult.found_in(study.findings)
-    if findings is not None:
+    if (findings := ChainResult.found_in(study.findings)) is not None:
         numbers = findings.own
         folds[CONSTANT], slack[CONSTANT] = numbers.fold_largest, numbers.slack_time
         residuals[CONSTANT], turns = numbers.energy_residual, numbers.independent_turns

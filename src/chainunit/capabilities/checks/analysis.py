@@ -104,8 +104,8 @@ class CheckAnalysis(Analysis):
             parts |= {
                 "gear": gear.find(study, plan, checks),
                 "motor_shaft": gear.motor_shaft(study.runs, plan, checks),
-                "flexible_coupling": coupling.find(study, plan, checks),
-                "section": section.find(study, plan.sections, checks),
+                "flexible_coupling": coupling.find(study.runs, plan, checks),
+                "section": section.find(study.runs, plan.sections, checks),
             }
         else:
             what = "bearings, gear, shaft of the motor, coupling, shaft sections"

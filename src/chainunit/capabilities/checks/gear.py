@@ -176,8 +176,8 @@ def check_gear(
 
 def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | None:
     """The gear of a study, and its `checks`; none for a drive without a gear."""
-    setup, runs = study.setup, study.runs
-    drive, tables, table, sold = setup.drive, setup.config.drive, plan.gear, setup.drive.gear_rating
+    runs, drive, tables, table = study.runs, study.setup.drive, study.setup.config.drive, plan.gear
+    sold = drive.gear_rating
     if drive.ratio == 1.0:
         return None
     limit = tables.gear.torque_limit if "gear.torque_limit" in tables.given else 0.0

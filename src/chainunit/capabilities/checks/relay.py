@@ -29,7 +29,6 @@ from ...study.relay import (
     start_seconds,
 )
 from ...study.starts import StartFindings
-from ...study.torques import from_event_on
 from ...study.verdict import STEADY
 from .plan import CheckPlan
 from .row import CheckRule, Checks
@@ -231,7 +230,7 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings |
         event, answer = study.setup.config.events[name], study.runs.answers[name]
         # behind a coupling that opens no load is left that could trip the relay
         if answer.coupling_trip_time is None:
-            run = from_event_on(study.runs, name)
+            run = study.runs.event_parts[name]
             after = before if event.passes and answer.stall_time is None else None
             time = run["time"].values - study.runs.event_times[name]
             runs[name] = time, current_of(run), 0.0 if event.from_rest else before, after

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from ...study.arrays import peak
 from ...study.record import StudyRuns
-from ...study.torques import from_event_on
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,6 +14,5 @@ if TYPE_CHECKING:
 
 def largest(runs: StudyRuns, quantity: Callable[[xr.Dataset], Any]) -> tuple[float, str]:
     """The largest size of a `quantity` in the start-up and in each other run from its event on, and that run."""
-    series = {"start_up": runs.series["start_up"]}
-    series |= {name: from_event_on(runs, name) for name in runs.event_times if name in runs.series}
+    series = {"start_up": runs.series["start_up"], **runs.event_parts}
     return max((peak(quantity(run)), name) for name, run in series.items())

@@ -30,8 +30,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
         exact(cited(study.setup.config.table("usage"), "given.usage").years),
     )
     yield b.Text(_lead(findings, x))
-    motor_class = MotorClass.found_in(study.findings)
-    if motor_class is not None:
+    if (motor_class := MotorClass.found_in(study.findings)) is not None:
         yield b.Text(words_of(motor_class))
     titles = _titles(study.setup)
     yield _places(findings, x, titles)

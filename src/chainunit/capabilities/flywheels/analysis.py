@@ -169,12 +169,10 @@ class FlywheelAnalysis(Analysis):
 
 def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
     """The flywheel of the study, from the run that the study has."""
-    runs = study.runs
+    setup, runs = study.setup, study.runs
     assert runs.start is not None
     residual = worst_residual(runs.certificate["start_up"])
-    return _wheel(
-        study.setup, findings, findings.own, runs.answers[STEADY], runs.start, runs.steady, residual
-    )
+    return _wheel(setup, findings, findings.own, runs.answers[STEADY], runs.start, runs.steady, residual)
 
 
 def _run(setup: StudySetup, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
@@ -493,12 +491,9 @@ def _on_heavier(findings: FlywheelFindings, study: StudyRecord) -> None:
         > max(findings.permitted_fluctuation, _WORSE * lighter.answers.speed_ripple)
     ]
     if worse:
-        where = ", ".join(
-            f"{number(size, 'kg.m2')} ({number(ripple, '1', 'percent')})" for size, ripple in worse
-        )
-        study.findings.say(
-            _HEAVIER_WORSE, where=where, **{f"{size:g}.speed_ripple": ripple for size, ripple in worse}
-        )
+        sizes = (f"{number(size, 'kg.m2')} ({number(ripple, '1', 'percent')})" for size, ripple in worse)
+        ripples = {f"{size:g}.speed_ripple": ripple for size, ripple in worse}
+        study.findings.say(_HEAVIER_WORSE, where=", ".join(sizes), **ripples)
 
 
 def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:

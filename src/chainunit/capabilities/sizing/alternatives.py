@@ -30,8 +30,8 @@ from ...study.relay import HEAVIEST
 from ...study.rig import Rig, join
 from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
 from ...study.start_up import start_up
-from ...study.starts import StartAnalysis, StartFindings
-from ...study.torques import PeakOf, all_feed_on, duty_peak, from_event_on, on_coupling
+from ...study.starts import StartFindings
+from ...study.torques import PeakOf, all_feed_on, duty_peak, on_coupling
 from ...study.transients import follow, follow_each
 from ...study.verdict import STEADY
 from ...system import ModelComponent, monolithic
@@ -97,10 +97,7 @@ def _for_starts(
     open a coupling that running alone allows. A way whose run fails is left out."""
     if study.setup.config.drive.start != "direct" or not setting.start_decides:
         return ()
-    if (
-        not setting.opened_by(setting.least_in_running)
-        or StartAnalysis.name not in study.findings.by_analysis
-    ):
+    if not setting.opened_by(setting.least_in_running) or StartFindings.found_in(study.findings) is None:
         return ()
     makers: tuple[Callable[[StudyRecord, Rig, Setting], Alternative | None], ...] = (
         partial(_soft_starter, chosen=chosen),
@@ -123,10 +120,7 @@ def _for_starts(
 
 def _worst(findings: StudyFindings) -> StartNumbers:
     """The start from the angle at which the direct start puts most on the coupling."""
-    worst: StartNumbers = max(
-        StartFindings.of_study(findings).starts, key=lambda start: start.coupling_torque
-    )
-    return worst
+    return max(StartFindings.of_study(findings).starts, key=lambda start: start.coupling_torque)
 
 
 def _loaded_starts(runs: StudyRuns) -> list[Event]:
@@ -390,9 +384,8 @@ def _higher(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
 def _rocker_until(runs: StudyRuns, setting: Setting) -> float | None:
     """The largest torque of the rocker in the overloads [N m], each up to the instant at which the coupling carries
     its least setting; None for a machine without a rocker."""
-    peaks = []
-    for name in setting.overloads:
-        run = from_event_on(runs, name)
+    peaks, parts = [], runs.event_parts
+    for run in (parts[name] for name in setting.overloads):
         if "machine.rocker.tau" not in run:
             return None
         torque = runs.drive.at_crank(np.abs(run[runs.drive.motor_torque].values))

@@ -10,12 +10,12 @@ import numpy as np
 
 from ...drives.catalogue_couplings import CatalogueCoupling
 from ...study.arrays import peak
-from ...study.coupling import at_motor_shaft, hardest_start, pull_out
+from ...study.coupling import hardest_start, pull_out
 from ...study.event import Role
 from ...study.judgement import wrong_runs
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudyRuns
 from ...study.sections import Coupling
-from ...study.torques import at_gear, from_event_on, gear_torque, peaks_in_events, running_peak
+from ...study.torques import at_gear, gear_torque, peaks_in_events, running_peak
 from ...study.verdict import STEADY
 from .parts import coupling_for
 from .protection import CouplingEffect, Setting, goal
@@ -47,18 +47,17 @@ def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCouplin
     )
     if setting.obstacle is not None:
         return setting
-    sold = coupling_of(study, setting, couplings)
+    sold = coupling_of(runs, setting, couplings)
     tried = effects(study, setting.least, release=None if sold is None else float(sold.data.release_time))
     return replace(setting, effects={n: tried[n] for n in setting.opens})
 
 
 def coupling_of(
-    study: StudyRecord, setting: Setting, couplings: Sequence[CatalogueCoupling]
+    runs: StudyRuns, setting: Setting, couplings: Sequence[CatalogueCoupling]
 ) -> CatalogueCoupling | None:
     """The torque limiter of the catalogues for that setting, see `coupling_for`; it turns with the motor's shaft."""
-    drive = study.setup.drive
-    fastest = peak(study.runs.steady[drive.motor_speed].values)
-    return coupling_for(couplings, at_motor_shaft(study.setup, setting.least), fastest)
+    fastest = peak(runs.steady[runs.drive.motor_speed].values)
+    return coupling_for(couplings, runs.drive.at_motor_shaft(setting.least), fastest)
 
 
 def effects(
@@ -73,7 +72,7 @@ def effects(
     drive, release = study.setup.drive, Coupling().release_time if release is None else release
     if runs is None:
         names = peaks_in_events(study.runs, Role.SHOCK)
-        runs = {name: from_event_on(study.runs, name) for name in names}
+        runs = {name: run for name, run in study.runs.event_parts.items() if name in names}
     by_shock = {}
     for name, run in runs.items():
         time, torque = run["time"].values, drive.at_crank(np.abs(run[drive.motor_torque].values))

@@ -10,11 +10,11 @@ from ...reading.text import aside, number
 from ...study.coupling import (
     LESS_TORQUE,
     TRIPS_IN_TRANSIENT,
-    at_motor_shaft,
     hardest_start,
     transient_of_starts,
 )
-from ...study.record import StudyRecord, StudyRuns, StudySetup
+from ...study.drive import Drive
+from ...study.record import StudyRecord, StudyRuns
 from ...study.sections import Coupling
 from ...study.starts import transient_words
 from ...study.torques import running_peak, running_words
@@ -25,10 +25,10 @@ def _torque(value: float) -> str:
     return number(value, "N.m")
 
 
-def _at_both(setup: StudySetup, value: float) -> str:
+def _at_both(drive: Drive, value: float) -> str:
     """A torque at the crank, and at the motor's shaft, on which the coupling sits."""
-    at_motor = _torque(at_motor_shaft(setup, value))
-    return f"{_torque(value)} at the {setup.driver_noun}, {at_motor} at the motor's shaft"
+    at_motor = _torque(drive.at_motor_shaft(value))
+    return f"{_torque(value)} at the {drive.driver_noun}, {at_motor} at the motor's shaft"
 
 
 def _list_of(runs: StudyRuns, peaks: Mapping[str, float]) -> str:
@@ -80,10 +80,11 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     by = " by load and acceleration" if setting.is_of_start else ""
     cause = f"that {start}" if setting.is_of_start else f"that {running_words(study.runs, running.run)}"
     above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {cause} puts on it{by}"
+    torque = _at_both(study.setup.drive, setting.least)
     if setting.obstacle is not None:
         return of_driver(_OBSTACLES[setting.obstacle], study.setup.driver_noun).format(
             start=start,
-            setting=_at_both(study.setup, setting.least),
+            setting=torque,
             release=number(Coupling().release_time, "s"),
             effects=_effects(study.runs, setting.effects),
             wrong=", ".join(map(study.runs.title_of, setting.wrong)),
@@ -98,7 +99,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     less = number(LESS_TORQUE, "1", "percent", full=False)
     text = (
-        f"Recommended torque limiter{caveat}: {_at_both(study.setup, setting.least)}; this is {MARGIN:g} times the "
+        f"Recommended torque limiter{caveat}: {torque}; this is {MARGIN:g} times the "
         f"{_torque(setting.normal)} {cause} puts on it{by}; the warm motor gives {_torque(setting.motor)} at the "
         f"{study.setup.driver_noun}, and may give {less} less by IEC 60034-1. It opens where "
         f"{_effects(study.runs, setting.effects)}"
@@ -208,7 +209,7 @@ def way_words(study: StudyRecord, alternative: Alternative, setting: Setting) ->
         if (value := getattr(alternative.numbers, v.name)) is not None
     }
     if alternative.numbers.setting is not None:
-        numbers["setting"] = _at_both(study.setup, alternative.numbers.setting)
+        numbers["setting"] = _at_both(study.setup.drive, alternative.numbers.setting)
     return _WAYS[alternative.way].format(
         **numbers, opens=_list_of(study.runs, alternative.opens), set=_set(study, alternative, setting)
     )
@@ -219,7 +220,7 @@ def _set(study: StudyRecord, alternative: Alternative, setting: Setting) -> str:
     gear = study.setup.config.drive.gear.torque_limit
     if alternative.numbers.setting is None:
         return f"no setting is left below the {_torque(gear)} that the gear may carry"
-    text = f"set to {_at_both(study.setup, alternative.numbers.setting)}, it opens "
+    text = f"set to {_at_both(study.setup.drive, alternative.numbers.setting)}, it opens "
     if not alternative.opens:
         return text + "in no overload of this study and protects nothing"
     effects, opens = alternative.effects, alternative.opens

@@ -14,7 +14,7 @@ from ...reading.results import GIVEN, as_data, derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import as_used
-from ...study.coupling import at_motor_shaft, remark_on_rams
+from ...study.coupling import remark_on_rams
 from ...study.drive import Drive
 from ...study.operation import DriveTables
 from ...study.proposal import DriveProposal
@@ -148,7 +148,7 @@ class SizingFindings(Findings):
             "Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
             self.answer,
             lambda study: SizingFindings.of_study(study.findings).sized(study).sentence,
-            _currents_until_trip,
+            lambda study: SizingFindings.of_study(study.findings).currents_until_trip(study),
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,
@@ -169,10 +169,10 @@ class SizingFindings(Findings):
             return None
         items, wanted = best.parts, ""
         if setting is not None and setting.torque is not None:
-            if sold := coupling_of(study, setting, self.couplings):
+            if sold := coupling_of(study.runs, setting, self.couplings):
                 items = [*items, OrderedPart.of("torque limiter", sold)]
             else:
-                torque = number(at_motor_shaft(study.setup, setting.torque), "N.m")
+                torque = number(study.setup.drive.at_motor_shaft(setting.torque), "N.m")
                 wanted = f"a torque limiter that opens at {torque} on the motor's shaft"
         unknown = [] if best.sold is None else unknown_limits(best.sold)
         flywheel = f"a flywheel of {best.flywheel_words}" if best.disc else ""
@@ -304,9 +304,3 @@ class ProtectionAnalysis(Analysis):
         if sizing.setting is not None:
             chosen = ChosenMotor(sizing.plan, sizing.duty, sizing.best)
             sizing.alternatives = alternatives(study, sizing.setting, work.rig, chosen, work.progress)
-
-
-def _currents_until_trip(study: StudyRecord) -> Mapping[str, float]:
-    """See `SizingFindings.currents_until_trip`; empty for a study without them."""
-    findings = SizingFindings.found_in(study.findings)
-    return {} if findings is None else findings.currents_until_trip(study)

@@ -11,7 +11,6 @@ from ...drives.belt import belt_drive
 from ...drives.gear_ratios import belt_before_gear
 from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import aside, number
-from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
 from ...study.record import StudyRecord, StudyRuns
 from ...study.relay import HEAVIEST, MORE_CURRENT, class_words, locked_rotor, protects, tolerant_class
@@ -285,7 +284,7 @@ def drive_protection(
     judged = setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
     return DriveProtection(
         trip_torque=setting.torque,
-        trip_torque_at_motor=setting.torque and at_motor_shaft(study.setup, setting.torque),
+        trip_torque_at_motor=setting.torque and study.setup.drive.at_motor_shaft(setting.torque),
         relay=relay,
         coupling=coupling_sentence(study, setting, alternatives),
         obstacle=setting.obstacle,

@@ -17,7 +17,6 @@ from ...study.drive import Drive
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord, StudyRuns
 from ...study.remark import note, warning
-from ...study.torques import from_event_on
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -142,13 +141,8 @@ class ObserverAnalysis(Analysis):
             return None
         steady, events = study.runs.steady, study.setup.config.events
         normal = peak(steady["machine.rocker.tau"].values)
-        after = {
-            name: from_event_on(study.runs, name)
-            for name in study.runs.event_times
-            if name in study.runs.answers and not events[name].from_rest
-        }
-        start = study.runs.series["start_up"].sel(time=slice(None, study.runs.steady_begin))
-        resonance = None
+        after = {name: run for name, run in study.runs.event_parts.items() if not events[name].from_rest}
+        start, resonance = study.runs.rise, None
         if study.setup.drive.machine.in_place:
             _, mode = slack_and_mode(study.setup.drive.chain_unit, study.setup.config.feed)
             resonance = study.setup.config.run.crank_speed / mode

@@ -91,16 +91,15 @@ class CouplingFindings(Findings):
 
     def remark(self, study: StudyRecord) -> None:
         """The load beside the rated one, the motor in a stall, and the plug."""
-        steady = self.answers[STEADY]
+        steady, findings = self.answers[STEADY], study.findings
         if steady.slip_mean > _MUCH * self.rated_slip:
-            study.findings.say(_TOO_SMALL, STEADY, slip=steady.slip_mean, rated=self.rated_torque)
+            findings.say(_TOO_SMALL, STEADY, slip=steady.slip_mean, rated=self.rated_torque)
         if self.motor_torque is not None and self.stall_torque > self.motor_torque:
-            study.findings.say(_MOTOR_STALLS, stall=self.stall_torque, motor=self.motor_torque)
+            findings.say(_MOTOR_STALLS, stall=self.stall_torque, motor=self.motor_torque)
         for name, answers in self.answers.items():
             if answers.plug_time is not None:
-                study.findings.say(
-                    _PLUG, name, title=study.runs.title_of(name), time=answers.plug_time, heat=answers.heat
-                )
+                title = study.runs.title_of(name)
+                findings.say(_PLUG, name, title=title, time=answers.plug_time, heat=answers.heat)
 
 
 _TOO_SMALL = warning(

@@ -89,8 +89,7 @@ def _rigid_runs(runs: StudyRuns, work: Work) -> dict[str, xr.Dataset]:
 
 
 def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindings:
-    setup, runs = study.setup, study.runs
-    steady = runs.steady
+    setup, runs, steady = study.setup, study.runs, study.runs.steady
     until = slice(None, steady["time"].values[0])
     # the damage of steady running comes first, as that of the other runs is relative to it
     parts = [("steady", steady, twins["start_up"].sel(time=slice(runs.steady_begin, None)))]
@@ -109,8 +108,7 @@ def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindi
 
 def remark(study: StudyRecord) -> None:
     """Add to a study with a driveline the remarks on it."""
-    setup, findings = study.setup, study.findings
-    modes = setup.statics.modes
+    setup, findings, modes = study.setup, study.findings, study.setup.statics.modes
     if modes is None:
         return
     line = driveline_of(setup.drive)

@@ -12,7 +12,6 @@ from ...core.quantities import Layout
 from ..analysis import Analysis
 from ..conditions import given
 from ..rules import Rule
-from ..torques import from_event_on
 from ..verdict import START, STEADY
 from .part import PartOfLine
 from .placed import PlacedPart
@@ -98,7 +97,5 @@ class SlipRun:
 
 def parts_of_runs(runs: StudyRuns, placed: PlacedPart) -> Iterator[tuple[str, SlipRun]]:
     """Steady running, the start-up, and each event from its begin on, with their names."""
-    pieces = {STEADY: runs.steady, START: runs.series[START].sel(time=slice(None, runs.steady_begin))}
-    pieces |= {name: from_event_on(runs, name) for name in runs.event_times if name in runs.series}
-    for name, run in pieces.items():
+    for name, run in {STEADY: runs.steady, START: runs.rise, **runs.event_parts}.items():
         yield name, SlipRun.read(placed, run)
