@@ -140,7 +140,7 @@ def test_the_data_of_an_analysis_have_the_documented_names(analysis):
     config = parse(parts.example("knife"))
     drive = choose(config, Path(), lambda *_: None).drive
     found = analysis.find(
-        record_of(config, drive).runs,
+        record_of(config, drive),
         Work(Rig(config.operation, drive, {}), print),
     )
     assert set(as_data(found)) == {name.split(".")[0] for name, _, _ in documented(type(found))}

@@ -930,7 +930,7 @@ def test_a_relay_of_a_star_delta_starter_has_its_place():
         == words
         == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
     )
-    started.drive.star_delta = None
+    started.setup.drive.star_delta = None
     assert "line_current" not in as_data(_relay_of(started, 8.04), titled=True)
 
 

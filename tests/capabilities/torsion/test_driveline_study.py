@@ -74,7 +74,7 @@ def study_of(text):
 def findings(text):
     study = study_of(SYSTEM + ("" if "[driveline]" in text else BARE) + text)
     return TorsionAnalysis.find(
-        study.runs, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
+        study, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
     )
 
 
@@ -552,7 +552,7 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
     study = study_of(SLOW_LINE)
     found = TorsionAnalysis.find(
-        study.runs, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
+        study, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
     )
     J = study.setup.statics.normal.outputs.J
     ratio = found.ratio
@@ -653,7 +653,7 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
     for more in ("", "[torsion]\nspeeds = 2\n"):
         study = study_of(text + more)
         found = TorsionAnalysis.find(
-            study.runs, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
+            study, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
         )
         assert (found is not None) == (made or bool(more))
         assert [remark.code for remark in study.findings.remarks] == [] if found else ["torsion-left-out"]
