@@ -119,17 +119,19 @@ def test_before_or_behind_the_gear(tmp_path):
         text = f'{SHORT}[driveline]\nplace = "{place}"\nalpha1 = 0\nalpha2 = 0\n{table}'
         runs.append(run_study(config.parse(text), tmp_path / place))
     crank, motor = runs
-    assert (crank.drive.line.ratio, motor.drive.line.ratio) == (25.0, 1.0)
+    assert (crank.setup.drive.line.ratio, motor.setup.drive.line.ratio) == (25.0, 1.0)
     for name in ("start_up", "jam_left"):
-        a, b = crank.runs[name], motor.runs[name]
+        a, b = crank.runs.series[name], motor.runs.series[name]
         np.testing.assert_allclose(a["motor.w"], b["motor.w"], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(a["driveline.tau2"], 25.0 * b["driveline.tau2"], rtol=1e-7, atol=1e-6)
         np.testing.assert_allclose(
-            crank_torque(crank.drive, a), crank_torque(motor.drive, b), rtol=1e-7, atol=1e-6
+            crank_torque(crank.setup.drive, a), crank_torque(motor.setup.drive, b), rtol=1e-7, atol=1e-6
         )
-    assert crank.statics.modes.k_largest == pytest.approx(motor.statics.modes.k_largest, rel=1e-12)
-    assert crank.answers["jam_left"].speed_least == pytest.approx(
-        motor.answers["jam_left"].speed_least, rel=1e-9
+    assert crank.setup.statics.modes.k_largest == pytest.approx(
+        motor.setup.statics.modes.k_largest, rel=1e-12
+    )
+    assert crank.runs.answers["jam_left"].speed_least == pytest.approx(
+        motor.runs.answers["jam_left"].speed_least, rel=1e-9
     )
 
 
