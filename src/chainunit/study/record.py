@@ -261,16 +261,16 @@ class Findings:
         return None
 
     @classmethod
-    def found_in(cls, study: StudyFindings) -> Self | None:
+    def found_in(cls, findings: StudyFindings) -> Self | None:
         """The findings of this kind of a study; None where it has none."""
-        return next((entry for entry in study.by_analysis.values() if isinstance(entry, cls)), None)
+        return next((entry for entry in findings.by_analysis.values() if isinstance(entry, cls)), None)
 
     @classmethod
-    def of_study(cls, study: StudyFindings) -> Self:
+    def of_study(cls, findings: StudyFindings) -> Self:
         """The findings of this kind of a study that has them."""
-        findings = cls.found_in(study)
-        assert findings is not None, cls.__name__
-        return findings
+        entry = cls.found_in(findings)
+        assert entry is not None, cls.__name__
+        return entry
 
     @property
     def store(self) -> Path | None:
