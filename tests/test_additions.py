@@ -60,15 +60,15 @@ _FORCE_OF_BEARING = warning(
     sizes={"N": "force"},
 )
 """
-WARNED = """    if (found := study.answers.get(STEADY)) is not None and (found.bearing_peak or 0.0) > 10.0:
-        study.say(_FORCE_OF_BEARING, STEADY, force=found.bearing_peak)
+WARNED = """    if (found := study.runs.answers.get(STEADY)) is not None and (found.bearing_peak or 0.0) > 10.0:
+        study.findings.say(_FORCE_OF_BEARING, STEADY, force=found.bearing_peak)
 """
 FIGURE = '''
 
-@PICTURES.declare(lambda study: "machine.angle" in study.runs.get("start_up", ()), "output_angle.png")
+@PICTURES.declare(lambda study: "machine.angle" in study.runs.series.get("start_up", ()), "output_angle.png")
 def _output_angle(study: StudyRecord) -> fig.Figure:
     """The angle of the output link over time."""
-    run = study.runs["start_up"]
+    run = study.runs.series["start_up"]
     curve = fig.Curve("output link", run["time"].values, run["machine.angle"].values)
     panel = fig.Panel(fig.Axis("time", "s"), fig.Axis("angle of the output link", "rad"), (curve,))
     return fig.Figure("output-angle", "The output link", "Angle of the output link over time.", ((panel,),))

@@ -44,22 +44,22 @@ turns = 1
 def sized(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sized")
     study = run_study(parse(KNIFE), folder)
-    assert study.failure is None
+    assert study.findings.failure is None
     return study, folder
 
 
 def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
     study, _ = sized
-    best = study.findings["sizing"].best
-    assert study.findings["sizing"].chosen_candidate is best and best.drive.added_inertia > 0.0
-    steady, ratio = study.answers["steady"], study.drive.ratio
+    best = study.findings.by_analysis["sizing"].best
+    assert study.findings.by_analysis["sizing"].chosen_candidate is best and best.drive.added_inertia > 0.0
+    steady, ratio = study.runs.answers["steady"], study.setup.drive.ratio
     plate = best.motor.nameplate
     # without it the RMS torque of the turn alone asks for more than the motor has
-    by_turn = study.statics.cycles["normal running"].crank_torque / ratio
+    by_turn = study.setup.statics.cycles["normal running"].crank_torque / ratio
     assert np.sqrt(np.mean(by_turn**2)) > plate.torque > steady.motor_torque_rms > np.mean(by_turn)
-    assert steady.speed_ripple <= study.config.plans["sizing"].demands.fluctuation
+    assert steady.speed_ripple <= study.setup.config.plans["sizing"].demands.fluctuation
     # it starts without a cut; it is judged once it has settled to its cuts
-    settled = np.sqrt(np.mean(study.steady["motor.air_gap_tau"].values ** 2))
+    settled = np.sqrt(np.mean(study.runs.steady["motor.air_gap_tau"].values ** 2))
     assert best.checks["rms_torque"].value == pytest.approx(settled, rel=0.01)
     # the duty has one feed, and no sides, nor is there a word on them
     assert not re.search(r"\bsides?\b", markdown(report_of(study), []))
@@ -73,7 +73,7 @@ def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
 
 def test_random_overloads_of_a_machine_without_sides(sized):
     study, _ = sized
-    random = study.findings.get("monte_carlo")
+    random = study.findings.by_analysis.get("monte_carlo")
     runs = random.dataset
     assert random.runs == 2 and random.failures == 0 and random.sides == {}
     assert (runs["side"] == 0).all() and np.isnan(runs["rocker_torque_peak"]).all()

@@ -56,7 +56,7 @@ step = "2 ms"
 def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("begin")
     study = run_study(parse(DIP + LINE), folder)
-    assert study.failure is None
+    assert study.findings.failure is None
     write(study, folder)
     return study, folder, ResultEntries(json.loads((folder / "result.json").read_text()))
 
@@ -64,15 +64,15 @@ def done(tmp_path_factory):
 def test_the_feed_comes_once_the_crank_turns_behind_its_line(done):
     """The motor is ahead of the crank by the twist of the shafts: the start is over where the crank is at speed."""
     study, _, result = done
-    time = study.start.start_time
+    time = study.runs.start.start_time
     assert time is not None and result["start_up"]["start_time"]["value"] == time
-    run = study.runs["start_up"].sel(time=time)
-    assert float(run["machine.w0"]) >= STARTED * study.config.run.crank_speed
+    run = study.runs.series["start_up"].sel(time=time)
+    assert float(run["machine.w0"]) >= STARTED * study.setup.config.run.crank_speed
     assert float(run["machine.left.processing_force"]) == 0.0
     # the flywheel that the study has starts as the others do
-    own, other = study.findings["flywheels"].wheels
+    own, other = study.findings.by_analysis["flywheels"].wheels
     assert own.answers.start_time == time and other.answers.start_time is not None
-    assert "flywheel-does-not-start" not in {warning.code for warning in study.warnings}
+    assert "flywheel-does-not-start" not in {warning.code for warning in study.findings.warnings}
 
 
 def test_every_peak_of_the_run_is_in_a_table(done):
@@ -85,7 +85,7 @@ def test_every_peak_of_the_run_is_in_a_table(done):
     assert max(values) == pytest.approx(np.max(torque), rel=1e-9)
     # the largest comes with the feed: neither in the start nor in the steady turns
     assert values[1] > 1.005 * max(values[0], values[2])
-    fed = time > study.start.start_time
+    fed = time > study.runs.start.start_time
     assert values[0] == pytest.approx(np.max(torque[~fed]), rel=1e-9)
     words = said_of(study)
     assert "Settling under the feed: crank torque, peak" in words
@@ -98,14 +98,14 @@ def test_every_peak_of_the_run_is_in_a_table(done):
 
 def test_the_driveline_has_its_start(done):
     study, folder, result = done
-    steady = study.steady["time"].values[0]
-    tau2 = np.abs(study.runs["start_up"]["driveline.tau2"].sel(time=slice(None, steady)).values)
+    steady = study.runs.steady["time"].values[0]
+    tau2 = np.abs(study.runs.series["start_up"]["driveline.tau2"].sel(time=slice(None, steady)).values)
     assert result["shaft"]["start_up"]["tau2_peak"]["value"] == np.max(tau2)
     assert (
-        shaft_findings(study).answers["start_up"].tau2_peak
-        > shaft_findings(study).answers["steady"].tau2_peak
+        shaft_findings(study.findings).answers["start_up"].tau2_peak
+        > shaft_findings(study.findings).answers["steady"].tau2_peak
     )
-    assert shaft_findings(study).answers["start_up"].turns_of_steady > 0.0
+    assert shaft_findings(study.findings).answers["start_up"].turns_of_steady > 0.0
     table = (folder / "result.md").read_text().partition("Torque in the driveline")[2]
     assert "start-up" in table[:200]
 
@@ -114,13 +114,13 @@ def test_a_ripple_that_the_line_makes_is_not_the_flywheels(done):
     """The motor runs evenly, the crank behind the joints does not: the study names the joints and asks for no
     flywheel."""
     study, _, _ = done
-    findings = study.findings["flywheels"]
+    findings = study.findings.by_analysis["flywheels"]
     own, heavy = (wheel.answers for wheel in findings.wheels)
-    w, crank = (study.steady[name].values for name in ("motor.w", "machine.w0"))
+    w, crank = (study.runs.steady[name].values for name in ("motor.w", "machine.w0"))
     assert own.motor_ripple == pytest.approx(np.ptp(w) / np.mean(w), rel=1e-12) and own.motor_ripple < 0.01
     assert own.speed_ripple == pytest.approx(np.ptp(crank) / np.mean(crank), rel=1e-2)
     assert own.speed_ripple > findings.permitted_fluctuation > own.motor_ripple and findings.least is None
-    messages = {warning.code: warning.text for warning in study.warnings}
+    messages = {warning.code: warning.text for warning in study.findings.warnings}
     assert "Make the bends equal" in messages["ripple-behind-flywheel"]
     # nor is a heavier one praised with which the drive swings
     assert heavy.speed_ripple > 2.0 * own.speed_ripple and "0.100 kg m" in messages["heavier-flywheel-worse"]
@@ -143,10 +143,10 @@ settle_turns = 1
 step = 0.002
 """
     study = run_study(parse(text), tmp_path)
-    assert study.failure is None
+    assert study.findings.failure is None
     words = "tuned to the inertia with each flywheel"
     assert (words in said_of(study)) is told
-    assert as_data(study.findings["flywheels"])["retuned"] is told
+    assert as_data(study.findings.by_analysis["flywheels"])["retuned"] is told
 
 
 HEAVY = """
@@ -169,7 +169,7 @@ step = "4 ms"
 
 def _heavy(J: float, folder):
     study = run_study(parse(DIP + HEAVY.format(J=J)), folder)
-    assert study.failure is None
+    assert study.findings.failure is None
     return study
 
 
@@ -177,23 +177,25 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
     """A rotor that speeds up for 40 s is fed at speed, and the turns that are evaluated gain nothing: a change of the
     speed that is small in itself takes power that is not of the load."""
     study = _heavy(10.0, tmp_path)
-    steady, start = study.answers["steady"], study.start
-    assert start.start_time == pytest.approx(study.started.rig.fed_from) and 35.0 < start.start_time < 45.0
-    warnings = {each.code: each for each in study.warnings}
+    steady, start = study.runs.answers["steady"], study.runs.start
+    assert (
+        start.start_time == pytest.approx(study.runs.started.rig.fed_from) and 35.0 < start.start_time < 45.0
+    )
+    warnings = {each.code: each for each in study.findings.warnings}
     assert not {"fed-before-speed", "speed-drifts"} & set(warnings)
     # as long as that no rotor may be locked
-    long, locked = warnings["motor-start"].quantities, study.config.plate.nameplate.locked_time
-    worst = max(each.start_time for each in study.findings["starts"].starts)
+    long, locked = warnings["motor-start"].quantities, study.setup.config.plate.nameplate.locked_time
+    worst = max(each.start_time for each in study.findings.by_analysis["starts"].starts)
     assert long["value"][0] == max(start.start_time, worst) > 2.0 * locked and long["limit"][0] == locked
     assert worst == pytest.approx(start.start_time, rel=0.01)
     verdict = motor_verdict(study)
     assert verdict.holds == "in part" and "its start takes too long" in verdict.text
-    turns, J = study.steady, study.drive.fmu_parameters.rotor.J
+    turns, J = study.runs.steady, study.setup.drive.fmu_parameters.rotor.J
     energy = 0.5 * J * turns["motor.w"].values ** 2
     work = steady.power_mean * float(turns["time"][-1] - turns["time"][0])
     assert abs(energy[-1] - energy[0]) < 0.05 * work
     # the energy of a cut goes to and fro between rotor and blade
-    swing = study.findings["constant_speed"].numbers.energy_swing
+    swing = study.findings.by_analysis["constant_speed"].numbers.energy_swing
     by_hand = swing / (J * float(np.mean(turns["motor.w"])) ** 2)
     assert steady.speed_ripple == pytest.approx(by_hand, rel=0.15)
 
@@ -201,7 +203,10 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
 def test_a_feed_that_comes_before_the_speed_is_told(tmp_path):
     """A machine that would take minutes to speed up is fed, and the study says with which speed."""
     study = _heavy(400.0, tmp_path)
-    (remarks,) = [each for each in study.warnings if each.code == "fed-before-speed"]
-    assert remarks.quantities["fed"][0] == study.started.rig.fed_from and study.start.start_time is None
-    assert remarks.quantities["speed"][0] < 0.5 * study.config.run.crank_speed
+    (remarks,) = [each for each in study.findings.warnings if each.code == "fed-before-speed"]
+    assert (
+        remarks.quantities["fed"][0] == study.runs.started.rig.fed_from
+        and study.runs.start.start_time is None
+    )
+    assert remarks.quantities["speed"][0] < 0.5 * study.setup.config.run.crank_speed
     assert "larger motor" in remarks.text

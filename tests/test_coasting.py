@@ -48,9 +48,9 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
     monkeypatch.setattr("chainunit.capabilities.chains.analysis.ChainAnalysis.find", lambda *_: None)
     text = STUDY.format(organ=organ, more=more, trip=trip)
     study = run_study(config.parse(text), tmp_path)
-    assert study.failure is None and study.answers["jam_left"].coupling_trip_time is not None
-    run, coasting = study.runs["jam_left"], study.runs["jam_left_coasting"]
-    J4 = study.drive.line.inertia
+    assert study.findings.failure is None and study.runs.answers["jam_left"].coupling_trip_time is not None
+    run, coasting = study.runs.series["jam_left"], study.runs.series["jam_left_coasting"]
+    J4 = study.setup.drive.line.inertia
     own = {name for name in run if name.startswith("machine.")} & set(coasting)
     assert ("machine.left.theta_1" in own) == (organ == "chain")
     w = float(run["machine.w0"][-1])
@@ -65,19 +65,19 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
     )
     gap = held.values - held.values[0] + losses
     assert np.max(np.abs(gap)) < 5e-3 * np.max(losses)
-    assert not [remark for remark in study.notes if "two bars" in remark.text]
-    answers = study.answers["jam_left"]
+    assert not [remark for remark in study.findings.notes if "two bars" in remark.text]
+    answers = study.runs.answers["jam_left"]
     assert answers.energy_behind == pytest.approx(float(coasting["machine.kinetic_energy"][0]))
     if organ == "chain":
         return
     # the equations of the direct model, without its FMU
-    model = coasting_model(study.drive)
+    model = coasting_model(study.setup.drive)
     start = model.start_from({"phi0": float(run["machine.phi0"][-1]), "w0": w})
-    p = model.parameter_layout.from_names(coasting_parameters(study.drive) | start)
-    loads = study.drive.loads(study.config.feed)
-    rig = Rig(study.config.operation, study.drive, {})
+    p = model.parameter_layout.from_names(coasting_parameters(study.setup.drive) | start)
+    loads = study.setup.drive.loads(study.setup.config.feed)
+    rig = Rig(study.setup.config.operation, study.setup.drive, {})
     (event,) = Runner(study, rig, print).events
-    jam = rig.event_signals(event, study.event["jam_left"], {})
+    jam = rig.event_signals(event, study.runs.event_times["jam_left"], {})
     times = coasting["time"].values
     alone = System({"machine": ModelComponent(model, p)})
     exact = monolithic(alone, {**loads, **jam, "machine.tau": 0.0}, times)
@@ -88,10 +88,10 @@ def test_the_axis_of_time_ends_where_the_crank_stands(tmp_path, monkeypatch):
     """The run behind the open coupling lasts on: it took nine tenths of the figure of a jam, at rest."""
     monkeypatch.setattr("chainunit.capabilities.chains.analysis.ChainAnalysis.find", lambda *_: None)
     study = run_study(config.parse(STUDY.format(organ="two-bar", more="", trip=250)), tmp_path)
-    assert study.failure is None
+    assert study.findings.failure is None
     figure = next(each for each in report_of(study).figures if each.name == "time-jam-left")
-    event, coasting = study.event["jam_left"], study.runs["jam_left_coasting"]
-    time, speed = coasting["time"].values - event, abs(crank_speed(study.drive, coasting))
+    event, coasting = study.runs.event_times["jam_left"], study.runs.series["jam_left_coasting"]
+    time, speed = coasting["time"].values - event, abs(crank_speed(study.setup.drive, coasting))
     stands = time[np.flatnonzero(speed > 0.02 * 4.0)[-1]]
     axis = figure.panels[0][0].x
     assert stands < axis.high < 2.0 * stands < 0.5 * time[-1]

@@ -223,14 +223,16 @@ def test_the_readme_is_short_and_its_overload_is_that_of_the_study(tmp_path):
     assert len(text.splitlines()) <= 110
     assert (ROOT / "examples" / "one_sided_overload.py").read_text("utf-8") in text
     study = run_study(load(), tmp_path)
-    turns = 4.0 * np.pi / study.config.run.crank_speed
+    turns = 4.0 * np.pi / study.setup.config.run.crank_speed
     results = []
     for run in ("start_up", "feed_left"):
-        last = study.runs[run].isel(time=study.runs[run]["time"] > study.runs[run]["time"][-1] - turns)
+        last = study.runs.series[run].isel(
+            time=study.runs.series[run]["time"] > study.runs.series[run]["time"][-1] - turns
+        )
         crank = np.abs(last["machine.tau"].values).max()
         current = last["motor.armature.i"].values
         rocker = np.abs(last["machine.rocker.tau"].values).max()
-        results.append((crank * study.config.machine.p.ratio, rocker, np.sqrt(np.mean(current**2))))
+        results.append((crank * study.setup.config.machine.p.ratio, rocker, np.sqrt(np.mean(current**2))))
     printed = re.findall(r"crank +(\S+) N m +rocker +(\S+) N m +current +(\S+) A RMS", text)
     np.testing.assert_allclose(np.array(printed, float), results, rtol=0.02)
     more, current = (

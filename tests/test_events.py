@@ -240,11 +240,13 @@ def test_two_of_a_kind_run_beside_each_other(tmp_path):
         "{ type = 'jam', side = 'left', force = 1500, turns = 1, crank_angle = '90 deg' }]\n"
     )
     study = run_study(config.parse(text + QUICK), tmp_path)
-    assert study.failure is None and study.overloads == ["jam_left", "jam_left_2"]
-    assert float(study.runs["jam_left_2"]["machine.left.processing_force"].max()) == pytest.approx(1510.0)
-    assert float(study.runs["jam_left"]["machine.left.processing_force"].max()) == pytest.approx(510.0)
+    assert study.findings.failure is None and study.runs.overloads == ["jam_left", "jam_left_2"]
+    assert float(study.runs.series["jam_left_2"]["machine.left.processing_force"].max()) == pytest.approx(
+        1510.0
+    )
+    assert float(study.runs.series["jam_left"]["machine.left.processing_force"].max()) == pytest.approx(510.0)
     for name, angle in (("jam_left", 0.0), ("jam_left_2", 0.5 * math.pi)):
-        phi = study.runs[name]["motor.phi"].interp(time=study.event[name])
+        phi = study.runs.series[name]["motor.phi"].interp(time=study.runs.event_times[name])
         assert math.remainder(float(phi) / 25.0 - angle, 2.0 * math.pi) == pytest.approx(0.0, abs=2e-4)
     result = as_dict(study)
     assert result["event"]["jam_left_2"]["force"] == {"value": 1500.0, "unit": "N"}

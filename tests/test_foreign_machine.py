@@ -203,13 +203,13 @@ def test_motor_and_machine_of_somebody_else(folder, burst):
     """Start-up, steady running and an event are those of both written as one ODE and integrated by scipy."""
     text = f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}[[event]]\ntype = 'burst'\n"
     study = run_study(parse(folder, text), folder / "both")
-    assert study.failure is None and set(study.runs) == {"start_up", "burst"}
+    assert study.findings.failure is None and set(study.runs.series) == {"start_up", "burst"}
     w_ref = Profile(0.0, ((0.0, 0.3, SPEED * RATIO),))
-    begin = study.event["burst"]
+    begin = study.runs.event_times["burst"]
     pressure = Profile(PRESSURE, ((begin, 0.02, BURST), (begin + 0.3, 0.02, PRESSURE)))
-    burst_run = study.runs["burst"]
+    burst_run = study.runs.series["burst"]
     exact = together(float(burst_run["time"][-1]), w_ref, pressure)
-    for run in (study.runs["start_up"], burst_run):
+    for run in (study.runs.series["start_up"], burst_run):
         angle, speed = exact(run["time"].values)[:2]
         error = np.max(np.abs(run["motor.w"].values - speed)) / np.max(speed)
         assert error < 3e-4
@@ -218,29 +218,30 @@ def test_motor_and_machine_of_somebody_else(folder, burst):
         accelerated = np.gradient(speed, run["time"].values) / RATIO
         whole = torque + inertia * accelerated
         inside = slice(5, -5)
-        error = np.abs(crank_torque(study.drive, run) - whole)[inside]
+        error = np.abs(crank_torque(study.setup.drive, run) - whole)[inside]
         assert np.max(error) < 0.02 * np.max(np.abs(whole))
-    steady = study.answers["steady"]
+    steady = study.runs.answers["steady"]
     turns = (
-        exact(np.linspace(study.steady_begin, study.steady_begin + 2.0 * math.pi / SPEED, 2000))[1] / RATIO
+        exact(np.linspace(study.runs.steady_begin, study.runs.steady_begin + 2.0 * math.pi / SPEED, 2000))[1]
+        / RATIO
     )
     assert steady.speed_ripple == pytest.approx(np.ptp(turns) / np.mean(turns), rel=5e-3)
-    assert study.answers["burst"].speed_least < steady.speed_least
+    assert study.runs.answers["burst"].speed_least < steady.speed_least
     # absent: what only a model of motor or machine can tell
     assert steady.current_peak is steady.rocker_torque_peak is steady.shaking_force is None
-    assert study.pins == {}
-    assert {"energy_residual_share", "gear_energy_residual_share"} == set(study.certificate["burst"])
-    for shares in study.certificate.values():
+    assert study.runs.pins == {}
+    assert {"energy_residual_share", "gear_energy_residual_share"} == set(study.runs.certificate["burst"])
+    for shares in study.runs.certificate.values():
         assert all(share < 2e-3 for share in shares.values())
-    assert study.verdict.holds == "true" and study.verdict.text == (
+    assert study.findings.verdict.holds == "true" and study.findings.verdict.text == (
         f"Energy balance of a machine that is an FMU, crank at "
-        f"{text_of(study.answers['steady'].speed_mean, 'rad/s')}: valid."
+        f"{text_of(study.runs.answers['steady'].speed_mean, 'rad/s')}: valid."
     )
     # a row of dashes tells only what the motor does not: nobody knows whether the machine has a rocker or a web
-    assert "torque_reserve" in study.not_known
+    assert "torque_reserve" in study.runs.not_known
     of_machine = {"rocker_torque_peak", "web_pull_least", "wall_pull_least", "shaking_force"}
-    absent = not_known(study.window(Phase.STEADY, study.steady))
-    assert of_machine <= set(absent) and not of_machine & study.not_known
+    absent = not_known(study.runs.window(Phase.STEADY, study.runs.steady))
+    assert of_machine <= set(absent) and not of_machine & study.runs.not_known
 
 
 def test_the_step_is_of_second_order(folder):
@@ -314,10 +315,12 @@ def compare_with_pump(best):
 
 def test_sizing_finds_a_motor_for_it(folder):
     study = run_study(parse(folder, SIZED), folder / "sized")
-    assert study.failure is None and study.findings["sizing"].chosen_candidate is not None
-    assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
-    assert study.drive.graph.components["gear"].parameters.ratio == study.drive.ratio
-    compare_with_pump(study.findings["sizing"].best)
+    assert (
+        study.findings.failure is None and study.findings.by_analysis["sizing"].chosen_candidate is not None
+    )
+    assert study.runs.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
+    assert study.setup.drive.graph.components["gear"].parameters.ratio == study.setup.drive.ratio
+    compare_with_pump(study.findings.by_analysis["sizing"].best)
 
 
 def test_sizing_does_without_its_torque(tmp_path):
@@ -329,12 +332,12 @@ def test_sizing_does_without_its_torque(tmp_path):
 def test_behind_an_open_coupling_it_is_not_followed(folder, burst):
     text = f"{STUDY}{MACHINE}[coupling]\ntrip_torque = 110\n[[event]]\ntype = 'burst'\n"
     study = run_study(parse(folder, text), folder / "trip")
-    assert study.failure is None
-    answers = study.answers["burst"]
+    assert study.findings.failure is None
+    answers = study.runs.answers["burst"]
     assert answers.coupling_trip_time is not None and answers.energy_after_trip is not None
     assert answers.energy_behind is answers.standstill_time is None
-    assert set(study.runs) == {"start_up", "burst"}
-    (remark,) = (each for each in study.warnings if each.code == "trip")
+    assert set(study.runs.series) == {"start_up", "burst"}
+    (remark,) = (each for each in study.findings.warnings if each.code == "trip")
     assert "the machine behind it is an FMU and is not followed" in remark.text
 
 
@@ -345,11 +348,13 @@ def test_the_least_that_it_needs(left_out, folder, tmp_path):
     """Other names, no torque of its own, no slopes: the same study by what its driver tells."""
     build(tmp_path, MACHINE_OTHER, left_out, SCRIPT)
     names = 'machine_names = { J = "inertia", tau_bias = "torque_needed" }\n'
-    whole = run_study(parse(folder, STUDY + MACHINE), tmp_path / "whole").answers["steady"]
+    whole = run_study(parse(folder, STUDY + MACHINE), tmp_path / "whole").runs.answers["steady"]
     study = run_study(parse(tmp_path, STUDY + MACHINE + names), tmp_path / "least")
-    assert study.failure is None
+    assert study.findings.failure is None
     for name in ("crank_torque_peak", "crank_torque_rms", "speed_mean", "power_mean", "current_rms"):
-        assert getattr(study.answers["steady"], name) == pytest.approx(getattr(whole, name), rel=2e-2), name
+        assert getattr(study.runs.answers["steady"], name) == pytest.approx(getattr(whole, name), rel=2e-2), (
+            name
+        )
 
 
 @pytest.mark.parametrize("place", ["motor", "crank"])
@@ -359,13 +364,13 @@ def test_a_cardan_line_before_it(place, folder):
     line = f'[driveline]\n{sizes}\ndamping_ratio = 0.05\nplace = "{place}"\n'
     text = STUDY.replace("step = 0.001", "step = 0.00025") + MACHINE + line
     study = run_study(parse(folder, text), folder / place)
-    assert study.failure is None
+    assert study.findings.failure is None
     parts = ["machine", "gear", "driveline", "motor"]
-    assert list(study.drive.graph.components) == parts
-    gear = study.drive.graph.components["gear"].parameters.ratio
-    assert gear == (RATIO if place == "motor" else 1.0) and study.drive.ratio == RATIO
-    assert shaft_findings(study).answers["steady"].amplification == pytest.approx(1.0, abs=0.5)
-    assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
+    assert list(study.setup.drive.graph.components) == parts
+    gear = study.setup.drive.graph.components["gear"].parameters.ratio
+    assert gear == (RATIO if place == "motor" else 1.0) and study.setup.drive.ratio == RATIO
+    assert shaft_findings(study.findings).answers["steady"].amplification == pytest.approx(1.0, abs=0.5)
+    assert study.runs.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
 
 
 @pytest.mark.parametrize("tool", TOOLS)

@@ -512,15 +512,17 @@ def test_a_motor_without_a_torque_whose_parameters_are_set(folder, tmp_path):
     other = "[system]\nmotor_parameters = { drag = 0.01 }\n"
     given = config.parse(text.replace("[system]\n", other), str(tmp_path / "x.toml"))
     study = run.run_study(given, tmp_path / "out")
-    assert study.failure is None and study.answers["jam_left"].coupling_trip_time is not None
+    assert study.findings.failure is None and study.runs.answers["jam_left"].coupling_trip_time is not None
     own = (folder / "own.toml").read_text().replace("rotor.d = 0.001", "rotor.d = 0.01")
     assert own != (folder / "own.toml").read_text()
     own = run.run_study(config.parse(f"{own}[coupling]\ntrip_torque = 120\n"), tmp_path / "own")
     for name in ("steady", "jam_left"):
         for measure in ("crank_torque_peak", "speed_least", "coupling_trip_time"):
-            value = getattr(own.answers[name], measure)
+            value = getattr(own.runs.answers[name], measure)
             assert value is not None or name == "steady"
-            assert value is None or getattr(study.answers[name], measure) == pytest.approx(value, rel=1e-4), (
+            assert value is None or getattr(study.runs.answers[name], measure) == pytest.approx(
+                value, rel=1e-4
+            ), (
                 name,
                 measure,
             )
@@ -536,11 +538,12 @@ def test_a_motor_without_an_acceleration_is_the_cause_of_the_missing_energy(fold
     build(tmp_path, OTHER, ["a", "tau"], script)
     text = (folder / "foreign.toml").read_text().replace("ForeignMotor", "SteadyMotor")
     study = run.run_study(config.parse(text, str(tmp_path / "x.toml")), tmp_path / "out")
-    (remark,) = [remark for remark in study.warnings if remark.code == "no-acceleration"]
+    (remark,) = [remark for remark in study.findings.warnings if remark.code == "no-acceleration"]
     assert "SteadyMotor.fmu does not give its acceleration" in remark.text
-    assert "the energy balance is not kept" in study.verdict.text
+    assert "the energy balance is not kept" in study.findings.verdict.text
     assert (
-        "run.step" not in study.verdict.text and "give the acceleration a of the motor" in study.verdict.text
+        "run.step" not in study.findings.verdict.text
+        and "give the acceleration a of the motor" in study.findings.verdict.text
     )
 
 
@@ -548,8 +551,8 @@ def test_a_block_has_no_peaks_of_what_is_not_known(folder):
     """The range of an assumption is told of the torques that there are."""
     text = (folder / "foreign.toml").read_text().replace('type = "jam"\nside = "left"', 'type = "blocked"')
     study = run.run_study(config.parse(text, str(folder / "x.toml")), folder / "block")
-    (spread,) = study.spreads.values()
-    assert study.failure is None and set(spread.peaks) == {"crank_torque", "rocker_torque"}
+    (spread,) = study.runs.spreads.values()
+    assert study.findings.failure is None and set(spread.peaks) == {"crank_torque", "rocker_torque"}
 
 
 @pytest.mark.parametrize("trip, opens", [(120, True), (400, False)])
@@ -557,14 +560,14 @@ def test_a_torque_limiter_behind_it(trip, opens, folder):
     """It opens in the jam or is said not to; the torque at which the motor stalls is not compared."""
     text = (folder / "foreign.toml").read_text() + f"[coupling]\ntrip_torque = {trip}\n"
     study = run.run_study(config.parse(text, str(folder / "x.toml")), folder / "coupling")
-    assert study.failure is None
-    assert (study.answers["jam_left"].coupling_trip_time is not None) == opens
-    told = [remark for remark in study.warnings if remark.code == "coupling-never-opens"]
+    assert study.findings.failure is None
+    assert (study.runs.answers["jam_left"].coupling_trip_time is not None) == opens
+    told = [remark for remark in study.findings.warnings if remark.code == "coupling-never-opens"]
     assert len(told) == (not opens)
     for remark in told:
         assert set(remark.quantities) == {"trip", "largest", "steady"} and remark.text.endswith("N m.")
     if opens:
-        assert study.certificate["jam_left"]["energy_residual_share"] < 1e-2
+        assert study.runs.certificate["jam_left"]["energy_residual_share"] < 1e-2
 
 
 def test_a_motor_that_saves_no_state_runs_each_event_from_rest(folder, tmp_path):
@@ -577,13 +580,17 @@ def test_a_motor_that_saves_no_state_runs_each_event_from_rest(folder, tmp_path)
     saving = run.run_study(config.parse(text, str(folder / "x.toml")), tmp_path / "saving")
     text = text.replace("ForeignMotor", "ForgetfulMotor")
     study = run.run_study(config.parse(text, str(tmp_path / "x.toml")), tmp_path / "forgetful")
-    assert study.failure is None and list(study.answers) == ["steady", "jam_left", "blocked"]
-    assert study.answers == saving.answers and study.spreads == saving.spreads and study.spreads
-    for name, rows in saving.runs.items():
-        assert study.runs[name].drop_attrs().equals(rows.drop_attrs())
-    (note,) = [note for note in study.notes if note.code == "state-not-saved"]
+    assert study.findings.failure is None and list(study.runs.answers) == ["steady", "jam_left", "blocked"]
+    assert (
+        study.runs.answers == saving.runs.answers
+        and study.runs.spreads == saving.runs.spreads
+        and study.runs.spreads
+    )
+    for name, rows in saving.runs.series.items():
+        assert study.runs.series[name].drop_attrs().equals(rows.drop_attrs())
+    (note,) = [note for note in study.findings.notes if note.code == "state-not-saved"]
     assert note.runs == ("jam_left", "blocked") and "Each event was run from rest" in note.text
-    assert not [note for note in saving.notes if note.code == "state-not-saved"]
+    assert not [note for note in saving.findings.notes if note.code == "state-not-saved"]
 
 
 def test_a_reference_in_another_unit_is_refused(file, tmp_path):

@@ -621,15 +621,15 @@ fluctuation = "10 %"
 )
 def test_a_study_finds_a_motor(name, speed, tmp_path):
     study = run_study(parse(SIZED.format(name=name, speed=speed), str(FOLDER / "study.toml")), tmp_path)
-    assert study.failure is None
-    best = study.findings["sizing"].best
-    assert study.findings["sizing"].chosen_candidate is best and best.fits
+    assert study.findings.failure is None
+    best = study.findings.by_analysis["sizing"].best
+    assert study.findings.by_analysis["sizing"].chosen_candidate is best and best.fits
     # the motor carries the cycle of the linkage, and not with twice the power that it needs
-    angular_speed = study.config.run.crank_speed
+    angular_speed = study.setup.config.run.crank_speed
     mean = float(np.mean(turn(name, angular_speed).power))
     assert 0.7 * mean < best.motor.nameplate.power < 3.0 * mean
     # the torque of the run is that of the linkage at its own motion
-    steady = study.steady
+    steady = study.runs.steady
     torque = turn(name, angular_speed).tau
-    crank = steady["machine.tau"].values * study.drive.ratio
+    crank = steady["machine.tau"].values * study.setup.drive.ratio
     assert np.max(np.abs(crank)) == pytest.approx(np.max(np.abs(torque)), rel=0.15)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from records import record_of
+from records import changed, record_of
 from reports import at, report_of
 from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
@@ -64,13 +64,13 @@ def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
 
 
 def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
-    origin = partial(origin_of, study_of(parse(KNIFE), tmp_path))
+    origin = partial(origin_of, study_of(parse(KNIFE), tmp_path).setup)
     assert origin("motor.rotor.J") == origin("motor.stator.R") == origin("machine.ratio") == "catalogue"
     assert origin("machine.r") == "file" and origin("motor.ambient.T") == "declared"
     assert origin("motor.w_start") == "declared"
     soft = KNIFE.replace("[system]", 'start = "inverter"\n[starter.inverter]\nramp = 2\n[system]')
     soft = soft.replace("[gear]\n", "[gear]\nratio = 25\n")
-    origin = partial(origin_of, study_of(parse(soft), tmp_path))
+    origin = partial(origin_of, study_of(parse(soft), tmp_path).setup)
     assert origin("machine.ratio") == origin("motor.inverter.on") == "file"
     assert origin("motor.inverter.slip") == origin("starter.inverter.slip") == "catalogue"
     # the supply is what `start` says, and no other key
@@ -78,7 +78,7 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
         parse(soft.replace("ramp = 2", "ramp = 2\non = 0"))
     # of the example, where the file leaves the system out
     origin = partial(
-        origin_of, study_of(parse("[system]\nmachine = 'KnifeDrive'\n[run]\ncrank_speed = 4"), tmp_path)
+        origin_of, study_of(parse("[system]\nmachine = 'KnifeDrive'\n[run]\ncrank_speed = 4"), tmp_path).setup
     )
     assert origin("motor.rotor.J") == "catalogue"
     assert origin("machine.r") == origin("flywheel.J") == "example" and origin("run.crank_speed") == "file"
@@ -99,18 +99,18 @@ def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
         config = parse(f'start = "inverter"\n{text}\n{more}')
         choice = choose(config, tmp_path, lambda *_: None)
         drive = choice.drive
-        study = dataclasses.replace(
-            study_of(config, tmp_path), config=dataclasses.replace(config, drive=choice.tables)
-        )
+        study = changed(study_of(config, tmp_path), config=dataclasses.replace(config, drive=choice.tables))
         result = as_dict(study)
         assert drive.parameters.inverter.slip == pytest.approx(used, rel=1e-12)
         assert result["motor"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
         assert result["starter"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
-        assert origin_of(study, "starter.inverter.slip") == ("file" if given else "catalogue")
+        assert origin_of(study.setup, "starter.inverter.slip") == ("file" if given else "catalogue")
         # a flywheel that a comparison adds has the setting of a drive with one
         wheel = with_inertia(config.drive, drive, 0.1)
         assert wheel.added_inertia == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
-        (note,) = [remark.text for remark in study.remarks if "slip-compensation" in remark.code] or [""]
+        (note,) = [
+            remark.text for remark in study.findings.remarks if "slip-compensation" in remark.code
+        ] or [""]
         assert ("rated slip" in note) == (not given and used > 0.0)
         assert ("flywheel has to slow down" in note) == (not given and used == 0.0)
 
@@ -129,22 +129,24 @@ def test_the_ratio_is_shown_that_is_used(tmp_path):
 
 def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     study = study_of(parse("[run]\ncrank_speed = 2"), tmp_path)
-    assert origin_of(study, "machine.r") == origin_of(study, "motor.rotor.J") == "example"
+    assert origin_of(study.setup, "machine.r") == origin_of(study.setup, "motor.rotor.J") == "example"
     assert (
-        origin_of(study, "event.jam_left.rise") == "declared"
-        and origin_of(study, "event.jam_left.force") == "example"
+        origin_of(study.setup, "event.jam_left.rise") == "declared"
+        and origin_of(study.setup, "event.jam_left.force") == "example"
     )
-    assert origin_of(study, "motor.speed_control.kp") == "tuned"
-    (note,) = (str(each) for each in study.notes if each.code.startswith("assumed"))
+    assert origin_of(study.setup, "motor.speed_control.kp") == "tuned"
+    (note,) = (str(each) for each in study.findings.notes if each.code.startswith("assumed"))
     assert "come from the packaged example" in note
-    (packaged,) = (str(each) for each in study_of(load(), tmp_path).notes if each.code.startswith("assumed"))
+    (packaged,) = (
+        str(each) for each in study_of(load(), tmp_path).findings.notes if each.code.startswith("assumed")
+    )
     assert "the papers print none" in packaged
     # of a machine of somebody else there is no example
     build(tmp_path, script=SCRIPT)
     study = study_of(parse(PUMP + MACHINE, str(tmp_path / "x.toml")), tmp_path)
-    assert origin_of(study, "machine.throw") == origin_of(study, "motor.rotor.J") == "declared"
-    assert origin_of(study, "machine.piston.mass") == "file"
-    (note,) = (str(each) for each in study.notes if each.code.startswith("assumed"))
+    assert origin_of(study.setup, "machine.throw") == origin_of(study.setup, "motor.rotor.J") == "declared"
+    assert origin_of(study.setup, "machine.piston.mass") == "file"
+    (note,) = (str(each) for each in study.findings.notes if each.code.startswith("assumed"))
     assert "example" not in note and "An eccentric pump" in note
     assert "machine.throw" not in as_dict(study)["origins"]
 
@@ -267,18 +269,18 @@ def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
     again = parse(toml_of(ResultEntries(json.loads(json.dumps(as_dict(study))))))
     for each in dataclasses.fields(again):
         if each.name not in ("file", "machine", "events", "plans"):
-            assert getattr(again, each.name) == getattr(study.config, each.name), each.name
+            assert getattr(again, each.name) == getattr(study.setup.config, each.name), each.name
     for name in ("catalogues", "labels", "is_packaged"):
-        assert getattr(again.file, name) == getattr(study.config.file, name), name
-    assert again.machine.by_name == pytest.approx(study.config.machine.by_name, rel=1e-12)
-    for name, plan in study.config.plans.items():
+        assert getattr(again.file, name) == getattr(study.setup.config.file, name), name
+    assert again.machine.by_name == pytest.approx(study.setup.config.machine.by_name, rel=1e-12)
+    for name, plan in study.setup.config.plans.items():
         event = getattr(plan, "event", None)
         if name == "random_overloads":
             assert again.plans[name].event.identity() == event.identity()
             assert again.plans[name].table == plan.table
         else:
             assert again.plans[name] == plan, name
-    for name, event in study.config.events.items():
+    for name, event in study.setup.config.events.items():
         assert (again.events[name].p, again.events[name].side) == (event.p, event.side)
 
 
@@ -310,11 +312,11 @@ def test_a_current_that_an_inverter_hardly_gives_has_a_note(tmp_path):
         ("direct", (1.2, 4.5), ()),
     ):
         study = study_of(parse(KNIFE.replace("[system]", f'start = "{start}"\n[system]')), tmp_path)
-        rated = study.drive.rated_current
+        rated = study.setup.drive.rated_current
         for name, times in zip(("steady", "jam_left"), currents, strict=True):
-            study.answers[name] = Answers(**none | {"current_peak": times * rated})
+            study.runs.answers[name] = Answers(**none | {"current_peak": times * rated})
         remarks._on_inverter(study)
-        notes = [remark for remark in study.remarks if remark.code.startswith("inverter-")]
+        notes = [remark for remark in study.findings.remarks if remark.code.startswith("inverter-")]
         assert len(notes) == len(noted)
         if noted:
             assert "(4.50)" in notes[0].text and "(1.20)" in notes[0].text
@@ -341,14 +343,14 @@ def test_lengths_beside_those_of_the_example_are_named(tmp_path):
 def test_the_loss_of_the_gear_of_an_own_motor_is_in_its_report(tmp_path):
     """With [motor] gear.loss the FMU lost it, and the report knew of none; by the balance of the rotor."""
     study = run_study(parse("event = []\n[motor]\ngear.loss = 0.25\n"), tmp_path)
-    run, p = study.steady, study.drive.fmu_parameters
+    run, p = study.runs.steady, study.setup.drive.fmu_parameters
     time = run["time"].values
     w, air_gap, load = (run[f"motor.{name}"].values for name in ("w", "air_gap_tau", "tau"))
     power = (air_gap - p.rotor.d * w - load) * w
     lost = np.trapezoid(power, time) / np.ptp(time)
-    found = study.findings["gear_loss"]
+    found = study.findings.by_analysis["gear_loss"]
     assert found.loss.whole == pytest.approx(lost, rel=1e-4) and found.efficiency == pytest.approx(
         0.8, rel=1e-12
     )
-    (said,) = [remark for remark in study.notes if remark.code == "gear-loss"]
+    (said,) = [remark for remark in study.findings.notes if remark.code == "gear-loss"]
     assert said.quantities["total"].value == found.loss.whole > 1.0

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import pytest
 import xarray as xr
 from command import chainunit
+from records import like
 
 from chainunit.report import series
 from chainunit.work import interrupts
@@ -134,9 +135,9 @@ def test_the_series_are_whole_where_an_interrupt_comes_while_they_are_written(tm
         written(*arguments, **options)
 
     monkeypatch.setattr(xr.DataTree, "to_netcdf", interrupted)
-    monkeypatch.setattr(series, "title", lambda study, name: name)
+    monkeypatch.setattr(series, "title", lambda runs, name: name)
     run = xr.Dataset({"x": ("time", [1.0, 2.0])}, {"time": [0.0, 1.0]})
-    study = SimpleNamespace(answers={}, runs={"start_up": run}, config=SimpleNamespace(title="a study"))
+    study = like(answers={}, series={"start_up": run}, config=SimpleNamespace(title="a study"))
     with pytest.raises(KeyboardInterrupt):
         series.write(study, tmp_path)
     with xr.open_datatree(tmp_path / series.SERIES) as tree:

@@ -62,12 +62,12 @@ def bare(text=""):
     study = record_of(config, drive)
     rig = Rig(config.operation, drive, {})
     for analysis in (TurnAnalysis, BladeAnalysis):
-        study.findings[analysis.name] = analysis.find(study, Work(rig, lambda *_: None))
+        study.findings.by_analysis[analysis.name] = analysis.find(study, Work(rig, lambda *_: None))
     return study
 
 
 def turn_and_cut(study):
-    return study.findings["constant_speed"].numbers, study.findings["blade"].numbers
+    return study.findings.by_analysis["constant_speed"].numbers, study.findings.by_analysis["blade"].numbers
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def done(tmp_path_factory):
     folder = tmp_path_factory.mktemp("knife")
     said = []
     study = run_study(parse(HEAD + SMALL), folder, lambda what, done, todo: said.append((done, todo)))
-    assert study.failure is None and all(0.0 <= done <= todo for done, todo in said)
+    assert study.findings.failure is None and all(0.0 <= done <= todo for done, todo in said)
     return study, folder
 
 
@@ -86,7 +86,7 @@ def rig(done):
     study = bare("[run]\nsettle_turns = 4\nturns = 4\n[flywheel]\nJ = 0.8\ncompare = []")
     folder = done[1] / "fmu"
     files = {"machine": folder / "KnifeDrive.fmu", "motor": folder / "InductionMotor.fmu"}
-    return study, Rig(study.config.operation, study.drive, files)
+    return study, Rig(study.setup.config.operation, study.setup.drive, files)
 
 
 def at_speed(rig, flywheel, **changes):
@@ -144,7 +144,7 @@ def test_the_share_of_a_path_in_the_stack():
 
 def test_the_energy_swing_is_that_of_the_torque_above_its_mean():
     """Only one rise of the torque: the swing is what it takes above the mean."""
-    found = bare().findings["constant_speed"]
+    found = bare().findings.by_analysis["constant_speed"]
     torque = found.loaded.crank_torque
     above = np.maximum(torque - np.mean(torque), 0.0)
     assert found.numbers.energy_swing == pytest.approx(np.sum(above) * 2.0 * math.pi / len(above), rel=1e-9)
@@ -152,8 +152,8 @@ def test_the_energy_swing_is_that_of_the_torque_above_its_mean():
 
 def test_pins_have_their_peaks_where_they_say():
     study = bare()
-    p, w = study.drive.machine.p, study.config.run.crank_speed
-    pins = study.findings["constant_speed"].pins
+    p, w = study.setup.drive.machine.p, study.setup.config.run.crank_speed
+    pins = study.findings.by_analysis["constant_speed"].pins
     for title, r in pins.items():
         for peak, angle, force in ((r.peak, r.angle, 2e4), (r.peak_free, r.angle_free, 0.0)):
             u = KnifeDrive.input_layout.from_names(
@@ -162,7 +162,7 @@ def test_pins_have_their_peaks_where_they_say():
             f = getattr(KnifeDrive.evaluate(MATH, p, u)[0], KnifeDrive.pins[title])
             assert math.hypot(f.fx, f.fy) == pytest.approx(peak, rel=1e-9)
     # a heavier cut, not the inertia, loads the pins: in proportion, but for weight and inertia
-    twice = bare("[feed]\ncut_force = 4e4\n").findings["constant_speed"].pins
+    twice = bare("[feed]\ncut_force = 4e4\n").findings.by_analysis["constant_speed"].pins
     for title, r in pins.items():
         assert twice[title].peak == pytest.approx(2.0 * r.peak, abs=2.0 * r.peak_free + 1.0)
 
@@ -180,7 +180,7 @@ def test_fluctuation_by_hand_with_a_large_flywheel(rig):
     w, ratio = answers.speed_mean, rig.drive.ratio
     inertia = heavy.drive.rotor_inertia + turn.inertia_mean / ratio**2
     # the flywheel also gives what the gear loses
-    loaded, loss = study.findings["constant_speed"].loaded, heavy.drive.gear_loss
+    loaded, loss = study.findings.by_analysis["constant_speed"].loaded, heavy.drive.gear_loss
     torque = np.append(loaded.crank_torque, loaded.crank_torque[0])
     torque = torque + loss * np.abs(torque)
     angle = np.append(loaded.angle, loaded.angle[0] + 2.0 * math.pi)
@@ -198,8 +198,12 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
     over the angle by table, by another integrator."""
     study, rig = rig
     _, answers = steady_turns(at_speed(rig, 0.8))
-    found, drive = study.findings["constant_speed"], study.drive
-    p, ratio, angle = drive.fmu_parameters, drive.ratio, study.findings["constant_speed"].loaded.angle
+    found, drive = study.findings.by_analysis["constant_speed"], study.setup.drive
+    p, ratio, angle = (
+        drive.fmu_parameters,
+        drive.ratio,
+        study.findings.by_analysis["constant_speed"].loaded.angle,
+    )
     # torque at the speed asked for; what goes with the square of the speed is small here
     torque, inertia = found.loaded.crank_torque / ratio, found.inertia / ratio**2
 
@@ -215,9 +219,9 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
         share = 1.0 + math.copysign(drive.gear_loss, passed)
         return [w, (air - share * load) / (p.rotor.J + share * table(phi, inertia))]
 
-    turn = study.config.operation.turn
+    turn = study.setup.config.operation.turn
     times = np.linspace(4.0 * turn, 5.0 * turn, 1001)
-    start = [0.0, study.config.run.crank_speed * ratio]
+    start = [0.0, study.setup.config.run.crank_speed * ratio]
     w = solve_ivp(rate, (0.0, times[-1]), start, rtol=1e-6, t_eval=times, max_step=2e-3).y[1]
     # the fluxes lag behind the slip: the speed dips a little deeper
     assert 1.0 < answers.speed_ripple / (np.ptp(w) / np.mean(w)) < 1.05
@@ -227,10 +231,10 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
 def test_energy_over_a_cut(done):
     """What flywheel and machine lose, and what comes through the air gap, is the work of the cut."""
     study, _ = done
-    run, answers, p = study.steady, study.answers["steady"], study.drive.fmu_parameters
+    run, answers, p = study.runs.steady, study.runs.answers["steady"], study.setup.drive.fmu_parameters
     power, time = cutting_power(run), run["time"].values
     rotor = run["motor.w"].values
-    lost = study.drive.gear_loss * np.abs(run["motor.tau"].values) * rotor
+    lost = study.setup.drive.gear_loss * np.abs(run["motor.tau"].values) * rotor
     given = (run["motor.air_gap_tau"].values - p.rotor.d * rotor) * rotor - lost
     inside = power > 0.01 * np.max(power)
     work = np.trapezoid(np.where(inside, power, 0.0), time)
@@ -238,8 +242,8 @@ def test_energy_over_a_cut(done):
     assert answers.stored_share + by_motor / work == pytest.approx(1.0, abs=0.01)
     assert 0.05 < answers.stored_share < answers.stored_share_most < 0.67
     turn, cut = turn_and_cut(study)
-    assert work / study.config.run.turns == pytest.approx(cut.cut_work, rel=0.02)
-    assert study.certificate["start_up"]["energy_residual_share"] < 1e-4
+    assert work / study.setup.config.run.turns == pytest.approx(cut.cut_work, rel=0.02)
+    assert study.runs.certificate["start_up"]["energy_residual_share"] < 1e-4
     # what the line gives is the work of the cuts, the heat of the motor, and friction
     heat = np.mean(run["motor.heat"]) + p.rotor.d * np.mean(rotor**2) + np.mean(lost)
     cuts = turn.lost * answers.speed_mean / (2.0 * math.pi)
@@ -268,27 +272,27 @@ def test_the_coupling_converges_to_the_monolithic_solution(rig):
 
 def test_the_flywheels(done):
     study, _ = done
-    found = study.findings["flywheels"]
+    found = study.findings.by_analysis["flywheels"]
     assert [wheel.flywheel for wheel in found.wheels] == [0.1, 0.4, 1.2] and found.own == 0.4
     by = [wheel.answers for wheel in found.wheels]
     for name, falls in (("speed_ripple", True), ("current_rms", True), ("start_time", False)):
         values = [getattr(a, name) for a in by]
         assert values == sorted(values, reverse=falls), name
     # the study's own is not run again
-    assert by[1].speed_ripple == study.answers["steady"].speed_ripple
-    assert by[1].start_time == study.start.start_time and study.answers["steady"].start_time is None
+    assert by[1].speed_ripple == study.runs.answers["steady"].speed_ripple
+    assert by[1].start_time == study.runs.start.start_time and study.runs.answers["steady"].start_time is None
     # the least flywheel keeps what is permitted, and hardly more
     least = found.least.answers
     assert 0.4 < least.flywheel < 1.2 and 0.97 * 0.05 <= least.speed_ripple <= 0.05
     assert least.flywheel < found.flywheel_by_hand
     assert found.by_hand(found.flywheel_by_hand) == pytest.approx(0.05, rel=1e-9)
-    said = {remark.code: remark.text for remark in study.remarks}
+    said = {remark.code: remark.text for remark in study.findings.remarks}
     assert said["least-flywheel"].startswith("A fluctuation of 5.00 % takes a flywheel of")
     ripple = number(by[1].speed_ripple, "1", "percent")
     assert f"The speed fluctuates by {ripple} with the study's flywheel" in said["fluctuation"]
     # rated current is passed by the light flywheels alone
-    rated = study.config.plate.nameplate.rated_current
-    hot = next(remark for remark in study.warnings if remark.code == "rated-current")
+    rated = study.setup.config.plate.nameplate.rated_current
+    hot = next(remark for remark in study.findings.warnings if remark.code == "rated-current")
     assert len(hot.quantities) - len([q for q in ("rated",) if q in hot.quantities]) == sum(
         a.current_rms > rated for a in by
     )
@@ -304,7 +308,7 @@ def test_the_files_of_the_study(done, tmp_path):
     assert all(file.stat().st_size > 1000 for file in written)
     numbers = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     for entries, wheel in zip(
-        numbers["flywheels"]["compared"], study.findings["flywheels"].wheels, strict=True
+        numbers["flywheels"]["compared"], study.findings.by_analysis["flywheels"].wheels, strict=True
     ):
         for v in Layout(FlywheelAnswers).variables:
             assert entries[v.name] == entry(getattr(wheel.answers, v.name), v.unit, v.kind)
@@ -314,34 +318,38 @@ def test_the_files_of_the_study(done, tmp_path):
     assert all(f'id="{name}"' in page for name in ("constant_speed", "blade", "flywheels", "motion"))
     # a row for each flywheel on the terminal
     told = said_of(study)
-    assert all(f"{number(w.flywheel, 'kg.m2')}" in told for w in study.findings["flywheels"].wheels)
+    assert all(
+        f"{number(w.flywheel, 'kg.m2')}" in told for w in study.findings.by_analysis["flywheels"].wheels
+    )
 
 
 def test_a_run_that_fails_keeps_what_was_computed(tmp_path, monkeypatch):
     whole = flywheels._run
 
-    def fails(study, rig, found, flywheel):
+    def fails(setup, rig, found, flywheel):
         if flywheel > 0.1:
             raise RunError("motor: gave up")
-        return whole(study, rig, found, flywheel)
+        return whole(setup, rig, found, flywheel)
 
     monkeypatch.setattr(flywheels, "_run", fails)
     study = run_study(parse(HEAD + SMALL), tmp_path)
-    found = study.findings["flywheels"]
-    assert [wheel.flywheel for wheel in found.wheels] == [0.1, 0.4] and str(study.failure) == "motor: gave up"
-    assert "steady" in study.answers
+    found = study.findings.by_analysis["flywheels"]
+    assert [wheel.flywheel for wheel in found.wheels] == [0.1, 0.4] and str(
+        study.findings.failure
+    ) == "motor: gave up"
+    assert "steady" in study.runs.answers
     # nothing is said of what was not tried
-    assert "no-flywheel-keeps-it" not in {remark.code for remark in study.remarks}
+    assert "no-flywheel-keeps-it" not in {remark.code for remark in study.findings.remarks}
 
 
 @pytest.mark.slow
 def test_a_motor_that_stalls(tmp_path):
     text = SMALL.replace("[0.1, 1.2]", "[]") + "step = 0.004\n[feed]\ncut_force = 1e5\n"
     study = run_study(parse(HEAD + text), tmp_path)
-    (wheel,) = study.findings["flywheels"].wheels
+    (wheel,) = study.findings.by_analysis["flywheels"].wheels
     assert wheel.stalls and wheel.answers.speed_ripple is None and wheel.answers.start_time is not None
-    assert study.findings["flywheels"].least is None
-    said = " ".join(str(remark) for remark in study.warnings)
+    assert study.findings.by_analysis["flywheels"].least is None
+    said = " ".join(str(remark) for remark in study.findings.warnings)
     assert "The motor stalls with a flywheel" in said and "A larger one that was tried does not." in said
     assert " on average, rated is 14.4 N m" in said
     # no flywheel is advised beside
@@ -398,7 +406,7 @@ def test_no_flywheel_is_needed_where_the_motor_alone_keeps_the_fluctuation():
     study = bare()
     found = FlywheelFindings(0.1, 0.05, 1.0, 1e3, 0.01, 1.0, [least], least)
     found.remark(study)
-    said = next(remark.text for remark in study.remarks if remark.code == "least-flywheel")
+    said = next(remark.text for remark in study.findings.remarks if remark.code == "least-flywheel")
     assert said == (
         "For a fluctuation of 5.00 % no flywheel is needed. By the hand formula none is needed. "
         "The start takes 1.00 s."
@@ -418,16 +426,18 @@ def test_no_flywheel_is_needed_where_the_motor_alone_keeps_the_fluctuation():
         study = bare()
         least = judged(study, sound | {"flywheel": size})
         FlywheelFindings(0.1, 0.05, 1.0, 1e3, 0.01, 1.0, [least], least).remark(study)
-        assert words in next(remark.text for remark in study.remarks if remark.code == "least-flywheel")
+        assert words in next(
+            remark.text for remark in study.findings.remarks if remark.code == "least-flywheel"
+        )
 
 
 def judged(study, answers):
     """A flywheel with these answers, and the limits of the study's motor."""
     a = FlywheelAnswers(**answers)
     checks = given_motor(
-        study.drive,
-        study.config.plate,
-        study.config.permitted_temperature[1],
+        study.setup.drive,
+        study.setup.config.plate,
+        study.setup.config.permitted_temperature[1],
         a.winding_temperature,
         a.current_rms,
         a.start_time,
@@ -464,9 +474,9 @@ def judged(study, answers):
 def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, mean, heavier, hot, ending):
     """The limits of its motor: rated current, permitted temperature, and the time its rotor may be locked."""
     study = bare()
-    plate = study.config.plate.nameplate
-    assert plate.locked_time == 13.0 and study.config.run.winding_temperature == 393.15
-    assert 8.0 < study.config.plate.nameplate.torque < 20.0
+    plate = study.setup.config.plate.nameplate
+    assert plate.locked_time == 13.0 and study.setup.config.run.winding_temperature == 393.15
+    assert 8.0 < study.setup.config.plate.nameplate.torque < 20.0
     sound = {v.name: 0.001 for v in Layout(FlywheelAnswers).variables}
     sizes = (1.0, 0.049, current, start, hot), (2.0, 0.03, heavier, 6.0, 350.0)
     least, heavy = (
@@ -479,7 +489,7 @@ def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, me
         for J, ripple, share, time, T in sizes
     )
     FlywheelFindings(2.0, 0.05, 1e3, 150.0, 0.1, mean, [heavy], least, is_searched=True).remark(study)
-    said = next(remark.text for remark in study.remarks if remark.code == "least-flywheel")
+    said = next(remark.text for remark in study.findings.remarks if remark.code == "least-flywheel")
     assert said.endswith(ending)
     assert ("It is not recommended" in said) == ("the limit" in said)
 
@@ -490,18 +500,21 @@ def test_words_for_a_slow_start_and_a_poor_run():
     given = sound | {"flywheel": 5.0, "start_time": 14.0, "residual": 0.03, "cycle_gap": 0.4}
     given |= {"winding_temperature": 400.0}
     FlywheelFindings(1.0, 0.05, 1.0, 150.0, 0.1, 1.0, [judged(study, given)]).remark(study)
-    assert [str(remark) for remark in study.warnings] == [
+    assert [str(remark) for remark in study.findings.warnings] == [
         "Energy is missing with a flywheel of 5.00 kg m² (3.00 %). Take a shorter run.step.",
         "The turns do not close with a flywheel of 5.00 kg m². Raise run.settle_turns.",
         "The winding becomes hotter than the permitted 120 degC with a flywheel of 5.00 kg m² (127 degC).",
         "The start takes longer than the 13 s for which the rotor may be locked with a flywheel of 5.00 kg m² "
         "(14.0 s).",
     ]
-    assert study.warnings[3].quantities["5.start_time"][:2] == (14.0, "s")
+    assert study.findings.warnings[3].quantities["5.start_time"][:2] == (14.0, "s")
     # of the limits that the study's own flywheel passes the study warns, with its remedies
     own = bare()
     FlywheelFindings(5.0, 0.05, 1.0, 150.0, 0.1, 1.0, [judged(own, given)]).remark(own)
-    assert [remark.code for remark in own.warnings] == ["energy-with-flywheel", "flywheel-not-settled"]
+    assert [remark.code for remark in own.findings.warnings] == [
+        "energy-with-flywheel",
+        "flywheel-not-settled",
+    ]
 
 
 def test_a_motor_without_a_nameplate_has_the_limit_of_its_winding_alone():
@@ -526,8 +539,8 @@ def test_a_motor_without_a_nameplate_has_the_limit_of_its_winding_alone():
 )
 def test_where_the_stack_lies(stack, beginning):
     study = bare(f"[machine]\nstack = {stack}\n")
-    study.findings["blade"].remark(study)
-    said = [str(remark) for remark in study.warnings]
+    study.findings.by_analysis["blade"].remark(study)
+    said = [str(remark) for remark in study.findings.warnings]
     assert said == [] if beginning is None else len(said) == 1 and said[0].startswith(beginning)
 
 
@@ -541,11 +554,11 @@ def test_the_example_says_what_is_declared():
     assert layout.values(shown.machine.p) == pytest.approx(layout.values(declared), rel=1e-12)
     assert "ours" in example("knife") and load().title
     # the ratio follows from the motor's speed, with the slip that the load makes
-    drive = bare().drive
+    drive = bare().setup.drive
     plate = parse(example("knife")).plate.nameplate
     w = 2.0 * math.pi * 40.0 / 60.0
     assert plate.speed / w < drive.ratio < plate.synchronous / w
-    assert bare("[gear]\nratio = 35\n").drive.ratio == 35.0
+    assert bare("[gear]\nratio = 35\n").setup.drive.ratio == 35.0
 
 
 @pytest.mark.parametrize(

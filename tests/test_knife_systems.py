@@ -65,8 +65,8 @@ J4 = 0.5
 
 def run(text, folder):
     study = run_study(parse(text + RUN), folder)
-    assert study.failure is None
-    assert max(x for shares in study.certificate.values() for x in shares.values()) < 1e-3
+    assert study.findings.failure is None
+    assert max(x for shares in study.runs.certificate.values() for x in shares.values()) < 1e-3
     return study
 
 
@@ -94,16 +94,16 @@ COMMON = {
 
 
 def cut_work(study):
-    return study.findings["blade"].numbers.cut_work
+    return study.findings.by_analysis["blade"].numbers.cut_work
 
 
 @pytest.mark.slow
 def test_a_dc_motor_keeps_the_speed_and_each_flywheel_has_gains_of_its_own(tmp_path):
     study = run(DC_MOTOR, tmp_path)
-    steady, drive = study.answers["steady"], study.drive
-    assert study.reaches and drive.follows and steady.current_share is None
+    steady, drive = study.runs.answers["steady"], study.setup.drive
+    assert study.runs.reaches and drive.follows and steady.current_share is None
     # what the armature gives is the work of the cuts and its own friction, and heats the winding
-    rows = study.steady
+    rows = study.runs.steady
     w = rows["motor.w"].values
     k, d = drive.parameters.armature.k, drive.fmu_parameters.rotor.d
     work = np.trapezoid((k * rows["motor.armature.i"].values - d * w) * w, rows["time"].values)
@@ -113,7 +113,7 @@ def test_a_dc_motor_keeps_the_speed_and_each_flywheel_has_gains_of_its_own(tmp_p
     friction = d * float(np.mean(w**2))
     assert steady.supply_power_mean == pytest.approx(turning + heat + friction, rel=0.01)
     # the same gains over the inertia: half the ripple with about twice the inertia
-    light, heavy = (wheel.answers for wheel in study.findings["flywheels"].wheels)
+    light, heavy = (wheel.answers for wheel in study.findings.by_analysis["flywheels"].wheels)
     assert light.speed_ripple == steady.speed_ripple
     shares = light.inertia / heavy.inertia, heavy.speed_ripple / light.speed_ripple
     assert shares[1] == pytest.approx(shares[0], rel=0.1)
@@ -123,12 +123,16 @@ def test_a_dc_motor_keeps_the_speed_and_each_flywheel_has_gains_of_its_own(tmp_p
 @pytest.mark.slow
 def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     study = run(COUPLING, tmp_path)
-    answers = study.answers["hard_cut"]
-    coasting = study.runs["hard_cut_coasting"]
+    answers = study.runs.answers["hard_cut"]
+    coasting = study.runs.series["hard_cut_coasting"]
     assert 0.0 < answers.coupling_trip_time < answers.standstill_time < answers.coupling_trip_time + 0.01
-    run_up = study.runs["hard_cut"]
-    at = int(np.argmin(np.abs(run_up["time"].values - study.event["hard_cut"] - answers.coupling_trip_time)))
-    before, after = run_up["motor.tau"].values[at - 1 : at + 1] * study.drive.ratio
+    run_up = study.runs.series["hard_cut"]
+    at = int(
+        np.argmin(
+            np.abs(run_up["time"].values - study.runs.event_times["hard_cut"] - answers.coupling_trip_time)
+        )
+    )
+    before, after = run_up["motor.tau"].values[at - 1 : at + 1] * study.setup.drive.ratio
     assert before < 2500.0 <= after
     # behind it the stack stops the blade within a millisecond; then it creeps through, and what it loses in height
     # goes to stack and pins
@@ -139,8 +143,8 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     losses = cumulative_trapezoid(coasting["machine.dissipated_power"].values[1:], time[1:], initial=0.0)
     assert np.max(np.abs(energy[1:] + losses - energy[1])) < 1e-3
     # the same by another integrator, from where the coupling let go
-    model = coasting_model(study.drive)
-    p = model.with_derived(MATH, model.parameter_layout.from_names(coasting_parameters(study.drive)))
+    model = coasting_model(study.setup.drive)
+    p = model.with_derived(MATH, model.parameter_layout.from_names(coasting_parameters(study.setup.drive)))
     u = model.input_layout.from_names({"tau": 0.0, "cut_force": 6e4})
     states = Layout(model.States)
 
@@ -158,22 +162,22 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
 @pytest.mark.slow
 def test_a_cardan_line_on_the_crank(tmp_path):
     study = run(HEAD + "[flywheel]\nJ = 0.8\ncompare = []\nfluctuation = 0.045\n" + CARDAN, tmp_path)
-    steady, rows = study.answers["steady"], study.steady
+    steady, rows = study.runs.answers["steady"], study.runs.steady
     # the line gives on what the motor puts in: of a turn the work of the cut
-    tau, w = rows["driveline.tau3"].values, crank_speed(study.drive, rows)
+    tau, w = rows["driveline.tau3"].values, crank_speed(study.setup.drive, rows)
     work = np.trapezoid(tau * w, rows["time"].values)
     assert work == pytest.approx(cut_work(study), rel=0.01)
     assert steady.crank_torque_mean == pytest.approx(cut_work(study) / (2.0 * math.pi), rel=0.02)
-    shaft = shaft_findings(study).answers["steady"]
+    shaft = shaft_findings(study.findings).answers["steady"]
     assert shaft.tau2_rigid == pytest.approx(steady.crank_torque_peak, rel=0.05)
     assert 1.0 < shaft.amplification < 1.5
     # least and largest frequency of the line, by the formula for two masses at their ends
-    line, turn = driveline_of(study.drive), study.findings["constant_speed"].numbers
-    motor = study.drive.fmu_parameters.rotor.J * study.drive.ratio**2
+    line, turn = driveline_of(study.setup.drive), study.findings.by_analysis["constant_speed"].numbers
+    motor = study.setup.drive.fmu_parameters.rotor.J * study.setup.drive.ratio**2
     c = line.c2 * line.c3 / (line.c2 + line.c3)
     for J, k in (
-        (turn.inertia_largest, study.statics.modes.k_least),
-        (turn.inertia_least, study.statics.modes.k_largest),
+        (turn.inertia_largest, study.setup.statics.modes.k_least),
+        (turn.inertia_least, study.setup.statics.modes.k_largest),
     ):
         assert k == pytest.approx(math.sqrt(c * (1.0 / motor + 1.0 / (line.J4 + J))), rel=0.03)
     assert sections(study) >= COMMON | {"flywheels", "shaft"}

@@ -21,6 +21,7 @@ from chainunit.core.errors import RunError
 from chainunit.core.register import entries
 from chainunit.report.analyses import analysis_sections
 from chainunit.study.file_section import FileSection, TableForm, TableLists
+from chainunit.study.record import StudyRecord
 
 pytestmark = pytest.mark.second
 
@@ -185,8 +186,58 @@ def _arguments(node):
 
 def _is_whole(argument):
     """Whether an argument is a `Config`; the commands name the path of a study file config, too."""
-    words = "" if argument.annotation is None else ast.unparse(argument.annotation)
+    words = _words_of(argument)
     return bool(re.search(r"\bConfig\b", words)) or (argument.arg == "config" and words in ("", "Any"))
+
+
+WHOLE_RECORD = 210
+"""Functions that take the whole record of a study; the number only falls."""
+AS_OTHERS_OF_THEIR_KIND = {
+    "capabilities.chains.page": {"_over_speed"},
+    "capabilities.checks.page": {"missing", "relay"},
+    "capabilities.flywheels.analysis": {"_on_heavier"},
+    "capabilities.sizing.alternatives": {"_before_flywheel"},
+    "capabilities.torsion.page": {"blocks"},
+    "report.figures": {"_speed_loop", "_turn"},
+    "report.study_task": {"_kept"},
+}
+"""By module, the functions that take the record and use one part of it, as others are called like them."""
+
+
+def test_a_function_takes_the_part_of_a_record_that_it_uses():
+    """A record has three parts; a function that passes the record on may need all of them, a method is a hook."""
+    assert [field.name for field in dataclasses.fields(StudyRecord)] == ["setup", "runs", "findings"]
+    whole, of_one_part = 0, {}
+    for file in sorted(HOUSE.PACKAGE.rglob("*.py")):
+        if "StudyRecord" not in (text := file.read_text("utf-8")):
+            continue
+        module = ".".join(file.relative_to(HOUSE.PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+        tree = ast.parse(text)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                names = {a.arg for a in _arguments(node) if _words_of(a) == "StudyRecord"}
+                whole += bool(names)
+                if names and node in tree.body and len(_parts_used(node, names)) == 1:
+                    of_one_part.setdefault(module, set()).add(node.name)
+    assert of_one_part == AS_OTHERS_OF_THEIR_KIND
+    assert WHOLE_RECORD - 5 < whole <= WHOLE_RECORD, whole
+
+
+def _parts_used(node, names):
+    """The attributes that a function takes of its arguments with these `names`; the names of those that it passes on
+    are among them, twice."""
+    taken = [n.value for n in ast.walk(node) if isinstance(n, ast.Attribute)]
+    used = {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute) and _is_one_of(n.value, names)}
+    passed = [n for n in ast.walk(node) if _is_one_of(n, names) and n not in taken]
+    return used | ({"passed", "on"} if passed else set())
+
+
+def _is_one_of(node, names):
+    return isinstance(node, ast.Name) and node.id in names
+
+
+def _words_of(argument):
+    return "" if argument.annotation is None else ast.unparse(argument.annotation)
 
 
 def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):

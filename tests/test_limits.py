@@ -62,16 +62,16 @@ JAM = event_line("jam_left", turns=1)
 
 def studied(text, folder):
     study = run_study(parse(text), folder)
-    assert study.failure is None
-    return study, motor_verdict(study), {each.code: each for each in study.warnings}
+    assert study.findings.failure is None
+    return study, motor_verdict(study), {each.code: each for each in study.findings.warnings}
 
 
 @pytest.mark.slow
 def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     """It keeps the speed of a load that comes and goes, with 129 % of its rated current and no reserve of torque."""
     study, verdict, warnings = studied(KNIFE, tmp_path)
-    steady, plate = study.answers["steady"], study.config.plate.nameplate
-    assert study.reaches and steady.current_share > 1.2 and steady.winding_temperature > 450.0
+    steady, plate = study.runs.answers["steady"], study.setup.config.plate.nameplate
+    assert study.runs.reaches and steady.current_share > 1.2 and steady.winding_temperature > 450.0
     assert verdict.holds == "false" and "keeps the crank" in verdict.text
     assert "its winding becomes too hot in steady running" in verdict.text
     assert verdict.limits["temperature"] > 1.5
@@ -102,14 +102,14 @@ turns = 2
 def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     """That is said in place of ratio and slip, and no state of overloads where there are none."""
     study, verdict, warnings = studied(STALLED.format(events="[]"), tmp_path)
-    steady, motor = study.answers["steady"], study.drive.parameters
+    steady, motor = study.runs.answers["steady"], study.setup.drive.parameters
     missed = warnings["motor-below-pull-out"].text
-    below = breakdown_speed(study.drive, study.steady)
+    below = breakdown_speed(study.setup.drive, study.runs.steady)
     assert steady.speed_mean < 0.5 * below
     assert f"The motor stalls below its pull-out speed, {below:.2f} rad/s. " in missed
     assert "slip" not in missed and "verload" not in missed
     # there the torque is the largest of all speeds
-    T, w = float(study.steady["motor.stator.T"].mean()), below * study.drive.ratio
+    T, w = float(study.runs.steady["motor.stator.T"].mean()), below * study.setup.drive.ratio
     slower, there, faster = (induction.steady(MATH, motor, w * x, T=T).tau for x in (0.9, 1.0, 1.1))
     assert there > max(slower, faster)
     said = "in each turn its torque exceeds the pull-out torque by 100 % or more"
@@ -131,7 +131,7 @@ def test_a_motor_above_its_breakdown_speed_has_the_speed_of_ratio_and_slip(tmp_p
 def test_the_permitted_temperature_of_a_dc_motor(tmp_path):
     """One that is badly cooled passes the permitted temperature, which the file may set."""
     study, verdict, warnings = studied(JAM + CHAIN_UNIT.format(R_th=60), tmp_path)
-    T = study.answers["steady"].winding_temperature
+    T = study.runs.answers["steady"].winding_temperature
     assert T > 500.0 and verdict.holds == "false" and set(motor_limits(study)) == {"temperature"}
     assert warnings["motor-temperature"].quantities["value"][:2] == (T, "K")
     hot = JAM + CHAIN_UNIT.format(R_th=60).replace(
@@ -156,9 +156,9 @@ def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     """One limit for the choice and the verdict: behind the given gear the crank is 2.5 % too fast."""
     text = "event = []\n[sizing]\npoles_least = 4\npoles_most = 4\ncandidates = 1\n[gear]\nratio = 50.4\n"
     study, verdict, warnings = studied(text + "[run]\nturns = 1\n", tmp_path)
-    check = study.findings["sizing"].chosen_candidate.checks["crank_speed"]
+    check = study.findings.by_analysis["sizing"].chosen_candidate.checks["crank_speed"]
     assert 0.5 < check.utilisation < 1.0 and check.limit == SPEED_DEVIATION
-    mean = study.answers["steady"].speed_mean
+    mean = study.runs.answers["steady"].speed_mean
     assert mean == pytest.approx(3.0 * (1.0 + check.value), rel=2e-3)
     assert verdict.holds == "true" and verdict.text.startswith(
         f"The motor keeps the crank at {mean:.2f} rad/s, {100.0 * (mean / 3.0 - 1.0):+.2f} % of 3 rad/s; "
@@ -171,10 +171,10 @@ def test_a_motor_whose_gear_misses_the_speed_starts_all_the_same(tmp_path):
     """Behind a gear for three quarters of the speed: the verdict speaks of the speed alone."""
     text = KNIFE.replace("1.5 kW, 90L", "3 kW, 100L").replace("efficiency = 1", "ratio = 49")
     study, verdict, warnings = studied(text, tmp_path)
-    assert not study.reaches and {"speed-missed", "speed-by-slip"} & set(warnings)
-    assert 0.7 < study.answers["steady"].speed_mean / study.config.run.crank_speed < 0.8
+    assert not study.runs.reaches and {"speed-missed", "speed-by-slip"} & set(warnings)
+    assert 0.7 < study.runs.answers["steady"].speed_mean / study.setup.config.run.crank_speed < 0.8
     check = motor_limits(study)["start"]
-    assert 0.0 < check.utilisation < 1.0 and check.value == study.start.start_time
+    assert 0.0 < check.utilisation < 1.0 and check.value == study.runs.start.start_time
     assert "does NOT reach the speed" in verdict.text and "start takes too long" not in verdict.text
 
 
@@ -225,11 +225,11 @@ def test_a_load_that_holds_the_motor_in_star_is_named(tmp_path):
         (0.81, ["star-just-long-enough"]),
         (0.95, []),
     ):
-        study.findings["starts"] = held_in_star((0.0, 225.0), speed)
-        study.remarks.clear()
+        study.findings.by_analysis["starts"] = held_in_star((0.0, 225.0), speed)
+        study.findings.remarks.clear()
         _on_star(study)
-        assert [remark.code for remark in study.remarks] == codes
-        for remark in study.remarks:
+        assert [remark.code for remark in study.findings.remarks] == codes
+        for remark in study.findings.remarks:
             size = remark.quantities["share"]
             if speed > 0.0:
                 assert size.value == speed and remark.text.startswith("In a start from 0 deg ")
@@ -242,39 +242,45 @@ def test_a_load_that_holds_the_motor_in_star_is_named(tmp_path):
             assert remark.quantities["delta"].value == 825.0 and "empty_start" in remark.remedy
             assert size.value == 0.9
     # every start is held: no other angle is named
-    study.findings["starts"] = held_in_star((0.0, 90.0, 225.0), 0.0)
-    study.remarks.clear()
+    study.findings.by_analysis["starts"] = held_in_star((0.0, 90.0, 225.0), 0.0)
+    study.findings.remarks.clear()
     _on_star(study)
-    assert "other angles" not in study.remarks[0].text
+    assert "other angles" not in study.findings.remarks[0].text
 
 
 @pytest.mark.second
 def test_an_inertia_beyond_the_standard_is_a_warning(tmp_path):
     """0.04 P^0.9 p^2.5 of IEC 60034-12, by hand; it stood in the list of what is not checked alone."""
     study = run_study(parse(STAR % "3 s"), tmp_path)
-    plate = study.plate.nameplate
+    plate = study.setup.plate.nameplate
     most = 0.04 * (plate.power / 1e3) ** 0.9 * (plate.poles / 2.0) ** 2.5
-    inertia = float(np.mean(study.steady["machine.J"])) + study.drive.fmu_parameters.rotor.J - plate.J
+    inertia = (
+        float(np.mean(study.runs.steady["machine.J"])) + study.setup.drive.fmu_parameters.rotor.J - plate.J
+    )
     for added, expected in (
         (0.0, inertia > most),
         (1.01 * most - inertia, True),
         (0.99 * most - inertia, False),
     ):
-        study.drive = dataclasses.replace(study.drive, added_inertia=study.drive.added_inertia + added)
-        study.remarks.clear()
+        study.setup.drive = dataclasses.replace(
+            study.setup.drive, added_inertia=study.setup.drive.added_inertia + added
+        )
+        study.findings.remarks.clear()
         _on_inertia(study)
-        assert [remark.code for remark in study.remarks] == ["heavy-to-start"] * expected
-        study.drive = dataclasses.replace(study.drive, added_inertia=study.drive.added_inertia - added)
+        assert [remark.code for remark in study.findings.remarks] == ["heavy-to-start"] * expected
+        study.setup.drive = dataclasses.replace(
+            study.setup.drive, added_inertia=study.setup.drive.added_inertia - added
+        )
 
 
 @pytest.mark.slow
 def test_a_change_to_delta_at_half_the_speed_is_warned_of(tmp_path):
     """The current jumps to that of a start direct on line, and the starter is good for nothing."""
     short, long = (run_study(parse(STAR % time), tmp_path / time[0]) for time in ("0.05 s", "3 s"))
-    (warning,) = [each for each in short.warnings if each.code == "star-too-short"]
-    run, plate = short.runs["start_up"], short.plate.nameplate
+    (warning,) = [each for each in short.findings.warnings if each.code == "star-too-short"]
+    run, plate = short.runs.series["start_up"], short.setup.plate.nameplate
     share = float(np.interp(0.05, run["time"], run["motor.w"])) / plate.synchronous
-    slowest = min(start.star_speed for start in short.findings["starts"].starts)
+    slowest = min(start.star_speed for start in short.findings.by_analysis["starts"].starts)
     assert warning.quantities["share"].value == pytest.approx(min(share, slowest)) and share < 0.8
     assert warning.quantities["delta"].value > 1.5 * plate.rated_current
-    assert not [each for each in long.warnings if each.code == "star-too-short"]
+    assert not [each for each in long.findings.warnings if each.code == "star-too-short"]

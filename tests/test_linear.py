@@ -225,8 +225,8 @@ def test_poles_of_the_loop_that_a_study_shows(of):
     study = record_of(loaded, drive)
     lossless = {n: 0.0 for n in ("rotor.d", "rotor.friction") if n in drive.motor.parameter_layout.names}
     p = drive.motor.parameter_layout.from_names(lossless, drive.fmu_parameters)
-    assert set(study.statics.loops) == {"mean inertia", "least inertia", "largest inertia"}
-    for loop in study.statics.loops.values():
+    assert set(study.setup.statics.loops) == {"mean inertia", "least inertia", "largest inertia"}
+    for loop in study.setup.statics.loops.values():
         shown = as_data(loop)
         inputs = {"load.J": loop.inertia - p.rotor.J, "w_ref": 50.0}
         found = linearize_model(drive.motor, p, inputs, {"w": 50.0, "armature.T": T_RATED})

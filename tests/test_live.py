@@ -390,7 +390,7 @@ def test_every_overload_has_the_peaks_of_the_co_simulation(name, tmp_path):
     found = in_node(live, f"{OUTCOME} return {names}.map((name) => outcome({{}}, name));")
     assert set(names) == set(config.events)
     for own, each in zip(names, found, strict=True):
-        answers = study.answers[own]
+        answers = study.runs.answers[own]
         for measure in ("crank_torque_peak", "rocker_torque_peak", "current_peak", "speed_least"):
             want = getattr(answers, measure)
             if want is not None and each[measure] is not None:

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from records import like
 
 from chainunit import ChainUnitMachine
 from chainunit.core.quantities import Layout
@@ -29,7 +30,7 @@ def test_a_peak_of_the_motor_that_is_none_of_the_load_has_its_reason(swing, is_t
         {"motor.air_gap_tau": ("time", load + 0.085 * a), "motor.a": ("time", a)}, {"time": time}
     )
     notes, rotor = [], SimpleNamespace(J=0.085)
-    study = SimpleNamespace(
+    study = like(
         drive=SimpleNamespace(foreign=None, fmu_parameters=SimpleNamespace(rotor=rotor)),
         steady=run,
         answers={"steady": SimpleNamespace(speed_ripple=0.012)},

@@ -50,16 +50,16 @@ def test_it_runs_as_an_fmu(tmp_path):
 def test_a_study_names_it(registered, tmp_path):
     choice = config.parse(STUDY)
     study = run.run_study(choice, tmp_path)
-    assert study.failure is None and study.drive.motor is ServoMotor
-    steady, p = study.answers["steady"], study.drive.parameters
+    assert study.findings.failure is None and study.setup.drive.motor is ServoMotor
+    steady, p = study.runs.answers["steady"], study.setup.drive.parameters
     assert p.coil.R == 1.5 and p.control.ki == pytest.approx(4.0 * p.control.kp)
     assert steady.speed_mean == pytest.approx(choice.run.crank_speed, rel=1e-6)
     # torque of the shaft: the current's, less that of the rotor
-    turns = study.steady
+    turns = study.runs.steady
     driving = p.coil.k * turns["motor.i"] - p.rotor.d * turns["motor.w"] - p.rotor.J * turns["motor.a"]
     np.testing.assert_allclose(driving, turns["motor.tau"], atol=1e-9)
-    kinds = {remark.code for remark in study.warnings}
-    reaches_limit = any(answers.current_peak > 0.999 * 3.0 for answers in study.answers.values())
+    kinds = {remark.code for remark in study.findings.warnings}
+    reaches_limit = any(answers.current_peak > 0.999 * 3.0 for answers in study.runs.answers.values())
     assert ("current-limit" in kinds) == reaches_limit
     result = ResultEntries(json.loads(json.dumps(as_dict(study))))
     assert result["motor"]["kind"] == "ServoMotor" and result["speed_loop"] == {}

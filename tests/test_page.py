@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import copy
 import dataclasses
 import gzip
 import itertools
@@ -19,6 +18,7 @@ import numpy as np
 import pytest
 from event_tables import event_line
 from plotly.offline import get_plotlyjs
+from records import changed
 from reports import at, page_of, pictures, plotly_figure, report_of, said_of, unpacked, write
 
 from chainunit import EMPTY, InputError, RunError
@@ -127,7 +127,7 @@ def candidate(study, name, verdict, reason, **utilisations):
         of: Check(of.replace("_", "-"), None if used is None else 8.0 * used, 8.0, "N.m")
         for of, used in utilisations.items()
     }
-    return Candidate(motor, study.drive, TrialResult(checks), verdict=Standing(verdict), reason=reason)
+    return Candidate(motor, study.setup.drive, TrialResult(checks), verdict=Standing(verdict), reason=reason)
 
 
 def sized(study, *names):
@@ -138,10 +138,10 @@ def sized(study, *names):
         candidate(study, "0.25 kW", "rejected", "too weak by 31 %", pull_out=1.31, heat=0.83),
     ]
     of_turn = CycleNumbers(**dict.fromkeys(Layout(CycleNumbers).names, 28.7))
-    duty = Duty(study.statics.normal, {}, None, of_turn)
+    duty = Duty(study.setup.statics.normal, {}, None, of_turn)
     kept = [each for each in candidates if not names or each.motor.designation in names]
     findings = Sized(config.parse("[sizing]").plans["sizing"], duty, kept, ["Typical values."], 3, tried=3)
-    return dataclasses.replace(study, findings=study.findings | {"sizing": findings})
+    return changed(study, by_analysis=study.findings.by_analysis | {"sizing": findings})
 
 
 class Reader(HTMLParser):
@@ -231,7 +231,7 @@ _DRAWING = re.compile(r'<figure class="drawing">.*?</figure>', re.S)
 
 def test_the_drawing_has_the_dimensions_of_the_machine(study, written):
     (drawing,) = _DRAWING.findall(written.read_text("utf-8"))
-    p = study.drive.machine.p
+    p = study.setup.drive.machine.p
     shown = re.findall(r">(\w+)</text>\s*<text[^>]*>([\d.]+) mm</text>", drawing)
     assert [name for name, _ in shown] == "r l h e l1 l2 c hy z".split()
     assert all(float(x) == pytest.approx(1e3 * getattr(p, name), rel=5e-4) for name, x in shown)
@@ -321,14 +321,14 @@ def test_every_axis_says_what_it_shows_in_which_unit(study, written):
 def test_the_moving_machine_is_the_simulated_one(study, written):
     moving = unpacked(Reader(written.read_text("utf-8")).scripts["pictures"])
     assert [r["name"] for r in moving["runs"]] == ["start_up", "feed_left", "jam_left"]
-    p = study.drive.machine.p
+    p = study.setup.drive.machine.p
     lengths = {("O1", "A"): p.r, ("A", "Bd"): p.l, ("C", "Bd"): p.h, ("Bd", "A2"): p.h - p.e}
     for side in ("left", "right"):
         lengths |= {(f"A1 {side}", f"B {side}"): p.l1, (f"B {side}", "A2"): p.l2}
     known = set(lengths)
     for run in moving["runs"]:
-        series = study.runs[run["name"]]
-        event = study.event.get(run["name"], 0.0)
+        series = study.runs.series[run["name"]]
+        event = study.runs.event_times.get(run["name"], 0.0)
         time = np.array(run["time"])
         assert np.all(np.diff(time) > 0.0) and np.max(np.diff(time)) < 0.02
         count = len(time)
@@ -376,17 +376,17 @@ def test_steady_running_begins_where_the_study_takes_it(study):
     """A soft starter that ramps for longer than the reference moves the mark and the still picture, too."""
     soft = SoftStart(voltage=0.5, time=0.7)
     config = dataclasses.replace(
-        study.config,
-        drive=dataclasses.replace(study.config.drive, start="soft", starter=Starter(soft_start=soft)),
+        study.setup.config,
+        drive=dataclasses.replace(study.setup.config.drive, start="soft", starter=Starter(soft_start=soft)),
     )
-    slow = dataclasses.replace(study, config=config, started=None)
+    slow = changed(study, config=config, started=None)
     start_up = next(each for each in report_of(slow).figures if each.name == "time-start-up")
     (mark,) = plotly_figure(start_up, DEFAULT_UNITS).layout.annotations
-    assert mark.text == "steady from here" and mark.x == slow.steady_begin == pytest.approx(
+    assert mark.text == "steady from here" and mark.x == slow.runs.steady_begin == pytest.approx(
         0.7 + math.pi / 3.0
     )
     first = pictures(study_motion.motion(slow))["runs"][0]
-    assert first["time"][first["still"] - 1] < slow.steady_begin <= first["time"][first["still"]]
+    assert first["time"][first["still"] - 1] < slow.runs.steady_begin <= first["time"][first["still"]]
 
 
 def test_the_verdict_comes_first_everywhere(study, written):
@@ -398,14 +398,17 @@ def test_the_verdict_comes_first_everywhere(study, written):
     pushed = [r for r in verdict["model"]["reasons"] if r["topic"] == "pushed"]
     for reason in pushed:
         rod = reason["quantity"].removesuffix("_mean_pull")
-        assert reason["value"]["value"] == study.pulls[reason["run"]][rod].mean < 0.0
+        assert reason["value"]["value"] == study.runs.pulls[reason["run"]][rod].mean < 0.0
     lines = said_of(study).splitlines()
     assert lines[:2] == [verdict["model"]["text"], verdict["motor"]["text"]]
     assert (
-        sum("Bars in compression, where a chain goes slack" in warning.text for warning in study.warnings)
+        sum(
+            "Bars in compression, where a chain goes slack" in warning.text
+            for warning in study.findings.warnings
+        )
         == 1
     )
-    assert not any("pull" in note.text for note in study.notes)
+    assert not any("pull" in note.text for note in study.findings.notes)
     text = written.read_text("utf-8")
     answer = text[text.index('<section id="answer"') :]
     assert (
@@ -417,14 +420,14 @@ def test_the_verdict_comes_first_everywhere(study, written):
 def test_the_start_up_stands_beside_the_runs(study, written):
     """Its crank torque and pulls are told, and it is a run of the pins."""
     said, text = said_of(study), written.read_text("utf-8")
-    peak = told_as(study.start.crank_torque_peak, "N.m")
+    peak = told_as(study.runs.start.crank_torque_peak, "N.m")
     assert f"Start-up: crank torque, peak {peak};" in said and "start_up.crank_torque_peak" in text
     pin = "O1 crank bearing"
     pins = {
-        **study.pins,
-        "start_up": {**study.pins["start_up"], pin: {**study.pins["start_up"][pin], "peak": 1e7}},
+        **study.runs.pins,
+        "start_up": {**study.runs.pins["start_up"], pin: {**study.runs.pins["start_up"][pin], "peak": 1e7}},
     }
-    worst = dataclasses.replace(study, pins=pins)
+    worst = changed(study, pins=pins)
     assert re.search(rf"{pin} .* {re.escape(told_as(1e7, 'N'))} .* start-up", said_of(worst))
     row = page_of(worst)
     row = row[row.index(f"pins.start_up.{pin}.peak") :].partition("</tr>")[0]
@@ -434,11 +437,11 @@ def test_the_start_up_stands_beside_the_runs(study, written):
 def test_a_run_whose_energy_balance_is_not_kept_is_no_verdict_on_the_motor(study):
     before = as_dict(study)["verdict"]["motor"]
     assert before["left_out"] == [] and before["run"] == "jam_left"
-    certificate = study.certificate | {"jam_left": {"energy_residual_share": 1.36}}
-    answers = study.answers | {
-        "jam_left": dataclasses.replace(study.answers["jam_left"], torque_reserve=-12.0)
+    certificate = study.runs.certificate | {"jam_left": {"energy_residual_share": 1.36}}
+    answers = study.runs.answers | {
+        "jam_left": dataclasses.replace(study.runs.answers["jam_left"], torque_reserve=-12.0)
     }
-    broken = dataclasses.replace(study, answers=answers, certificate=certificate)
+    broken = changed(study, answers=answers, certificate=certificate)
     motor = as_dict(broken)["verdict"]["motor"]
     assert motor["left_out"] == ["jam_left"] and motor["run"] != "jam_left"
     others = [a.torque_reserve for name, a in answers.items() if name != "jam_left"]
@@ -447,21 +450,25 @@ def test_a_run_whose_energy_balance_is_not_kept_is_no_verdict_on_the_motor(study
         "runs whose energy balance is not kept are left out (a lump jams the left side)."
     )
     # a torque that steady running has comes in each turn
-    steady = study.answers | {"steady": dataclasses.replace(study.answers["steady"], torque_reserve=-0.3)}
+    steady = study.runs.answers | {
+        "steady": dataclasses.replace(study.runs.answers["steady"], torque_reserve=-0.3)
+    }
     for worst, when in ((answers, "for a moment"), (steady, "in each turn")):
-        said = as_dict(dataclasses.replace(study, answers=worst))["verdict"]["motor"]["text"]
+        said = as_dict(changed(study, answers=worst))["verdict"]["motor"]["text"]
         assert re.search(rf"{when} its torque exceeds the pull-out torque by ", said)
     # with none left nothing is known of the reserve
     nothing = {name: {"energy_residual_share": math.nan} for name in certificate}
-    motor = as_dict(dataclasses.replace(study, certificate=nothing))["verdict"]["motor"]
+    motor = as_dict(changed(study, certificate=nothing))["verdict"]["motor"]
     assert motor["holds"] == "in part" and motor["run"] is None and motor["least_reserve"]["value"] is None
     assert "its reserve of torque is not known" in motor["text"]
 
 
 def test_the_speed_after_the_event_is_a_sentence(study):
     def caption(**answers):
-        runs = study.answers | {"jam_left": dataclasses.replace(study.answers["jam_left"], **answers)}
-        text = page_of(dataclasses.replace(study, answers=runs))
+        runs = study.runs.answers | {
+            "jam_left": dataclasses.replace(study.runs.answers["jam_left"], **answers)
+        }
+        text = page_of(changed(study, answers=runs))
         place = text.rindex("answers.jam_left.speed_dip")
         text = text[text.rindex("<figcaption>", 0, place) :]
         return re.sub(r"<[^>]*>", "", text.partition("</figcaption>")[0]).replace("\u202f", " ")
@@ -476,19 +483,19 @@ def test_what_does_not_act_is_not_given(study):
     """A motor on the line follows no reference, so that no ramp of one is shown."""
     given = page_of(study)
     assert 'data-path="given.run.ramp"' in given[given.index('<section id="given"') :]
-    line = dataclasses.replace(study, drive=dataclasses.replace(study.drive, follows=False))
+    line = changed(study, drive=dataclasses.replace(study.setup.drive, follows=False))
     given = page_of(line)
     assert 'data-path="given.run.ramp"' not in given and 'data-path="given.run.crank_speed"' in given
 
 
 def test_the_speeds_at_which_a_web_goes_slack_are_a_sentence(study):
     slack = {"slack_speed": 0.0, "slack_speed_empty": 4.64, "chain_resonance": 5.0}
-    organs = study.findings["organs"]
+    organs = study.findings.by_analysis["organs"]
     organs = dataclasses.replace(organs, limits=dataclasses.replace(organs.limits, **slack))
     assert (
         "With this feed, a web is slack at rest; empty, a web first goes slack at 4.64 rad/s (44.3 rev/min) of the "
         "crank; the lowest mode of a chain lies near 5.00 rad/s (47.7 rev/min)."
-    ) in said_of(dataclasses.replace(study, findings=study.findings | {"organs": organs}))
+    ) in said_of(changed(study, by_analysis=study.findings.by_analysis | {"organs": organs}))
 
 
 def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):
@@ -504,14 +511,14 @@ def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatc
         keys={},
         sentence=lambda study: "Insufficient motor.",
     )
-    motor = as_dict(dataclasses.replace(study, proposal=nearest))["verdict"]["motor"]
+    motor = as_dict(changed(study, proposal=nearest))["verdict"]["motor"]
     assert motor["holds"] == "in part" and "insufficient" in motor["text"]
 
 
 def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
-    answers = dict(study.answers)
+    answers = dict(study.runs.answers)
     answers["steady"] = dataclasses.replace(answers["steady"], speed_mean=3.74)
-    slow = dataclasses.replace(study, answers=answers)
+    slow = changed(study, answers=answers)
     text = said_of(slow)
     assert (
         "crank at 3.74 rad/s (35.7 rev/min); 6 rad/s (57.3 rev/min) NOT reached" in text
@@ -533,10 +540,10 @@ def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
 def test_the_study_file_chooses_the_units(study):
     """The data stay in SI units."""
     chosen = config.parse(SHORT + '[report]\nunits = { speed = "rev/min", power = "W" }\n')
-    other = dataclasses.replace(study, config=dataclasses.replace(study.config, units=chosen.units))
+    other = changed(study, config=dataclasses.replace(study.setup.config, units=chosen.units))
     text = said_of(other)
     assert "crank at 57.3 rev/min" in text and "crank at 6.00 rad/s (57.3 rev/min)" in said_of(study)
-    power = study.answers["steady"].power_peak
+    power = study.runs.answers["steady"].power_peak
     assert told_as(power, "W", units=chosen.units) in text and told_as(
         power, "W", units=chosen.units
     ).endswith(" W")
@@ -594,11 +601,15 @@ def test_each_overload_factor_says_its_use(study, written):
 
 def test_one_number_of_the_reserve_everywhere(study, written):
     """The least (limit - torque)/limit of a run, in %, on the terminal, on the page and in the data."""
-    answers, p = study.answers, study.drive.parameters
+    answers, p = study.runs.answers, study.setup.drive.parameters
     result = as_dict(study)
     warm = 1.0 + p.armature.alpha * (answers["steady"].winding_temperature - 293.15)
     for run in answers:
-        rows = study.steady if run == "steady" else study.runs[run].sel(time=slice(study.event[run], None))
+        rows = (
+            study.runs.steady
+            if run == "steady"
+            else study.runs.series[run].sel(time=slice(study.runs.event_times[run], None))
+        )
         torque, speed = rows["motor.air_gap_tau"].values, rows["motor.w"].values
         current = np.minimum(p.limit.i, (p.limit.v - p.armature.k * speed) / (p.armature.R * warm))
         driving = (torque > 0.0) & (speed > 0.0)
@@ -655,14 +666,13 @@ def test_no_candidate_fits(study):
 
 
 def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
-    stopped = copy.copy(study)
-    stopped.failure = RunError("motor: it <broke>")
-    stopped.runs = {"unfinished": study.runs["start_up"].isel(time=slice(0, 1))}
-    stopped.answers, stopped.pins, stopped.event, stopped.certificate = {}, {}, {}, {}
+    series = {"unfinished": study.runs.series["start_up"].isel(time=slice(0, 1))}
+    empty = {"answers": {}, "pins": {}, "event_times": {}, "certificate": {}}
+    stopped = changed(study, failure=RunError("motor: it <broke>"), series=series, **empty)
     text = html.write(report_of(stopped), tmp_path).read_text("utf-8")
     assert "The run stopped early:" in text and "it &lt;broke&gt;" in text
     assert not any(words["data-path"] == "status" for words in Reader(text).words)
-    stopped.runs = {}
+    stopped.runs.series = {}
     assert unpacked(Reader(page_of(stopped)).scripts["pictures"]) is None
 
 
@@ -670,7 +680,7 @@ def test_the_head_names_project_author_date_and_revision(study):
     text = '[report]\nproject = "Mill 3"\nauthor = "A. <b>"\ndate = 2026-11-22\nrevision = "B"\n'
     labels = config.parse(text).file.labels
     assert labels == {"project": "Mill 3", "author": "A. <b>", "date": "2026-11-22", "revision": "B"}
-    named = dataclasses.replace(study, config=study.config.with_file(labels=labels))
+    named = changed(study, config=study.setup.config.with_file(labels=labels))
     page = html.render(report_of(named))
     head = re.search(r'<p class="from">.*?</p>', page)[0]
     plain = re.sub(r"<[^>]*>", "", head)
@@ -837,7 +847,11 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
 @pytest.mark.slow
 def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     """At rest a chain of 8 rods pulls as two bars do with this feed, but not without: the parts differ by a fifth."""
-    machine, feed, own = chains.drive.machine, chains.config.feed, chains.findings["chain"].own
+    machine, feed, own = (
+        chains.setup.drive.machine,
+        chains.setup.config.feed,
+        chains.findings.by_analysis["chain"].own,
+    )
     out = cycle(machine, own.speed, feed).outputs
     at_rest = machine.chamber(0.0, left=feed.left, right=feed.right)
 
@@ -862,9 +876,9 @@ def test_each_snatch_is_in_parts_of_its_own_rest(chains):
 
 def test_the_rods_of_chains_move_as_simulated(chains):
     moving = pictures(study_motion.motion(chains))
-    walls, webs = chains.drive.simulated_machine.rods
+    walls, webs = chains.setup.drive.simulated_machine.rods
     organs = {link["name"]: link["joints"] for link in moving["links"]}
-    p = chains.drive.machine.p
+    p = chains.setup.drive.machine.p
     for side in ("left", "right"):
         assert (len(organs[f"{side} wall"]), len(organs[f"{side} web"])) == (walls + 1, webs + 1)
     for run in moving["runs"]:
@@ -902,8 +916,9 @@ def test_any_linkage_moves(knife):
         off = np.hypot(*(np.array([path["x"], path["y"]])[:, :, None] - at["blade"][:, None, :]))
         assert np.max(np.min(off, axis=0)) < 0.05 * size
         assert len(run["forces"]) == 10 and {force["at"] for force in run["forces"]} <= set(at)
-        whole = knife.runs[run["name"]].sel(
-            time=np.array(run["time"]) + (knife.event["hard_cut"] if run["event"] else 0.0), method="nearest"
+        whole = knife.runs.series[run["name"]].sel(
+            time=np.array(run["time"]) + (knife.runs.event_times["hard_cut"] if run["event"] else 0.0),
+            method="nearest",
         )
         assert np.max(np.abs(at["blade"][1] - whole["machine.blade.y"].values)) < 2e-4
         titles = {reading["title"] for reading in run["readings"]}
@@ -914,8 +929,8 @@ def test_any_linkage_moves(knife):
 
 def test_one_bearing_has_room_for_its_bars(study):
     """A panel without height stops the script of the page, and with it the animation."""
-    pins = {run: dict([next(iter(table.items()))]) for run, table in study.pins.items()}
-    figures = report_of(dataclasses.replace(study, pins=pins)).figures
+    pins = {run: dict([next(iter(table.items()))]) for run, table in study.runs.pins.items()}
+    figures = report_of(changed(study, pins=pins)).figures
     (reactions,) = (figure for figure in figures if figure.name == "reactions")
     layout = plotly_figure(reactions, DEFAULT_UNITS).layout
     assert layout.height - layout.margin.t - layout.margin.b > 100
@@ -972,15 +987,15 @@ def test_a_table_that_is_wider_than_the_screen_says_that_it_scrolls(written, tmp
 def test_plots_mark_running_margin_and_where_two_bars_end(study):
     """Each mark against the numbers of the study, computed otherwise."""
     figures = {figure.name: figure for figure in report_of(study).figures}
-    running = study.config.run.crank_speed
+    running = study.setup.config.run.crank_speed
 
     def items(figure, kind, name=""):
         panels = [panel for *_, panel in figures[figure].all_panels()]
         return [[x for x in panel.items if isinstance(x, kind) and name in x.name] for panel in panels]
 
-    mean = study.answers["steady"].speed_mean
+    mean = study.runs.answers["steady"].speed_mean
     for marks in items("torque-speed", Mark, "steady running, mean"):
-        assert [mark.at for mark in marks] == [pytest.approx(mean * study.drive.ratio)]
+        assert [mark.at for mark in marks] == [pytest.approx(mean * study.setup.drive.ratio)]
     for marks in items("sides", Mark, "normal running"):
         assert [mark.at for mark in marks] == [running]
     mode = at(as_dict(study), "organs.limits.chain_resonance")["value"]
@@ -989,7 +1004,7 @@ def test_plots_mark_running_margin_and_where_two_bars_end(study):
         ROCKER_GOOD_EMPTY * mode
     )
     gain, phase, _ = items("speed-loop", Mark, "crossover")
-    narrowest = min(study.statics.loops.values(), key=lambda loop: loop.phase_margin)
+    narrowest = min(study.setup.statics.loops.values(), key=lambda loop: loop.phase_margin)
     crossing = np.interp(0.0, -np.log(narrowest.gain), np.log(narrowest.frequency))
     assert gain[0].at == phase[0].at == pytest.approx(math.exp(crossing), rel=2e-3)
     (label,) = (

@@ -67,17 +67,17 @@ def figures(study):
 
 
 def test_the_guide_stands_among_the_bearings_by_the_names_of_the_file(study):
-    for table in study.pins.values():
+    for table in study.runs.pins.values():
         assert list(table) == ["guide", "O1", "A", "C"]
         # a guide does not turn: it has no load of ISO 281
         assert table["guide"]["ball_equivalent"] is None
         # the larger exponent weighs the peaks more
         assert table["C"]["roller_equivalent"] > table["C"]["ball_equivalent"] > 0.0
-    run = study.steady
+    run = study.runs.steady
     across = np.hypot(run["machine.guide.fx"].values, run["machine.guide.fy"].values)
-    assert study.pins["start_up"]["guide"]["peak"] >= np.max(across) > 100.0
+    assert study.runs.pins["start_up"]["guide"]["peak"] >= np.max(across) > 100.0
     # the guide bears the sideways part of the force that the rod puts on the ram, with its mass and its load
-    reactions = study.findings["constant_speed"].pins
+    reactions = study.findings.by_analysis["constant_speed"].pins
     assert list(reactions) == ["guide", "O1", "A", "C"] and reactions["guide"].peak > 100.0
 
 
@@ -93,7 +93,7 @@ def test_ram_guide_and_working_force_are_drawn(study):
         assert list(forces) == ["guide", "O1", "A", "C", "pressing"]
         pressing = forces["pressing"]
         assert (pressing["kind"], pressing["at"], pressing["short"]) == ("load", "T", "pressing")
-        force = study.runs[run["name"]]["machine.press_force"].values
+        force = study.runs.series[run["name"]]["machine.press_force"].values
         # the whole force within the last way, a twentieth of it to the side, both with four digits of the largest
         assert max(pressing["y"]) == pytest.approx(np.max(force), rel=1e-3) and min(pressing["y"]) == 0
         half = 0.51 * 10.0 ** (math.floor(math.log10(np.max(force))) - 3) * (1.0 + 1.0 / 20.0)
@@ -123,10 +123,10 @@ def test_the_answer_comes_first(page):
 
 def test_force_over_stroke(study, figures):
     """The way of the ram is that of the textbook, and the area of the loop is the work of the load in a turn."""
-    steady = study.steady
-    state = machine_state(study, steady)
+    steady = study.runs.steady
+    state = machine_state(study.setup.drive, steady)
     ((link, (way, force)),) = loads_on_slides(state).items()
-    angle, _ = crank_motion(study.drive, steady)
+    angle, _ = crank_motion(study.setup.drive, steady)
     r, l, e = 0.08, 0.36, 0.025
     rod = np.sqrt(l * l - (e - r * np.cos(angle)) ** 2)
     y = r * np.sin(angle) - rod
@@ -149,11 +149,13 @@ def test_force_over_stroke(study, figures):
 
 def test_a_coupling_opens_too_late_for_a_press(study):
     """The force of the workpiece comes at once, so that the peak lies within the release time."""
-    run = study.runs["surge_press_force"].sel(time=slice(study.event["surge_press_force"], None))
-    torque, time = np.abs(crank_torque(study.drive, run)), run["time"].values
-    setting = 1.25 * np.max(np.abs(crank_torque(study.drive, study.steady)))
+    run = study.runs.series["surge_press_force"].sel(
+        time=slice(study.runs.event_times["surge_press_force"], None)
+    )
+    torque, time = np.abs(crank_torque(study.setup.drive, run)), run["time"].values
+    setting = 1.25 * np.max(np.abs(crank_torque(study.setup.drive, study.runs.steady)))
     (effect,) = effects(study, setting).values()
-    trip = time[np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting)[0]]
+    trip = time[np.flatnonzero(np.abs(run["motor.tau"].values) * study.setup.drive.ratio > setting)[0]]
     until = torque[(time <= trip + 0.005) & (time >= trip - 0.01)]
     assert effect.without == pytest.approx(np.max(torque)) and np.max(until) == pytest.approx(np.max(torque))
     assert effect.with_coupling == pytest.approx(effect.without) and not spares({"surge": effect})
@@ -167,8 +169,8 @@ def test_power_over_the_turn_and_histogram(study, figures):
     crank = curves["crank"]
     assert np.all(np.diff(crank.x) > 0.0) and 0.0 <= crank.x[0] and crank.x[-1] < 2.0 * math.pi
     # energy of the turn by angle: torque over angle is power over speed
-    torque = crank_torque(study.drive, study.steady)
-    angle, speed = crank_motion(study.drive, study.steady)
+    torque = crank_torque(study.setup.drive, study.runs.steady)
+    angle, speed = crank_motion(study.setup.drive, study.runs.steady)
     k = len(angle) // 2
     at = angle[k] % (2.0 * math.pi)
     assert np.interp(at, crank.x, crank.y) == pytest.approx(torque[k] * speed[k], rel=1e-9)

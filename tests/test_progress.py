@@ -26,14 +26,14 @@ def test_the_export_of_each_fmu_is_told(tmp_path):
         assert f"{name}: exporting" in words
     assert words.index("DcMotor: exporting") < words.index("start-up and steady running")
     assert all(0.0 <= done <= todo for _, done, todo in message)
-    assert not [note for note in study.notes if note.code == "no-compiler"]
+    assert not [note for note in study.findings.notes if note.code == "no-compiler"]
 
 
 def test_without_a_compiler_it_is_told_how_to_have_one(tmp_path, monkeypatch):
     monkeypatch.setattr(backends.targets, "compiles", lambda fmi: False)
     study, _ = _said(tmp_path)
-    (note,) = [note for note in study.notes if note.code == "no-compiler"]
-    assert "chainunit[cross]" in note.text and study.fmus["machine"].backend == "python"
+    (note,) = [note for note in study.findings.notes if note.code == "no-compiler"]
+    assert "chainunit[cross]" in note.text and study.runs.fmus["machine"].backend == "python"
     # where the user asks for Python there is nothing to say
     study, _ = _said(tmp_path / "asked", backend="python")
-    assert not [note for note in study.notes if note.code == "no-compiler"]
+    assert not [note for note in study.findings.notes if note.code == "no-compiler"]

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from records import like
 from reports import at, plotly_figure, screen_of
 from rich.console import Console
 
@@ -454,8 +455,8 @@ def test_no_line_of_a_screen_ends_between_a_number_and_its_unit(width):
 @pytest.mark.parametrize("coupling", [None, 1304.0])
 def test_the_worst_overload_is_without_a_limiter_only_if_there_is_none(monkeypatch, coupling):
     """The column of 1891 N m, with a limiter that trips, stood below "without torque limiter"."""
-    monkeypatch.setattr(runs, "by_side", lambda study, answers: ["steady", "surge"])
-    study = SimpleNamespace(
+    monkeypatch.setattr(runs, "by_side", lambda runs, answers: ["steady", "surge"])
+    study = like(
         overloads=["surge"],
         proposal=object(),
         insufficient="",
@@ -464,7 +465,7 @@ def test_the_worst_overload_is_without_a_limiter_only_if_there_is_none(monkeypat
         titles={"surge": "rock rises"},
         answers={"surge": SimpleNamespace(crank_torque_peak=1891.0)},
     )
-    monkeypatch.setattr(runs.run_names, "title", lambda study, run: study.titles[run])
+    monkeypatch.setattr(runs.run_names, "title", lambda runs, run: runs.titles[run])
     table = b.Table((b.TableRow(("peak", "1", "2")),), b.heads("", "steady", "surge"))
     title = runs._beside_the_worst(study, table).title
     bare = " (without torque limiter)" if coupling is None else ""

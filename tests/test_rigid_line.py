@@ -32,8 +32,8 @@ def by_hand(study, place):
     """The natural frequency of two inertias on the two shafts in series [rad/s], by eigenvalues of their matrices;
     the machine in its heaviest position."""
     rotor, machine, ratio = (
-        study.drive.fmu_parameters.rotor.J,
-        float(np.max(study.statics.normal.outputs.J)),
+        study.setup.drive.fmu_parameters.rotor.J,
+        float(np.max(study.setup.statics.normal.outputs.J)),
         25.0,
     )
     stiffness = 1.0 / (1.0 / SOFT["c2"] + 1.0 / SOFT["c3"])
@@ -54,12 +54,12 @@ def test_on_both_sides_of_ten(place):
     for ratio, holds in ((10.001, True), (9.999, False), (10.0 * (1.0 + 1e-9), True)):
         speed = found / ratio
         study = study_of(place, speed)
-        line = study.statics.rigid_line
+        line = study.setup.statics.rigid_line
         assert line.natural_frequency == pytest.approx(found, rel=1e-12)
         assert line.driver_frequency == speed and line.ratio == pytest.approx(ratio, rel=1e-12)
         assert line.holds is holds
         remark(study)
-        told = [each for each in study.warnings if each.code == "no-rigid-line"]
+        told = [each for each in study.findings.warnings if each.code == "no-rigid-line"]
         assert len(told) == (not holds)
         for each in told:
             assert each.quantities["ratio"].value == line.ratio and "VDI 2149" in each.text
@@ -72,7 +72,7 @@ def test_on_both_sides_of_ten(place):
             "ratio": {"value": line.ratio, "unit": "1"},
             "holds": holds,
         }
-        shown = shaft._rigid(study, line)
+        shown = shaft._rigid(study.setup, line)
         words = plain_line(shown.line)
         assert shown.severity == ("good" if holds else "partly")
         assert words.startswith(
@@ -85,5 +85,5 @@ def test_a_line_without_stiffness_has_no_ratio():
     loaded = config.parse("")
     study = record_of(loaded, choose(loaded, Path(), lambda *_: None).drive)
     remark(study)
-    assert study.statics.rigid_line is None and "rigid_line" not in as_dict(study)
-    assert not [each for each in study.warnings if each.code == "no-rigid-line"]
+    assert study.setup.statics.rigid_line is None and "rigid_line" not in as_dict(study)
+    assert not [each for each in study.findings.warnings if each.code == "no-rigid-line"]

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from records import record_of
+from records import like, record_of
 
 from chainunit.reading.results import as_data
 from chainunit.study.analyses import GearAnalysis
@@ -127,15 +127,15 @@ def test_the_energy_that_is_held_grows_by_the_power_that_comes_in(mill):
 def test_a_turn_that_never_settles_is_told_with_its_energy(mill):
     rig, first, told, _ = mill
     study = record_of(parse(MILL), rig.drive)
-    study.runs["start_up"] = first
+    study.runs.series["start_up"] = first
 
     def remarks(turns):
         names = ("speed_mean", "cycle_gap", "speed_drift", "energy_gap", "winding_temperature")
         answers = SimpleNamespace(**{name: read_measure(name, window(rig, turns)) for name in names})
-        study.answers["steady"] = answers
-        study.remarks.clear()
+        study.runs.answers["steady"] = answers
+        study.findings.remarks.clear()
         _on_steady_running(study, answers)
-        return [remark for remark in study.warnings if remark.code == "energy-taken-up"]
+        return [remark for remark in study.findings.warnings if remark.code == "energy-taken-up"]
 
     (remark,) = remarks(first)
     assert "still take up energy, over the evaluated turns 3.2" in remark.text
@@ -149,10 +149,10 @@ def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     study = record_of(parse(MILL), rig.drive)
     assert GearAnalysis.applies(rig.drive, {})
     assert GearAnalysis.find(study, Work(rig, lambda *_: None)) is None  # no steady running yet
-    study.runs["start_up"], study.started = told, StartUp(told, float(told["time"][0]), 0.0, rig)
-    study.answers["steady"] = SimpleNamespace(power_mean=read_measure("power_mean", window(rig, told)))
+    study.runs.series["start_up"], study.runs.started = told, StartUp(told, float(told["time"][0]), 0.0, rig)
+    study.runs.answers["steady"] = SimpleNamespace(power_mean=read_measure("power_mean", window(rig, told)))
     findings = GearAnalysis.find(study, Work(rig, lambda *_: None))
-    torque, w = study.statics.normal.crank_torque, read_measure("speed_mean", window(rig, told))
+    torque, w = study.setup.statics.normal.crank_torque, read_measure("speed_mean", window(rig, told))
     loss = findings.loss
     assert loss.by_load == pytest.approx((1.0 / 0.94 - 1.0) * np.mean(np.abs(torque)) * w, rel=0.03)
     assert loss.without_load == pytest.approx(1e-5 * (197.0 * w) ** 2, rel=1e-3)
@@ -161,14 +161,14 @@ def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     assert loss.share == pytest.approx(loss.whole / loss.net_power)
     assert loss.share > 5.0 * (1.0 / 0.94 - 1.0) and loss.passed_power > 4.0 * loss.net_power
     findings.remark(study)
-    (note,) = study.notes
+    (note,) = study.findings.notes
     assert note.quantities["share"][0] == loss.share
     assert note.quantities["efficiency"][0] == pytest.approx(0.94, rel=1e-12)
     assert "swings energy to and fro" in note.text
     assert note.quantities["without_load"].title == "loss without load (gear.d)"
     assert as_data(findings)["without_load"] == {"value": loss.without_load, "unit": "W"}
     # the warm motor of the energy turns more slowly: one number
-    study.findings["energy"] = SimpleNamespace(gear_loss=0.99 * loss.whole)
+    study.findings.by_analysis["energy"] = SimpleNamespace(gear_loss=0.99 * loss.whole)
     warm = GearAnalysis.find(study, Work(rig, lambda *_: None)).loss
     assert warm.whole == 0.99 * loss.whole and warm.by_load + warm.without_load == pytest.approx(warm.whole)
 
@@ -216,7 +216,7 @@ def test_a_machine_that_speeds_up_is_not_called_stalled(heavy):
     early = started.run.sel(time=slice(8.0, 16.0))
     steady = window(rig, only_whole_turns(rig.drive, early, 1))
     answers = read_answers(steady)
-    study = SimpleNamespace(reaches=False, drive=rig.drive, steady=steady.run)
+    study = like(reaches=False, drive=rig.drive, steady=steady.run)
     assert answers.speed_mean < breakdown_speed(rig.drive, steady.run)
-    assert _stall_speed(study, answers) is None
-    assert _why_missed(study, answers).code == "start-does-not-end"
+    assert _stall_speed(study.runs, answers) is None
+    assert _why_missed(study.runs, answers).code == "start-does-not-end"

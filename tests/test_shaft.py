@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 
 import numpy as np
 import pytest
 import xarray as xr
 from event_tables import event_line
+from records import changed
 from reports import write
 from scipy.linalg import eigh
 from test_page import Reader, check_traced
@@ -59,23 +59,25 @@ def study(tmp_path_factory):
 
 def test_the_run_has_its_certificates(study):
     for name in ("start_up", "jam_left"):
-        shares = study.certificate[name]
+        shares = study.runs.certificate[name]
         assert shares["energy_residual_share"] < 1e-4
         assert shares["driveline_energy_residual_share"] < 1e-4
-    assert study.certificate["start_up"]["machine.tau_difference_to_monolithic"] < 1e-3
+    assert study.runs.certificate["start_up"]["machine.tau_difference_to_monolithic"] < 1e-3
 
 
 def test_the_line_amplifies_a_jam(study):
     """Peaks are those of the series; the rigid drive's torque is that of a study without a line but with its
     inertia."""
-    shaft = shaft_findings(study).answers
+    shaft = shaft_findings(study.findings).answers
     steady, jam = shaft["steady"], shaft["jam_left"]
-    run = study.runs["jam_left"].sel(time=slice(study.event["jam_left"], None))
+    run = study.runs.series["jam_left"].sel(time=slice(study.runs.event_times["jam_left"], None))
     assert jam.tau2_peak == np.max(np.abs(run["driveline.tau2"])) > 2.0 * steady.tau2_peak
     assert jam.amplification == pytest.approx(jam.tau2_peak / np.max(np.abs(run[RIGID])))
     assert jam.amplification > 1.2 and 1.0 < steady.amplification < 1.3
     assert jam.turns_of_steady > 10.0 and jam.range_equivalent is None
-    runs = {warning.runs: warning.text for warning in study.warnings if warning.code == "amplification"}
+    runs = {
+        warning.runs: warning.text for warning in study.findings.warnings if warning.code == "amplification"
+    }
     assert "times that of a rigid drive" in runs["jam_left",]
     before = run[RIGID].attrs
     assert before["units"] == "N.m"
@@ -83,11 +85,11 @@ def test_the_line_amplifies_a_jam(study):
 
 def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_path):
     """The same study without a driveline, the crank heavier by J4: its crank torque is the rigid shaft's."""
-    J4, crank = study.drive.line.inertia, study.drive.machine.p.crank
+    J4, crank = study.setup.drive.line.inertia, study.setup.drive.machine.p.crank
     heavier = f"{SHORT}crank = {{ I = {crank.I + J4} }}"
     gains = {
         n: v
-        for n, v in study.drive.motor.parameter_layout.by_name(study.drive.parameters).items()
+        for n, v in study.setup.drive.motor.parameter_layout.by_name(study.setup.drive.parameters).items()
         if ".k" in n and "control" in n
     }
     motor = "".join(
@@ -97,9 +99,9 @@ def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_
     )
     plain = run_study(config.parse(f"{heavier}\n{motor}"), tmp_path)
     for name in ("start_up", "jam_left"):
-        reference = crank_torque(plain.drive, plain.runs[name])
+        reference = crank_torque(plain.setup.drive, plain.runs.series[name])
         # the crank without the line is heavier by J4, so that this torque holds that of J4, too
-        result = study.runs[name][RIGID].values
+        result = study.runs.series[name][RIGID].values
         if name == "start_up":
             np.testing.assert_allclose(result, reference, atol=2e-4 * np.max(np.abs(reference)))
         else:  # its event comes at the same crank angle, a little later than in the elastic drive
@@ -117,23 +119,25 @@ def test_before_or_behind_the_gear(tmp_path):
         text = f'{SHORT}[driveline]\nplace = "{place}"\nalpha1 = 0\nalpha2 = 0\n{table}'
         runs.append(run_study(config.parse(text), tmp_path / place))
     crank, motor = runs
-    assert (crank.drive.line.ratio, motor.drive.line.ratio) == (25.0, 1.0)
+    assert (crank.setup.drive.line.ratio, motor.setup.drive.line.ratio) == (25.0, 1.0)
     for name in ("start_up", "jam_left"):
-        a, b = crank.runs[name], motor.runs[name]
+        a, b = crank.runs.series[name], motor.runs.series[name]
         np.testing.assert_allclose(a["motor.w"], b["motor.w"], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(a["driveline.tau2"], 25.0 * b["driveline.tau2"], rtol=1e-7, atol=1e-6)
         np.testing.assert_allclose(
-            crank_torque(crank.drive, a), crank_torque(motor.drive, b), rtol=1e-7, atol=1e-6
+            crank_torque(crank.setup.drive, a), crank_torque(motor.setup.drive, b), rtol=1e-7, atol=1e-6
         )
-    assert crank.statics.modes.k_largest == pytest.approx(motor.statics.modes.k_largest, rel=1e-12)
-    assert crank.answers["jam_left"].speed_least == pytest.approx(
-        motor.answers["jam_left"].speed_least, rel=1e-9
+    assert crank.setup.statics.modes.k_largest == pytest.approx(
+        motor.setup.statics.modes.k_largest, rel=1e-12
+    )
+    assert crank.runs.answers["jam_left"].speed_least == pytest.approx(
+        motor.runs.answers["jam_left"].speed_least, rel=1e-9
     )
 
 
 def test_the_frequency_is_that_of_rotor_gear_shafts_and_machine(study):
     """The eigenproblem in the angles of rotor (behind the gear) and driven shaft, the straight cardan condensed."""
-    drive = study.drive
+    drive = study.setup.drive
     line, rotor, result = driveline_of(drive), drive.fmu_parameters.rotor.J, line_modes(drive, [2e-3, 9e-3])
     for J, expected in zip((2e-3, 9e-3), (result.k_largest, result.k_least), strict=True):
         c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
@@ -163,21 +167,21 @@ def test_damage_of_a_steady_swing(study, turns, phase):
     does that of as many, but for its open ends."""
     angle = np.linspace(0.0, turns, turns * 400 + 1)
     swing = 7.0 * np.sin(2.0 * np.pi * angle + phase)
-    zero, gear = np.zeros_like(angle), study.drive.driven_machine.p.ratio
+    zero, gear = np.zeros_like(angle), study.setup.drive.driven_machine.p.ratio
     series = {
         "driveline.tau2": swing, "driveline.tau3": swing, "driveline.twist2": zero, "driveline.twist3": zero,
         "machine.phi0": 2.0 * np.pi * angle * gear, "machine.w0": zero,
         # the torque of a rigid shaft twice as small
-        "machine.tau": 0.5 * swing / study.drive.line.ratio, "motor.a": zero,
+        "machine.tau": 0.5 * swing / study.setup.drive.line.ratio, "motor.a": zero,
     }  # fmt: skip
     run = xr.Dataset({name: ("time", y) for name, y in series.items()}, {"time": angle})
-    answers, cycles, damage = shaft_answers(study.drive, run, run, 5.0)
+    answers, cycles, damage = shaft_answers(study.setup.drive, run, run, 5.0)
     assert answers.range_equivalent == pytest.approx(14.0, rel=1e-4) and answers.cycles == pytest.approx(
         turns, abs=1
     )
     assert isinstance(cycles, Cycles) and damage == pytest.approx(14.0**5, rel=1e-3)
     assert answers.amplification == pytest.approx(2.0)
-    event, _, _ = shaft_answers(study.drive, run, run, 5.0, damage)
+    event, _, _ = shaft_answers(study.setup.drive, run, run, 5.0, damage)
     assert event.turns_of_steady == pytest.approx(turns, abs=0.6) and event.range_equivalent is None
 
 
@@ -186,31 +190,31 @@ def test_rounding_is_no_cycle(study):
     measure of an event."""
     angle = np.linspace(0.0, 2.0, 801)
     even = 375.0 + 8e-7 * np.sin(2.0 * np.pi * 49.0 * angle)
-    zero, gear = np.zeros_like(angle), study.drive.driven_machine.p.ratio
+    zero, gear = np.zeros_like(angle), study.setup.drive.driven_machine.p.ratio
     series = {"driveline.tau2": even, "driveline.tau3": even, "machine.tau": even}
     series |= dict.fromkeys(("driveline.twist2", "driveline.twist3", "machine.w0", "motor.a"), zero)
     series["machine.phi0"] = 2.0 * np.pi * angle * gear
     run = xr.Dataset({name: ("time", y) for name, y in series.items()}, {"time": angle})
-    answers, cycles, damage = shaft_answers(study.drive, run, run, 5.0)
+    answers, cycles, damage = shaft_answers(study.setup.drive, run, run, 5.0)
     assert (answers.cycles, answers.range_largest, answers.range_equivalent, damage) == (0.0, 0.0, 0.0, 0.0)
     assert cycles.classes(answers.range_largest) == []
     shaken = run.assign({"driveline.tau2": ("time", even + 50.0 * np.sin(2.0 * np.pi * angle))})
-    event, _, _ = shaft_answers(study.drive, shaken, run, 5.0, damage)
+    event, _, _ = shaft_answers(study.setup.drive, shaken, run, 5.0, damage)
     assert event.cycles > 0.0 and event.turns_of_steady is None
 
 
 def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
     names = [f"jam_{k}" for k in range(6)]
-    shaft = shaft_findings(study)
+    shaft = shaft_findings(study.findings)
     more = (
         {"steady": each["steady"]} | dict.fromkeys(names, each["jam_left"])
         for each in (shaft.answers, shaft.cycles)
     )
-    more = dataclasses.replace(
+    more = changed(
         study,
-        findings=study.findings | {"shaft": ShaftFindings(*more)},
-        event=study.event | dict.fromkeys(names, study.event["jam_left"]),
-        runs=study.runs | dict.fromkeys(names, study.runs["jam_left"]),
+        by_analysis=study.findings.by_analysis | {"shaft": ShaftFindings(*more)},
+        event_times=study.runs.event_times | dict.fromkeys(names, study.runs.event_times["jam_left"]),
+        series=study.runs.series | dict.fromkeys(names, study.runs.series["jam_left"]),
     )
     drawn = _driveline(more)
     panels = list(drawn.all_panels())
@@ -218,7 +222,7 @@ def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
     # torque above cycles, each with the labels of its own axes
     assert all(drawn.sharing(r, c) == [r] for r, c, _ in panels)
     assert [panel.title for r, _, panel in panels if r % 2 == 0] == [
-        more.title_of(name) for name in shaft_findings(more).answers
+        more.runs.title_of(name) for name in shaft_findings(more.findings).answers
     ]
 
 
@@ -243,8 +247,8 @@ def test_the_report_shows_it(study, tmp_path):
     head, first = (tmp_path / "load_cycle.csv").read_text().splitlines()[:2]
     assert head == "time [s],speed [rad/s],torque [N.m],inertia [kg.m2]"
     # at the motor: J4 and the machine's inertia through the gear
-    steady = study.runs["start_up"].sel(time=slice(study.steady_begin, None))
-    inertia = (float(steady["machine.J"][0]) + study.drive.line.inertia) / 25.0**2
+    steady = study.runs.series["start_up"].sel(time=slice(study.runs.steady_begin, None))
+    inertia = (float(steady["machine.J"][0]) + study.setup.drive.line.inertia) / 25.0**2
     assert float(first.split(",")[3]) == pytest.approx(inertia, rel=1e-8)
     assert float(first.split(",")[2]) == pytest.approx(float(steady["driveline.tau"][0]), rel=1e-8)
     result = as_dict(study)["driveline"]
@@ -254,19 +258,19 @@ def test_the_report_shows_it(study, tmp_path):
 def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     """What is behind the coupling keeps the inertia of the line; the energy certificate holds in its run, too."""
     study = run_study(config.parse(f"{SHORT}{LINE}[coupling]\ntrip_torque = 150\n"), tmp_path)
-    assert study.failure is None
-    jam = study.answers["jam_left"]
+    assert study.findings.failure is None
+    jam = study.runs.answers["jam_left"]
     assert 0.0 < jam.coupling_trip_time < 0.2
-    coasting = study.runs["jam_left_coasting"]
-    w = float(study.runs["jam_left"]["machine.w0"][-1])
+    coasting = study.runs.series["jam_left_coasting"]
+    w = float(study.runs.series["jam_left"]["machine.w0"][-1])
     assert float(coasting["machine.w"][0]) == pytest.approx(w, rel=1e-12)
-    assert coasting_parameters(study.drive)["J_added"] == study.drive.line.inertia
+    assert coasting_parameters(study.setup.drive)["J_added"] == study.setup.drive.line.inertia
     # what stays behind is the energy of the machine before it opened, and of the line's end
-    before = float(study.runs["jam_left"]["machine.kinetic_energy"][-1])
-    assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line.inertia * w * w, rel=1e-9)
-    assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
+    before = float(study.runs.series["jam_left"]["machine.kinetic_energy"][-1])
+    assert jam.energy_behind == pytest.approx(before + 0.5 * study.setup.drive.line.inertia * w * w, rel=1e-9)
+    assert study.runs.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
     # nothing turns what is left alone
-    assert not np.any(crank_torque(study.drive, coasting))
+    assert not np.any(crank_torque(study.setup.drive, coasting))
     assert "jam_left_coasting" in {clip.name for clip in motion(study).runs}
 
 
@@ -274,8 +278,8 @@ def test_the_rigid_drive_has_the_same_coupling(tmp_path):
     """Where it opens, both peak near the trip torque: what comes after it is in neither."""
     events = SHORT.replace(JAM, BLOCKED)
     study = run_study(config.parse(f"{events}{LINE}[coupling]\ntrip_torque = 150\n"), tmp_path)
-    blocked = shaft_findings(study).answers["blocked"]
-    assert study.answers["blocked"].coupling_trip_time is not None
+    blocked = shaft_findings(study.findings).answers["blocked"]
+    assert study.runs.answers["blocked"].coupling_trip_time is not None
     assert 0.9 * 150.0 < blocked.tau2_rigid < 2.0 * 150.0 and 0.6 < blocked.amplification < 1.5
 
 
@@ -284,11 +288,11 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
     sizing = "[sizing]\ncandidates = 1\ninertia_ratio = 1e-6\npoles_least = 2\npoles_most = 2\n"
     text = f"event = []\n{LINE}{sizing}[run]\nstep = 0.002\n"
     study = run_study(config.parse(text), tmp_path)
-    assert study.findings["sizing"].chosen_candidate is None and study.insufficient
-    assert study.drive.ratio == study.findings["sizing"].best.drive.ratio
+    assert study.findings.by_analysis["sizing"].chosen_candidate is None and study.setup.insufficient
+    assert study.setup.drive.ratio == study.findings.by_analysis["sizing"].best.drive.ratio
     assert (
-        set(as_dict(study)["shaft"]) == {"start_up", *study.answers}
-        and "steady" in shaft_findings(study).answers
+        set(as_dict(study)["shaft"]) == {"start_up", *study.runs.answers}
+        and "steady" in shaft_findings(study.findings).answers
     )
     write(study, tmp_path)
 
@@ -296,9 +300,9 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
 def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
     """A heavy J4: the gains are those of rotor, J4 and machine, and so is the loop that is shown."""
     study = run_study(config.parse(f"{SHORT}[driveline]\nJ4 = 20\n"), tmp_path)
-    loop, drive = study.statics.loops["mean inertia"], study.drive
+    loop, drive = study.setup.statics.loops["mean inertia"], study.setup.drive
     assert loop.inertia > drive.fmu_parameters.rotor.J + 20.0 / 25.0**2
-    assert loop.crossover == pytest.approx(study.drive.tuning.crossover, rel=0.05)
+    assert loop.crossover == pytest.approx(study.setup.drive.tuning.crossover, rel=0.05)
 
 
 @pytest.mark.parametrize(

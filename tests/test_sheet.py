@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from records import changed
 from reports import report_of
 
 from chainunit import InputError
@@ -78,7 +79,7 @@ def test_assumptions_are_the_numbers_that_the_file_leaves_out(study, made):
     (section,) = (each for each in made.sections if each.name == "assumptions")
     shown = {value.name for block in section.blocks for _, values in block.sections for value in values}
     assert {"machine.crank.m", "motor.armature.R", "run.turns"} <= shown
-    assert not shown & study.config.file.given and not any(name.startswith("event.") for name in shown)
+    assert not shown & study.setup.config.file.given and not any(name.startswith("event.") for name in shown)
 
 
 def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assumptions(study):
@@ -86,7 +87,7 @@ def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assu
     names |= {"motor.ambient.T": "declared", "gear.J": "file", "starter.inverter.lag": "declared"}
     names |= {"motor.soft_start.voltage": "declared", "starter.soft_start.voltage": "file"}
     values = tuple(b.GivenValue(name, name, Number(1.0, "1"), origin) for name, origin in names.items())
-    chosen = replace(
+    chosen = changed(
         study, proposal=SimpleNamespace(name="sizing", insufficient="", motor=object(), duty=None, keys={})
     )
     whole = report_of(study)
@@ -108,13 +109,14 @@ def test_it_says_up_to_which_speed_it_holds(study, made):
     (basis,) = (each for each in made.sections if each.name == "basis")
     text = pdf.page_text(replace(made, sections=(basis,), annex=()), {})
     limits = {
-        each.topic: each.speed for each in limits_of_organs(study.drive.machine, study.config.feed, ["N.m"])
+        each.topic: each.speed
+        for each in limits_of_organs(study.setup.drive.machine, study.setup.config.feed, ["N.m"])
     }
     shown = dict(re.findall(r'data-path="findings.organs.limits.(\w+)" value="([^"]+)"', text))
     assert float(shown["crank_torque_speed"]) == limits["crank torque"]
     assert float(shown["rocker_torque_speed"]) == limits["rocker torque"] < limits["crank torque"]
     assert float(shown["slack_speed"]) == limits["slack speed"]
-    chain = replace(study, verdict=replace(study.verdict, model="chains"))
+    chain = changed(study, verdict=replace(study.findings.verdict, model="chains"))
     report = report_of(chain)
     assert "No highest speed was computed" in pdf.page_text(sheet(chain, report), {})
 
@@ -126,8 +128,8 @@ def test_it_names_each_pin_whose_bearing_was_not_checked(made):
 
 
 def test_without_sizing_it_says_that_no_drive_was_chosen_and_without_order_numbers(study):
-    plans = {**study.config.plans, "sizing": None}
-    without = replace(study, config=replace(study.config, plans=plans))
+    plans = {**study.setup.config.plans, "sizing": None}
+    without = changed(study, config=replace(study.setup.config, plans=plans))
     made = sheet(without, report_of(without))
     (section,) = (each for each in made.sections if each.name == "unchecked")
     text = pdf.page_text(replace(made, sections=(section,), annex=()), {})
@@ -216,7 +218,7 @@ def test_each_check_of_the_sheet_names_its_clause_and_formula(study, made):
 def test_things_that_were_not_checked_for_one_reason_share_a_line(study, made):
     (section,) = (each for each in made.sections if each.name == "unchecked")
     text = re.sub(r"<[^>]+>", "", pdf.page_text(replace(made, sections=(section,), annex=()), {}))
-    missing = [each for each in study.findings["checks"].not_checked if not each.table]
+    missing = [each for each in study.findings.by_analysis["checks"].not_checked if not each.table]
     assert missing and all(each.what in text and text.count(each.why) == 1 for each in missing)
 
 
@@ -387,6 +389,6 @@ def test_the_sheet_of_each_machine_has_at_most_four_pages_with_readable_letters(
         page.extract_text(visitor_text=note)
     assert small and all(each in drawn for each in small)
     if name in ("heavy_mill", "knife"):
-        pins = turning_pins(study.drive.machine.model)
+        pins = turning_pins(study.setup.drive.machine.model)
         words = " ".join(" ".join(pages[: annex + 1]).split())
         assert len(pins) > 8 and all(f"{pin}:" in words for pin in pins)

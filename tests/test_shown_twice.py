@@ -145,16 +145,18 @@ def test_one_screen_has_the_answer_and_one_table(study, report):
         assert verdict[each] is None or verdict[each]["text"] in text
     assert sum("┏" in line for line in lines) == 1
     # the worst overload is the one with the largest crank torque, and stands there with its title
-    peaks = {run: abs(report.result["answers"][run]["crank_torque_peak"]["value"]) for run in study.overloads}
+    peaks = {
+        run: abs(report.result["answers"][run]["crank_torque_peak"]["value"]) for run in study.runs.overloads
+    }
     if peaks:
-        assert study.title_of(max(peaks, key=peaks.get)) in text
+        assert study.runs.title_of(max(peaks, key=peaks.get)) in text
     assert ("Motor: " in text or "Insufficient motor: " in text) == ("sizing" in report.result)
 
 
 def test_the_sized_drive_is_said_first_everywhere_in_one_sentence(study, report):
     """It stood on the terminal alone, below the verdicts."""
     sentence = report.result.get("sentence")
-    assert (sentence is not None) == (study.proposal is not None)
+    assert (sentence is not None) == (study.setup.proposal is not None)
     if sentence is None:
         return
     assert list(report.result).index("sentence") < list(report.result).index("verdict")
@@ -176,8 +178,8 @@ def rows_of(result):
 def test_a_quantity_has_one_value(study, report):
     """A start and a steady turn are run by several analyses: they take them from the same runs."""
     values = defaultdict(dict)
-    plan = study.config.plans["checks"]
-    factor = 3.0**0.5 if study.drive.star_delta is not None and plan.relay_in_phases else 1.0
+    plan = study.setup.config.plans["checks"]
+    factor = 3.0**0.5 if study.setup.drive.star_delta is not None and plan.relay_in_phases else 1.0
     for whole, value in leaves(report.result):
         place = whole.removeprefix("given.").removeprefix("runs.").removeprefix("findings.")
         if value is not None and re.fullmatch(IN_PHASES, place):
@@ -228,8 +230,8 @@ def test_a_torque_of_the_gear_has_one_verdict(study, report):
     """A torque of running is judged by the rating times its factor, a shock by the peak factor, everywhere."""
     result = report.result
     limits = {row["title"]: row["limit"]["value"] for row in rows_of(result) if row["of"] == "gear"}
-    if "gear.torque_limit" in study.config.drive.given and "torque of running" in limits:
-        gear = study.config.drive.gear
+    if "gear.torque_limit" in study.setup.config.drive.given and "torque of running" in limits:
+        gear = study.setup.config.drive.gear
         assert limits["torque of running"] == gear.torque_limit
         (largest,) = (x for title, x in limits.items() if title.startswith("largest torque"))
         assert largest == gear.start_limit == result["starts"]["limit"]["value"]
@@ -257,7 +259,7 @@ def test_the_relay_is_of_one_class_and_its_checks_have_numbers(report):
 
 def test_a_heading_names_the_speed_that_was_run(study, report):
     """Above values of steady running stands their mean speed, not the one asked for."""
-    mean = study.answers["steady"].speed_mean
+    mean = study.runs.answers["steady"].speed_mean
     shown = number(mean, "rad/s", "speed", beside=False)
     (table,) = (
         block
@@ -280,9 +282,9 @@ def paths_of(block):
 
 
 def test_peak_and_rms_of_an_event_are_of_the_same_time(study):
-    for name in study.overloads:
-        run = study.runs[name].sel(time=slice(study.event[name], None))
-        answers = study.answers[name]
+    for name in study.runs.overloads:
+        run = study.runs.series[name].sel(time=slice(study.runs.event_times[name], None))
+        answers = study.runs.answers[name]
         torque = run["motor.air_gap_tau"].values
         time = run["time"].values
         mean_square = ((torque[1:] ** 2 + torque[:-1] ** 2) / 2.0 * (time[1:] - time[:-1])).sum()

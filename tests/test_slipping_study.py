@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from records import like
 from scipy.optimize import brentq
 
 from chainunit import InputError
@@ -31,7 +32,6 @@ from chainunit.study import readings
 from chainunit.study.analyses import GearAnalysis
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
-from chainunit.study.coupling import at_motor_shaft
 from chainunit.study.permitted_starts import starting_data
 from chainunit.study.rig import Rig
 from chainunit.study.torques import on_coupling
@@ -124,7 +124,7 @@ def test_the_loss_of_a_gear_behind_a_belt_counts_once():
     crank = (2.0 - bend) * belt.ratio * 0.7
     run = columns([0.0, 1.0], motor_tau=[1.0, 2.0])
     assert bend > 0.05 and on_coupling(belt, run) == pytest.approx(crank, rel=1e-12)
-    assert at_motor_shaft(SimpleNamespace(drive=belt), crank) == pytest.approx(2.0, rel=1e-12)
+    assert belt.at_motor_shaft(crank) == pytest.approx(2.0, rel=1e-12)
     # the belt takes its load from the same shaft
     config = parse(MILL + WORM + f"[belt]\nratio = 4\n[coupling]\ntrip_torque = {crank}\n")
     guards = Rig(config.operation, drive_of(config), None).guards
@@ -132,7 +132,7 @@ def test_the_loss_of_a_gear_behind_a_belt_counts_once():
     # without a part that slips the motor's torque is the one behind the loss
     bare = drive(WORM)
     assert on_coupling(bare, run) == 2.0 * bare.ratio
-    assert at_motor_shaft(SimpleNamespace(drive=bare), 2.0 * bare.ratio) == pytest.approx(2.0 / 0.7)
+    assert bare.at_motor_shaft(2.0 * bare.ratio) == pytest.approx(2.0 / 0.7)
 
 
 def test_the_largest_torque_at_the_crank_is_without_the_bending_of_the_belt(monkeypatch):
@@ -215,10 +215,10 @@ def test_the_drag_of_a_gear_behind_a_belt_is_that_at_the_driven_speed():
 
     def without_load(turning):
         window = SimpleNamespace(mean=lambda reading: float(np.mean(reading(turning, run))), warm=300.0)
-        study = SimpleNamespace(
+        study = like(
             drive=turning,
             steady=run,
-            findings={},
+            by_analysis={},
             answers={STEADY: SimpleNamespace(power_mean=200.0)},
             window=lambda *args: window,
         )

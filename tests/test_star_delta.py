@@ -110,7 +110,7 @@ def test_a_dc_motor_has_no_contactor(tmp_path):
     study = run_study(
         parse('[run]\nturns = 1\nsettle_turns = 0\n[[event]]\ntype = "interruption"\n'), tmp_path
     )
-    assert "interruption" not in study.answers
+    assert "interruption" not in study.runs.answers
     assert "this motor's drive has no contactor on the line" in json.dumps(said_of(study))
 
 
@@ -195,8 +195,8 @@ def test_a_motor_on_an_inverter_is_not_cut_off(tmp_path):
     """The model has neither the current limit of an inverter nor its search for the speed of the motor, so that a
     reclosing behind it would be that of a line."""
     study = run_study(parse(STUDY.replace('"star-delta"', '"inverter"')), tmp_path)
-    assert study.failure is None and "interruption" not in study.answers
-    (left_out,) = [remark for remark in study.remarks if remark.code == "event-left-out"]
+    assert study.findings.failure is None and "interruption" not in study.runs.answers
+    (left_out,) = [remark for remark in study.findings.remarks if remark.code == "event-left-out"]
     assert "no contactor on the line" in left_out.text
 
 
@@ -220,18 +220,19 @@ def test_a_motor_that_is_cut_off_is_asked_for_no_torque():
 
 def test_a_study_tells_of_both(tmp_path):
     study = run_study(parse(STUDY), tmp_path)
-    assert study.failure is None
+    assert study.findings.failure is None
     write(study, tmp_path)
     result = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     assert result["start"] == "star-delta" and "interruption" in result["answers"]
     certificate = result["certificate"]["interruption"]["energy_residual_share"]["value"]
     assert certificate < 1e-4
-    answer = study.answers["interruption"]
-    assert answer.current_peak > 3.0 * study.answers["steady"].current_peak
+    answer = study.runs.answers["interruption"]
+    assert answer.current_peak > 3.0 * study.runs.answers["steady"].current_peak
     assert answer.speed_dip > 0.02 and answer.recovery_time < 2.0
     assert "the motor is cut off and reclosed" in (tmp_path / "result.md").read_text()
-    assert study.start.current_peak == pytest.approx(
-        max(study.start.current_peak, *(s.current for s in study.findings["starts"].starts)), rel=0.3
+    assert study.runs.start.current_peak == pytest.approx(
+        max(study.runs.start.current_peak, *(s.current for s in study.findings.by_analysis["starts"].starts)),
+        rel=0.3,
     )
 
 
@@ -240,7 +241,7 @@ def test_sizing_with_a_star_delta_starter(tmp_path):
     head = 'start = "star-delta"\n[run]\ncrank_speed = "30 rev/min"\nturns = 1\n[sizing]\ncandidates = 1\n'
     study = run_study(parse(head + STARTER), tmp_path)
     write(study, tmp_path)
-    assert study.failure is None
+    assert study.findings.failure is None
     result = ResultEntries(json.loads((tmp_path / "result.json").read_text()))
     best = result["sizing"]["candidates"][0]
     assert best["checks"]["start"]["value"]["value"] > 0.0

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from records import like
 from typer.testing import CliRunner
 
 from chainunit.app import cli
@@ -65,20 +66,20 @@ def pump(tmp_path_factory):
 def test_the_worst_start_is_named_with_its_angle(pump):
     """The start puts more on the gear than running does, and the worst is that of all angles; the electromagnetic
     transient, by which the gear was ordered, stands beside it."""
-    assert pump.failure is None
-    found = pump.findings["starts"]
+    assert pump.findings.failure is None
+    found = pump.findings.by_analysis["starts"]
     peaks = [start.quasi_static for start in found.starts]
     assert len(peaks) == START_ANGLES and found.worst.quasi_static == max(peaks) > 1.02 * min(peaks)
-    assert found.starts[0].gear_torque == pytest.approx(pump.start.crank_torque_peak, rel=1e-6)
-    steady = pump.answers["steady"].crank_torque_peak
+    assert found.starts[0].gear_torque == pytest.approx(pump.runs.start.crank_torque_peak, rel=1e-6)
+    steady = pump.runs.answers["steady"].crank_torque_peak
     assert found.running == pytest.approx(steady) and found.worst.quasi_static < 2.0 * steady
     assert found.transient == max(start.gear_torque for start in found.starts) > 2.0 * steady
-    assert not [each for each in pump.warnings if each.code.startswith("start-at-gear")]
+    assert not [each for each in pump.findings.warnings if each.code.startswith("start-at-gear")]
     hard, warned = dataclasses.replace(found, running=0.4 * found.worst.quasi_static), []
-    study = SimpleNamespace(
-        config=pump.config,
-        drive=pump.drive,
-        title_of=pump.title_of,
+    study = like(
+        config=pump.setup.config,
+        drive=pump.setup.drive,
+        title_of=pump.runs.title_of,
         say=lambda code, *runs, **values: warned.append(values),
     )
     hard.remark(study)
@@ -110,10 +111,10 @@ def test_a_start_of_a_wheel_by_hand(tmp_path):
 @pytest.mark.second
 def test_a_start_from_an_angle_by_the_compiled_system(pump):
     """The same start by another route: one system with the motor's shaft at that angle, without FMUs."""
-    worst, drive = pump.findings["starts"].worst, pump.drive
+    worst, drive = pump.findings.by_analysis["starts"].worst, pump.setup.drive
     p = dataclasses.replace(drive.parameters, phi_start=worst.angle * drive.ratio)
     turned = dataclasses.replace(drive, parameters=p)
-    with Rig(pump.config.operation, turned, None).from_rest() as simulation:
+    with Rig(pump.setup.config.operation, turned, None).from_rest() as simulation:
         run = simulation.run(worst.start_time + 0.25, 1e-3)
     assert float(crank_angle(drive, run)[0]) == pytest.approx(worst.angle)
     inertia, rotor = run["machine.J"].values, drive.fmu_parameters.rotor
@@ -165,7 +166,7 @@ def test_the_inverter_is_ordered_by_all_starts_and_events():
             StartNumbers(**NONE | {"angle": 0.1 * k, "current": 6.0 * x, "long_current": 0.0})
             for k, x in enumerate(peaks)
         )
-        return SimpleNamespace(
+        record = like(
             drive=SimpleNamespace(rated_current=6.0),
             config=SimpleNamespace(drive=SimpleNamespace(start="inverter", starter=Starter())),
             start=SimpleNamespace(current_peak=11.8),
@@ -173,13 +174,14 @@ def test_the_inverter_is_ordered_by_all_starts_and_events():
                 "steady": SimpleNamespace(current_peak=9.0, current_rms=4.0),
                 "surge": SimpleNamespace(current_peak=6.0 * event),
             },
-            findings={
+            by_analysis={
                 "starts": StartFindings(starts, 1.0, math.inf, "steady"),
             },
-            currents_until_trip=dict(until_trip),
             proposal=proposal,
             title_of=lambda name: name,
         )
+        record.currents_until_trip = dict(until_trip)
+        return record
 
     need = inverter_need(study((1.9, 3.95), 2.3))
     assert need.current == pytest.approx(15.8) and need.case == "a start from 5.73 deg"
@@ -210,13 +212,15 @@ def test_each_current_may_decide_on_the_inverter(values, case, current):
 @pytest.mark.parametrize(("factor", "passed"), [(1.0, True), (9.0, False)])
 def test_the_gear_has_a_limit_of_its_own_in_a_start(pump, factor, passed):
     """gear.start_factor times gear.torque_limit; the study warns where a start passes it."""
-    limit = 1.2 * pump.answers["steady"].crank_torque_peak
+    limit = 1.2 * pump.runs.answers["steady"].crank_torque_peak
     text = f"torque_limit = {limit}\nstart_factor = {factor}\n"
     given = config.parse(PUMP + text)
     assert given.drive.gear.start_limit == pytest.approx(factor * limit)
-    found = dataclasses.replace(pump.findings["starts"], limit=given.drive.gear.start_limit)
-    said = SimpleNamespace(
-        config=given, drive=pump.drive, say=lambda code, *runs, **values: kinds.append((code.code, values))
+    found = dataclasses.replace(pump.findings.by_analysis["starts"], limit=given.drive.gear.start_limit)
+    said = like(
+        config=given,
+        drive=pump.setup.drive,
+        say=lambda code, *runs, **values: kinds.append((code.code, values)),
     )
     kinds: list[tuple[str, dict]] = []
     found.remark(said)
@@ -271,10 +275,10 @@ def test_a_setting_at_the_ram_by_hand():
     machine = machine_of(read_linkage(LINKAGES / "slider_crank_press.toml"))
     speed = 2.0 * math.pi
     turn = cycle(machine, speed, machine.model.Feed(), 3600)
-    study = SimpleNamespace(
+    study = like(
         drive=SimpleNamespace(machine=machine),
         config=SimpleNamespace(run=SimpleNamespace(crank_speed=speed)),
-        findings={TurnAnalysis.name: TurnFindings(turn, turn, None, None, {})},
+        by_analysis={TurnAnalysis.name: TurnFindings(turn, turn, None, None, {})},
     )
     (ram,) = rams(study)
     r, rod, offset = 0.08, 0.36, 0.025
@@ -333,13 +337,13 @@ def test_a_large_motor_has_the_boost_of_its_stator_and_does_not_hunt(tmp_path):
     hunting = run_study(
         config.parse(f"{TRIPLEX}[starter.inverter]\nboost = 0.05\n", source), tmp_path / "hunting"
     )
-    codes = [{remark.code for remark in study.warnings} for study in (quiet, hunting)]
+    codes = [{remark.code for remark in study.findings.warnings} for study in (quiet, hunting)]
     assert "start-hunts" not in codes[0] and "start-hunts" in codes[1]
-    (said,) = [remark for remark in hunting.warnings if remark.code == "start-hunts"]
-    run = hunting.runs["start_up"]["motor.w"].values
+    (said,) = [remark for remark in hunting.findings.warnings if remark.code == "start-hunts"]
+    run = hunting.runs.series["start_up"]["motor.w"].values
     assert said.quantities["backwards"].value >= -np.min(run) / plate.synchronous > 0.05
     assert "to 2.70 % for this motor" in said.remedy and p.inverter.boost == 0.027
-    starts = [study.findings["starts"].starts for study in (quiet, hunting)]
+    starts = [study.findings.by_analysis["starts"].starts for study in (quiet, hunting)]
     assert max(start.backwards for start in starts[0]) == 0.0
     assert max(start.current for start in starts[0]) < 0.6 * max(start.current for start in starts[1])
 

@@ -17,7 +17,7 @@ from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult
 from chainunit.app import studies
 from chainunit.core.files import LIST, FileList, claim
 from chainunit.reading.result_entries import ResultEntries
-from chainunit.study.record import StudyRecord
+from chainunit.study.record import StudySetup
 
 pytestmark = pytest.mark.second
 
@@ -144,7 +144,7 @@ def test_verdict_warnings_and_notes_are_texts(result, monkeypatch):
     assert "Model of the organs, two bars" in result.verdict and "not valid" in result.verdict
     assert result.warnings == [each["text"] for each in numbers["warnings"]] and len(result.warnings) >= 2
     assert any("Static friction is not modelled" in note for note in result.notes)
-    monkeypatch.setattr(StudyRecord, "insufficient", "All runs are with one which is insufficient.")
+    monkeypatch.setattr(StudySetup, "insufficient", "All runs are with one which is insufficient.")
     assert result.verdict.endswith("which is insufficient.")
 
 

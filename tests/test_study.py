@@ -170,25 +170,25 @@ def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
     from chainunit.study.run import run_study
 
     study = run_study(config.parse(event_line("blocked", turns=1) + BLOCKED), tmp_path, check=True)
-    assert study.failure is None
-    result, stop = study.spreads["blocked"], study.config.events["blocked"].p
+    assert study.findings.failure is None
+    result, stop = study.runs.spreads["blocked"], study.setup.config.events["blocked"].p
     soft, stiff = result.ranges["stiffness"]
     assert stiff == pytest.approx(10.0 * soft) and soft < stop.stiffness < stiff
     low, high = result.peaks["crank_torque"]
-    assert low < study.answers["blocked"].crank_torque_peak < high
+    assert low < study.runs.answers["blocked"].crank_torque_peak < high
     damping = stop.damping * (stiff / stop.stiffness) ** 0.5
     assert result.ranges["damping"][1] == pytest.approx(damping)
     line = event_line("blocked", turns=1, stiffness=stiff, damping=damping)
     other = run_study(config.parse(line + BLOCKED), tmp_path)
     for name in ("crank_torque", "motor_torque", "rocker_torque"):
-        peak = getattr(other.answers["blocked"], f"{name}_peak")
+        peak = getattr(other.runs.answers["blocked"], f"{name}_peak")
         assert peak == pytest.approx(result.peaks[name][1], rel=1e-6)
-    (note,) = (note for note in study.notes if note.code == "assumption")
+    (note,) = (note for note in study.findings.notes if note.code == "assumption")
     assert note.runs == ("blocked",)
     assert "are assumed and decide the peak" in note.text and "distance from the pivot C" in note.text
     peaks = as_dict(study)["block_peaks"]["blocked"]
     assert peaks["crank_torque_low"]["unit"] == "N.m" and peaks["stiffness_high"]["value"] == stiff
-    certificate = study.certificate["blocked"]
+    certificate = study.runs.certificate["blocked"]
     assert 0.0 < certificate["motor.w_difference_to_monolithic"] < 1e-3
     assert 0.0 < certificate["machine.tau_difference_to_monolithic"] < 1e-2
     # the power that the stop takes jumps where it comes; a rule that smears that over a step loses 1e-3
@@ -256,7 +256,11 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Instance, "step", fails_late)
     study = run_study(config.parse(SHORT), tmp_path)
-    assert "it broke" in str(study.failure) and "start_up" in study.runs and "unfinished" in study.runs
+    assert (
+        "it broke" in str(study.findings.failure)
+        and "start_up" in study.runs.series
+        and "unfinished" in study.runs.series
+    )
     write(study, tmp_path)
     assert ResultEntries(json.loads((tmp_path / "result.json").read_text()))["status"].startswith(
         "failed: motor: step"
@@ -563,7 +567,7 @@ def ran(text, folder):
 def test_the_load_cycle_is_whole_turns_that_the_numbers_follow_from(text, turns, tmp_path):
     study, numbers = ran(text, tmp_path)
     time, speed, torque, inertia = np.loadtxt(tmp_path / "load_cycle.csv", delimiter=",", skiprows=1).T
-    ratio, steady = study.drive.ratio, {n: e["value"] for n, e in numbers["answers"]["steady"].items()}
+    ratio, steady = study.setup.drive.ratio, {n: e["value"] for n, e in numbers["answers"]["steady"].items()}
     whole = time[-1]
     assert time[0] == 0.0
     assert np.trapezoid(speed, time) == pytest.approx(2.0 * math.pi * ratio * turns, rel=1e-6)
@@ -579,8 +583,10 @@ def test_the_load_cycle_is_whole_turns_that_the_numbers_follow_from(text, turns,
     assert rms == pytest.approx(steady["crank_torque_rms"], rel=1e-6)
     assert np.max(np.abs(torque)) * ratio == pytest.approx(steady["crank_torque_peak"], rel=1e-8)
     # what friction and the processing force take, by inverse dynamics at the mean speed
-    ideal = study.statics.cycles["both sides"].crank_torque
-    assert steady["power_mean"] == pytest.approx(np.mean(ideal) * study.config.run.crank_speed, rel=0.02)
+    ideal = study.setup.statics.cycles["both sides"].crank_torque
+    assert steady["power_mean"] == pytest.approx(
+        np.mean(ideal) * study.setup.config.run.crank_speed, rel=0.02
+    )
 
 
 @pytest.mark.second
@@ -590,7 +596,7 @@ def test_a_slow_motor_still_makes_its_turns(tmp_path):
     steady = numbers["answers"]["steady"]
     assert steady["speed_mean"]["value"] < 0.7 * 6.0
     time, speed = np.loadtxt(tmp_path / "load_cycle.csv", delimiter=",", skiprows=1).T[:2]
-    assert np.trapezoid(speed, time) == pytest.approx(4.0 * math.pi * study.drive.ratio, rel=1e-6)
+    assert np.trapezoid(speed, time) == pytest.approx(4.0 * math.pi * study.setup.drive.ratio, rel=1e-6)
 
 
 def test_whole_turns_of_whole_turns_are_the_same():
@@ -621,9 +627,9 @@ UNSETTLED = LIGHT + "settle_turns = 0\nramp = 0.01\n"
 def test_the_study_waits_until_the_turns_close(tmp_path):
     """The crank still starts in the first turn; the one that is evaluated is a later one."""
     study, _ = ran(UNSETTLED, tmp_path)
-    assert study.steady_begin > study.config.operation.steady_begin + 1.5
-    assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
-    assert not any(warning.code == "turns-do-not-close" for warning in study.warnings)
+    assert study.runs.steady_begin > study.setup.config.operation.steady_begin + 1.5
+    assert study.runs.answers["steady"].cycle_gap < 0.01 and study.runs.answers["steady"].speed_ripple < 0.05
+    assert not any(warning.code == "turns-do-not-close" for warning in study.findings.warnings)
 
 
 @pytest.mark.second
@@ -640,7 +646,7 @@ def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkey
     monkeypatch.setattr(start_up, "PATIENCE", 0.0)
     monkeypatch.setattr(start_up, "_SETTLES", 0.0)
     study, _ = ran(text, tmp_path)
-    assert any(warning.code == told for warning in study.warnings)
+    assert any(warning.code == told for warning in study.findings.warnings)
     assert (tmp_path / "load_cycle.csv").exists() == there
 
 
@@ -650,13 +656,13 @@ def test_the_winding_temperature_is_that_of_the_duty_for_ever(tmp_path):
     settings = "[motor]\narmature = {{ R = 9.5, L = 0.11, k = 1.27, R_th = 9, C = {} }}\n"
     slow, numbers = ran(LIGHT + settings.format(2000), tmp_path)
     warm = numbers["answers"]["steady"]["winding_temperature"]["value"]
-    end = float(slow.runs["start_up"]["motor.armature.T"][-1])
+    end = float(slow.runs.series["start_up"]["motor.armature.T"][-1])
     assert end < 294.0 and warm > end + 20.0
     quick, _ = ran(LIGHT + "settle_turns = 15\n" + settings.format(0.5), tmp_path)
-    turns = quick.steady
+    turns = quick.runs.steady
     mean = np.trapezoid(turns["motor.armature.T"], turns["time"]) / np.ptp(turns["time"].values)
     assert mean == pytest.approx(warm, abs=0.2)
-    assert quick.answers["steady"].winding_temperature == pytest.approx(mean, abs=0.2)
+    assert quick.runs.answers["steady"].winding_temperature == pytest.approx(mean, abs=0.2)
 
 
 def test_each_overload_has_its_mirror_on_the_other_side():
@@ -698,11 +704,11 @@ def test_each_overload_has_its_mirror_on_the_other_side():
 def test_both_sides_are_run_and_differ(tmp_path):
     """The rocker swings 9.06 deg to the right and 8.19 deg to the left."""
     study, numbers = ran(LIGHT.replace("event = []\n", event_line(*STANDARD, turns=1)), tmp_path)
-    assert set(numbers["answers"]) == {"steady", *study.config.events}
+    assert set(numbers["answers"]) == {"steady", *study.setup.config.events}
     peaks = {n: a["crank_torque_peak"]["value"] for n, a in numbers["answers"].items()}
     assert peaks["jam_left"] > 1.05 * peaks["jam_right"] > 1.05 * peaks["steady"]
     assert peaks["feed_left"] != pytest.approx(peaks["feed_right"], rel=0.05)
-    left, right = (study.runs[name] for name in ("right_empties", "left_empties"))
+    left, right = (study.runs.series[name] for name in ("right_empties", "left_empties"))
     assert (
         float(left["machine.right.material_mass"][-1])
         == float(right["machine.left.material_mass"][-1])
@@ -767,10 +773,12 @@ settle_turns = 2
 
     for name in ("chains", "bars"):
         study = run_study(config.parse(text), tmp_path / name)
-        assert study.failure is None
-        ripples.append(study.answers["steady"].speed_ripple)
-        kinds = {part: c.model.name for part, c in study.drive.graph.components.items()}
+        assert study.findings.failure is None
+        ripples.append(study.runs.answers["steady"].speed_ripple)
+        kinds = {part: c.model.name for part, c in study.setup.drive.graph.components.items()}
         model = "ChainUnitFlexible" if name == "chains" else "ChamberForces"
         assert (kinds["machine"], kinds["model"]) == ("ChainUnitFlexible", model)
         monkeypatch.setattr(Drive, "graph", property(bars))
-    assert ripples[0] < 0.4 * ripples[1] < 0.2 * study.findings["ripple_without_feed_forward"].ripple
+    assert (
+        ripples[0] < 0.4 * ripples[1] < 0.2 * study.findings.by_analysis["ripple_without_feed_forward"].ripple
+    )

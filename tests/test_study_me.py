@@ -40,7 +40,7 @@ def studies(tmp_path_factory):
     for name, (simulation, step) in WAYS.items():
         values = config.parse(TEXT.format(simulation=simulation, step=step, trip=TRIP))
         studies[name] = run_study(values, tmp_path_factory.mktemp(name), check=True)
-        assert studies[name].failure is None
+        assert studies[name].findings.failure is None
     return studies
 
 
@@ -48,7 +48,9 @@ def studies(tmp_path_factory):
 @pytest.mark.parametrize("run", ["start_up", "jam_left", "blocked"])
 @pytest.mark.parametrize("of", ["machine.tau", "motor.w"])
 def test_me_is_near_the_equations_and_cs_comes_nearer_as_the_step_shrinks(of, run, studies):
-    off = {name: study.certificate[run][f"{of}_difference_to_monolithic"] for name, study in studies.items()}
+    off = {
+        name: study.runs.certificate[run][f"{of}_difference_to_monolithic"] for name, study in studies.items()
+    }
     assert off["me"] < 1e-6
     if run != "jam_left":
         # in the jam the difference is that of the start-up before it
@@ -61,19 +63,19 @@ def test_answers_agree(studies):
     """Events that open no coupling: each run starts from the saved state."""
     for run in ("steady", "jam_left"):
         for name in ("crank_torque_peak", "crank_torque_rms", "speed_mean", "speed_least", "current_rms"):
-            me, fine = (getattr(studies[way].answers[run], name) for way in ("me", "fine"))
+            me, fine = (getattr(studies[way].runs.answers[run], name) for way in ("me", "fine"))
             assert fine == pytest.approx(me, rel=1e-3), (run, name)
 
 
 @pytest.mark.slow
 def test_the_coupling_opens_at_the_instant_at_which_its_torque_is_reached(studies):
     """In co-simulation the coupling opens at the end of the step in which the torque is reached."""
-    limit = TRIP / studies["me"].drive.ratio
+    limit = TRIP / studies["me"].setup.drive.ratio
     times = {}
     for name, study in studies.items():
-        run, answers = study.runs["blocked"], study.answers["blocked"]
+        run, answers = study.runs.series["blocked"], study.runs.answers["blocked"]
         times[name] = answers.coupling_trip_time
-        at = study.event["blocked"] + times[name]
+        at = study.runs.event_times["blocked"] + times[name]
         before = run.sel(time=slice(None, at + 1e-9))
         torque = abs(before["motor.tau"].values)
         assert np.all(torque[:-1] < limit) and torque[-1] >= limit
@@ -81,7 +83,7 @@ def test_the_coupling_opens_at_the_instant_at_which_its_torque_is_reached(studie
             assert torque[-1] == pytest.approx(limit, rel=1e-9)
     for name in ("coarse", "fine"):
         assert 0.0 <= times[name] - times["me"] < WAYS[name][1] + 1e-3
-    coasting = studies["me"].runs["blocked_coasting"]
+    coasting = studies["me"].runs.series["blocked_coasting"]
     assert float(coasting["machine.w"][0]) == pytest.approx(
         float(studies["me"].runs["blocked"]["machine.w0"][-1])
     )
@@ -113,9 +115,12 @@ side = "right"
 turns = 1
 """
     study = run_study(config.parse(text), tmp_path, check=True)
-    assert study.failure is None and shaft_findings(study).answers["jam_right"].amplification > 0.0
+    assert (
+        study.findings.failure is None
+        and shaft_findings(study.findings).answers["jam_right"].amplification > 0.0
+    )
     for run in ("start_up", "jam_right"):
-        shares = study.certificate[run]
+        shares = study.runs.certificate[run]
         assert shares["machine.tau_difference_to_monolithic"] < 1e-4
         assert shares["driveline_energy_residual_share"] < 1e-3
 

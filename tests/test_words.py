@@ -61,7 +61,7 @@ trip_torque = 300
 {UNITS}"""
     )
     study = run_study(parse(text.replace("\n    ", "\n")), tmp_path)
-    assert study.failure is None
+    assert study.findings.failure is None
     message = list(sentences(study))
     assert any("44.9 rev/min" in words for words in message[:2]) and any(
         "0.300 kN m" in each for each in message
@@ -113,8 +113,8 @@ step = "2 ms"
 def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
     event = event_line("overload", turns=1)
     study = run_study(parse(f"{event}{ROTOR}[machine]\npin = {{ friction = {friction} }}\n"), tmp_path)
-    assert study.failure is None
-    kinds = {note.code for note in study.notes}
+    assert study.findings.failure is None
+    kinds = {note.code for note in study.findings.notes}
     assert ("smoothed-friction" in kinds) is (friction > 0.0)
     # nor has it a crank
     text = said_of(study) + markdown(report_of(study), [])
@@ -145,7 +145,7 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
 def test_decisive_values_that_the_file_leaves_out_are_named_once(text, said, tmp_path):
     event = event_line("dip" if "Knife" in text else "jam_left", turns=1)
     study = run_study(parse(event + text + SHORT), tmp_path)
-    words = [note.text for note in study.notes if note.code == "values-left-out"]
+    words = [note.text for note in study.findings.notes if note.code == "values-left-out"]
     assert len(words) == (1 if said else 0)
     if said:
         assert words[0].startswith(said) and said_of(study).count("The file leaves out") == 1

@@ -377,11 +377,11 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
 
         record = self.record
         runs: dict[str, tuple[Any, set[str]]] = {
-            name: (answers, set(Layout(Answers).names)) for name, answers in record.answers.items()
+            name: (answers, set(Layout(Answers).names)) for name, answers in record.runs.answers.items()
         }
         for name, phase, begin in (
-            ("settling", Phase.SETTLING, record.settling),
-            ("start_up", Phase.START_UP, record.start),
+            ("settling", Phase.SETTLING, record.runs.settling),
+            ("start_up", Phase.START_UP, record.runs.start),
         ):
             if begin is not None:
                 runs = {name: (begin, {v.name for v in measures_of(phase)}), **runs}
@@ -398,7 +398,8 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         units in ``attrs``; ``runs["steady"]`` has the turns in steady running. The file result.nc holds the
         runs."""
         runs = {name: node.to_dataset() for name, node in series.tree(self.record).children.items()}
-        return Named(runs | ({"steady": self.record.steady} if "steady" in self.record.answers else {}))
+        ran = self.record.runs
+        return Named(runs | ({"steady": ran.steady} if "steady" in ran.answers else {}))
 
     @property
     def verdict(self) -> str:
@@ -406,7 +407,7 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         the choice of the drive."""
         verdicts = self._numbers["verdict"].values()
         lines = [verdict["text"] for verdict in verdicts if verdict is not None]
-        return "\n".join([*lines, self.record.insufficient]).rstrip()
+        return "\n".join([*lines, self.record.setup.insufficient]).rstrip()
 
 
 def _as_words(progress: TaskProgress) -> Callable[[str], None]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.descriptions import of_driver
 from ..reading.text import number as number_words
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudySetup
 from ..study.starts import StartFindings, transient_words
 from ..study.torques import running_words
 from ..study.turn import TurnFindings
@@ -26,10 +26,10 @@ from .lines import filled
 _TURN_PICTURE = "turn.png"
 
 
-def angle_axis(study: StudyRecord) -> fig.Axis:
+def angle_axis(setup: StudySetup) -> fig.Axis:
     """The axis of the crank angle over a turn."""
-    counts = study.drive.machine.model.angle_counts
-    return fig.Axis(f"{study.driver_noun} angle {counts}", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
+    counts = setup.drive.machine.model.angle_counts
+    return fig.Axis(f"{setup.driver_noun} angle {counts}", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
 
 
 def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
@@ -43,14 +43,14 @@ def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
 
 def _turn(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
-    turn = TurnFindings.of_study(study)
-    bars = f", of {substitute}" if (substitute := study.drive.machine.in_place) else ""
+    setup, turn = study.setup, TurnFindings.of_study(study.findings)
+    bars = f", of {substitute}" if (substitute := setup.drive.machine.in_place) else ""
     lead = filled(
-        f"Inverse dynamics at {{}} of the {study.driver_noun}, without a motor{bars}.", asked_speed(study)
+        f"Inverse dynamics at {{}} of the {setup.driver_noun}, without a motor{bars}.", asked_speed(setup)
     )
     yield b.Text(lead, "lead", "long")
     x = cited(turn, "findings.constant_speed")
-    rows = quantity_rows(x.numbers, study.driver_noun, none="none")
+    rows = quantity_rows(x.numbers, setup.driver_noun, none="none")
     yield b.Table(rows, title=f"A turn at constant speed{bars}", form="long")
     if turn.pins:
         yield from table(
@@ -63,7 +63,7 @@ def _turn(study: StudyRecord) -> Iterator[b.Block]:
             title=f"Largest forces in the pins over a turn at constant speed{bars}",
             form="long",
         )
-    yield _turn_figure(turn, angle_axis(study), bars, study.driver_noun)
+    yield _turn_figure(turn, angle_axis(setup), bars, setup.driver_noun)
 
 
 def _turn_figure(turn: TurnFindings, angle: fig.Axis, bars: str, driver: str) -> fig.Figure:
@@ -102,34 +102,34 @@ def _reactions(turn: TurnFindings) -> fig.Panel:
 
 def _starts(study: StudyRecord) -> Iterator[b.Block]:
     """The worst start in a sentence, and a table of all starts."""
-    findings = StartFindings.found_in(study)
+    setup, findings = study.setup, StartFindings.found_in(study.findings)
     if findings is None:
         return
-    place = "output of the gear" if study.drive.is_geared else study.driver_noun
+    place = "output of the gear" if setup.drive.is_geared else setup.driver_noun
     x = cited(findings, "findings.starts")
     worst = of_driver(
         f"Start: load and acceleration load the {place} with up to {{}}, from {{a driver}} angle of {{}}: {{}} times "
         "{}, {}.",
-        study.driver_noun,
+        setup.driver_noun,
     )
-    running = running_words(study, findings.running_in), number(x.running)
+    running = running_words(study.runs, findings.running_in), number(x.running)
     sizes = number(x.worst.quasi_static), number(x.worst.angle), number(x.over_running)
     text = filled(worst, *sizes, *running)
-    if not study.drive.follows:
-        text += filled(" The {}: {}.", transient_words(study), number(x.transient))
+    if not setup.drive.follows:
+        text += filled(" The {}: {}.", transient_words(setup), number(x.transient))
     yield b.Text(text)
-    at_gear = "torque at the gear" if study.drive.is_geared else f"torque at the {study.driver_noun}"
+    at_gear = "torque at the gear" if setup.drive.is_geared else f"torque at the {setup.driver_noun}"
     in_star = ("speed at the change to delta", lambda start: number(start.star_speed))
     yield from table(
         x.starts,
-        (f"{study.driver_noun} angle", lambda start: number(start.angle)),
+        (f"{setup.driver_noun} angle", lambda start: number(start.angle)),
         (at_gear, lambda start: number(start.quasi_static, none="not reached")),
         ("with the transient", lambda start: number(start.gear_torque, none="not reached")),
         ("torque on a coupling", lambda start: number(start.coupling_torque, none="not reached")),
         ("start-up time", lambda start: number(start.start_time, none="not reached")),
         ("motor current, peak", lambda start: number(start.current)),
-        *([in_star] if study.drive.star_delta is not None else []),
-        title=f"Starts from rest, from several {study.driver_noun} angles",
+        *([in_star] if setup.drive.star_delta is not None else []),
+        title=f"Starts from rest, from several {setup.driver_noun} angles",
         form="long",
     )
 

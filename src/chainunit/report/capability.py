@@ -9,6 +9,7 @@ from typing import Any, Protocol, Self
 from ..mechanism.machine import MachineState
 from ..study.capability import StudyCapability
 from ..study.config import Config
+from ..study.drive import Drive
 from ..study.record import StudyRecord
 from ..study.registry import capabilities as registered
 from ..work.progress import TaskProgress
@@ -61,7 +62,7 @@ class Details:
 class Supplement:
     """Additions to the pictures of all runs; most machines have none."""
 
-    study: StudyRecord
+    drive: Drive
     caption: Line = ()
     links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """the joints of links that are drawn otherwise, or in addition to the links of the linkage"""
@@ -110,7 +111,7 @@ class Capability(StudyCapability):
         """What the study could have checked by this capability and did not."""
         return iter(())
 
-    def supplement(self, study: StudyRecord) -> Supplement | None:
+    def supplement(self, drive: Drive) -> Supplement | None:
         """Its additions to the machine in motion."""
         return None
 

@@ -17,7 +17,7 @@ from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
 from ..study.readings import crank_motion, crank_speed, crank_torque, shaft_power
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudyRuns, StudySetup
 from ..study.result import assumed_ranges
 from ..study.window import mean
 from . import figure as fig
@@ -41,14 +41,14 @@ _LOAD_CLASSES = 40
 
 
 @PICTURES.declare(
-    lambda study: run_names.motor_runs(study) and study.drive.foreign is None, "torque_speed.png"
+    lambda study: run_names.motor_runs(study.runs) and study.setup.drive.foreign is None, "torque_speed.png"
 )
 def _torque_speed(study: StudyRecord) -> fig.Figure:
     """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
-    names = run_names.motor_runs(study)
+    names = run_names.motor_runs(study.runs)
     # an event that is a start of its own would squeeze the loops of the others
-    starts = [name for name in names if run_names.event_time(study, name) is None]
-    overloads = run_names.groups(study, [name for name in names if name not in starts])
+    starts = [name for name in names if run_names.event_time(study.runs, name) is None]
+    overloads = run_names.groups(study.runs, [name for name in names if name not in starts])
     return fig.Figure(
         "torque-speed",
         "Torque-speed plane: the start, and the overloads from their event on",
@@ -63,10 +63,10 @@ def _torque_speed(study: StudyRecord) -> fig.Figure:
 def _torque_speed_panel(study: StudyRecord, group: list[str], names: list[str]) -> fig.Panel:
     """The panel of a group of runs; a run has the look of its place among all `names`."""
     # an overload is drawn from its event on: before, it is the steady running of the first panel
-    runs = {name: run_names.from_event(study, name) for name in group}
+    runs = {name: run_names.from_event(study.runs, name) for name in group}
     curves = [
         fig.Curve(
-            run_names.title(study, name),
+            run_names.title(study.runs, name),
             run["motor.w"].values,
             run["motor.air_gap_tau"].values,
             names.index(name),
@@ -78,65 +78,65 @@ def _torque_speed_panel(study: StudyRecord, group: list[str], names: list[str]) 
     room = 0.15 * (fastest - slowest)
     low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
     w = np.linspace(low, fastest + room, 301)
-    most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
+    most = np.broadcast_to(study.setup.drive.motor.limit(numpy_(), study.setup.drive.parameters, w), w.shape)
     # beyond the synchronous speed the limit falls far below the torques of all runs
     most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
     x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
     limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
     items = (*curves, limit, *_duty(study))
-    return fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group))
+    return fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study.runs, group))
 
 
 def _duty(study: StudyRecord) -> Iterator[fig.Item]:
     """The speed of normal running and, where the motor has a nameplate, its rated point and the rated torque, which
     it may give without a limit of time (S1)."""
-    if "steady" in study.answers:
-        speed = study.answers["steady"].speed_mean * study.drive.ratio
+    if "steady" in study.runs.answers:
+        speed = study.runs.answers["steady"].speed_mean * study.setup.drive.ratio
         yield fig.Mark(speed, "steady running, mean", look="mark")
-    if study.plate is not None:
-        speed, torque = study.plate.nameplate.speed, study.plate.nameplate.torque
+    if study.setup.plate is not None:
+        speed, torque = study.setup.plate.nameplate.speed, study.setup.plate.nameplate.torque
         yield fig.Mark(torque, "rated torque (S1)", axis="y", look="reference")
         yield fig.Curve("rated point", [speed], [torque], marker="o", has_line=False)
 
 
-def _group_title(study: StudyRecord, runs: list[str]) -> str:
+def _group_title(runs: StudyRuns, names: list[str]) -> str:
     """The title of a panel with these runs."""
-    if run_names.event_time(study, runs[0]) is None:
-        return f"Start{'s' * (len(runs) > 1)} and steady running"
-    sides = [study.config.events[run].loaded_side for run in runs if run_names.is_event(study, run)]
+    if run_names.event_time(runs, names[0]) is None:
+        return f"Start{'s' * (len(names) > 1)} and steady running"
+    sides = [runs.events[run].loaded_side for run in names if run in runs.events]
     return f"Overloads of the {sides[0]} side" if sides[0] else "Overloads"
 
 
-@PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
+@PICTURES.declare(lambda study: study.setup.statics.cycles, "torque_angle.png")
 def _turn(study: StudyRecord) -> fig.Figure:
-    driver = study.driver_noun
+    setup, driver, cycles = study.setup, study.setup.driver_noun, study.setup.statics.cycles
     torques: dict[str, Callable[[Cycle], Any]] = {driver: lambda c: c.crank_torque}
-    organs = bool(study.drive.machine.model.sides)
+    organs = bool(setup.drive.machine.model.sides)
     if organs:
         torques["rocker"] = lambda c: c.outputs.rocker.tau
     items: dict[fig.Axis, list[fig.Item]] = {}
     for part, torque in torques.items():
         curves = items[fig.Axis(f"{part} torque", "N.m")] = []
-        for look, (name, c) in enumerate(study.statics.cycles.items()):
+        for look, (name, c) in enumerate(cycles.items()):
             y = np.broadcast_to(torque(c), c.angle.shape)
             curves.append(fig.Curve(name, np.append(c.angle, 2.0 * math.pi), np.append(y, y[0]), look))
     return fig.Figure(
         "turn",
         of_driver("Torque over {a driver} turn at constant speed", driver),
-        f"{' and '.join(torques).capitalize()} torque over the {driver} angle: {', '.join(study.statics.cycles)}.",
-        fig.stacked(angle_axis(study), items.items()),
+        f"{' and '.join(torques).capitalize()} torque over the {driver} angle: {', '.join(cycles)}.",
+        fig.stacked(angle_axis(setup), items.items()),
         line(
             f"Inverse dynamics{' of two bars' * organs} at ",
-            asked_speed(study),
+            asked_speed(setup),
             f" of the {driver}, without a motor.",
         ),
     )
 
 
-@PICTURES.declare(run_names.has_steady_turns, "power_turn.png")
+@PICTURES.declare(lambda study: run_names.has_steady_turns(study.runs), "power_turn.png")
 def _power(study: StudyRecord) -> fig.Figure:
     """The power at crank and motor over the last turn of steady running."""
-    drive, steady, driver = study.drive, study.steady, study.driver_noun
+    drive, steady, driver = study.setup.drive, study.runs.steady, study.setup.driver_noun
     phi, speed = crank_motion(drive, steady)
     powers = {driver: crank_torque(drive, steady) * speed, "shaft of the motor": shaft_power(drive, steady)}
     if "motor.supply_power" in steady:
@@ -144,27 +144,23 @@ def _power(study: StudyRecord) -> fig.Figure:
     curves = [
         fig.Curve(name, *last_turn(phi, power), look) for look, (name, power) in enumerate(powers.items())
     ]
+    axes = angle_axis(study.setup), fig.Axis("power", "W")
+    panel = fig.Panel(*axes, (*curves, fig.Mark(0.0, axis="y", look="thin")))
     return fig.Figure(
         "power-turn",
         "Power over a turn in steady running",
         f"The power at {', '.join(powers)} over the {driver} angle in the last turn of steady running.",
-        (
-            (
-                fig.Panel(
-                    angle_axis(study), fig.Axis("power", "W"), (*curves, fig.Mark(0.0, axis="y", look="thin"))
-                ),
-            ),
-        ),
+        ((panel,),),
         "Below zero the machine gives power back.",
     )
 
 
-@PICTURES.declare(run_names.has_steady_turns, "load_histogram.png")
+@PICTURES.declare(lambda study: run_names.has_steady_turns(study.runs), "load_histogram.png")
 def _load_histogram(study: StudyRecord) -> fig.Figure:
     """The share of the time in which the torque lies in each class: at the crank and, where it is known, in the air
     gap of the motor, which the inertia of its rotor and a flywheel make smoother."""
-    steady, driver = study.steady, study.driver_noun
-    torques = {f"{driver} torque": crank_torque(study.drive, steady)}
+    steady, driver = study.runs.steady, study.setup.driver_noun
+    torques = {f"{driver} torque": crank_torque(study.setup.drive, steady)}
     if "motor.air_gap_tau" in steady:
         torques["air-gap torque of the motor"] = steady["motor.air_gap_tau"].values
     panels = []
@@ -202,23 +198,24 @@ def _averages(steady: xr.Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
 
 
 @PICTURES.declare(
-    lambda study: run_names.has_steady_turns(study) and not study.drive.foreign_machine,
+    lambda study: run_names.has_steady_turns(study.runs) and not study.setup.drive.foreign_machine,
     "force_over_stroke.png",
 )
 def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
-    names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
-    parts = {"steady": study.steady} | {name: run_names.from_event(study, name) for name in names}
-    runs = ((run_names.title(study, name), machine_state(study, part)) for name, part in parts.items())
-    return machine_picture.force_over_stroke(runs)
+    runs, drive = study.runs, study.setup.drive
+    names = [name for name in run_names.motor_runs(runs) if run_names.event_time(runs, name) is not None]
+    parts = {"steady": runs.steady} | {name: run_names.from_event(runs, name) for name in names}
+    states = ((run_names.title(runs, name), machine_state(drive, part)) for name, part in parts.items())
+    return machine_picture.force_over_stroke(states)
 
 
-@PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")
+@PICTURES.declare(lambda study: study.setup.statics.loops, "speed_loop.png")
 def _speed_loop(study: StudyRecord) -> fig.Figure:
-    loops = list(enumerate(study.statics.loops.items()))
+    loops = list(enumerate(study.setup.statics.loops.items()))
     ends = [loop.frequency[k] for _, (_, loop) in loops for k in (0, -1)]
     frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
-    narrowest = min(study.statics.loops.values(), key=lambda loop: loop.phase_margin)
-    longest = 1.5 * max(loop.settling for loop in study.statics.loops.values())
+    narrowest = min(study.setup.statics.loops.values(), key=lambda loop: loop.phase_margin)
+    longest = 1.5 * max(loop.settling for loop in study.setup.statics.loops.values())
     time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
     panels = (
         (frequency, fig.Axis("gain of the open loop", log=True), "frequency", "gain", "Gain"),
@@ -260,22 +257,21 @@ def _speed_loop(study: StudyRecord) -> fig.Figure:
 # -- over time
 
 
-@PICTURES.declare(lambda study: "start_up" in study.runs, "start_up.png")
+@PICTURES.declare(lambda study: "start_up" in study.runs.series, "start_up.png")
 def _start_up(study: StudyRecord) -> fig.Figure:
     return _transient(study, "start_up")
 
 
-@PICTURES.declare(run_names.motor_runs)
+@PICTURES.declare(lambda study: run_names.motor_runs(study.runs))
 def _others(study: StudyRecord) -> Iterator[fig.Figure]:
-    return (_transient(study, name) for name in run_names.motor_runs(study) if name != "start_up")
+    return (_transient(study, name) for name in run_names.motor_runs(study.runs) if name != "start_up")
 
 
-@PICTURES.declare(lambda study: run_names.groups(study, study.overloads), "overload_time.png")
+@PICTURES.declare(lambda study: run_names.groups(study.runs, study.runs.overloads), "overload_time.png")
 def _overloads(study: StudyRecord) -> fig.Figure:
     """The overloads beside each other, for print: a band of rows for each side, and the same scales in all panels."""
-    groups = [
-        [_transient(study, name) for name in group] for group in run_names.groups(study, study.overloads)
-    ]
+    setup, runs = study.setup, study.runs
+    groups = [[_transient(study, name) for name in group] for group in run_names.groups(runs, runs.overloads)]
     rows: list[list[fig.Panel | None]] = []
     for group in groups:
         for k in range(min(3, *(len(figure.panels) for figure in group))):
@@ -287,7 +283,7 @@ def _overloads(study: StudyRecord) -> fig.Figure:
     return fig.Figure(
         "overloads",
         "Overloads",
-        f"{capital(study.driver_noun)} torque, {study.driver_noun} speed and motor current of every overload.",
+        f"{capital(setup.driver_noun)} torque, {setup.driver_noun} speed and motor current of every overload.",
         tuple((*row, *[None] * (widest - len(row))) for row in rows),
         level=True,
         on_page=False,
@@ -296,7 +292,7 @@ def _overloads(study: StudyRecord) -> fig.Figure:
 
 def _transient(study: StudyRecord, name: str) -> fig.Figure:
     """Torque, speed and current of a run over time."""
-    run, drive, event = study.runs[name], study.drive, run_names.event_time(study, name)
+    run, drive, event = study.runs.series[name], study.setup.drive, run_names.event_time(study.runs, name)
     time = run["time"].values - (event or 0.0)
     low, high = float(time[0]), float(time[-1])
     driver = drive.driver_noun
@@ -311,16 +307,16 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         items[TORQUE] = shaft_torque(run, time)
     if event is None and drive.follows:
         speed.append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
-    coasting = study.runs.get(name + run_names.COASTING)
+    coasting = study.runs.series.get(name + run_names.COASTING)
     if coasting is not None:
-        behind, stands = _coasting(study, coasting, event or 0.0)
+        behind, stands = _coasting(study.setup, coasting, event or 0.0)
         speed.append(behind)
         high = min(float(behind.x[-1]), 1.3 * max(high, high if stands is None else stands))
     if event is not None:
         # a quarter turn before the event shows enough of steady running
-        before = 0.5 * math.pi / study.config.run.crank_speed
+        before = 0.5 * math.pi / study.setup.config.run.crank_speed
         low = max(low, -before if coasting is None else -min(before, 0.5 * high))
-    marks, title = _marks(study, name, event), run_names.title(study, name)
+    marks, title = _marks(study.runs, name, event), run_names.title(study.runs, name)
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
         title,
@@ -330,17 +326,17 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
             ((axis, (*curves, *marks(axis is of_torque))) for axis, curves in items.items()),
         ),
-        _after(study, name) if event is not None else (),
+        _after(study.runs, name) if event is not None else (),
         half=True,
     )
 
 
-def _coasting(study: StudyRecord, run: xr.Dataset, event: float) -> tuple[fig.Curve, float | None]:
+def _coasting(setup: StudySetup, run: xr.Dataset, event: float) -> tuple[fig.Curve, float | None]:
     """The speed of the machine behind the open coupling, and the time from which on it stands [s]; None if it never
     turns."""
-    time, speed = run["time"].values - event, crank_speed(study.drive, run)
-    turning = np.flatnonzero(np.abs(speed) > 0.02 * study.config.run.crank_speed)
-    curve = fig.Curve(f"{study.driver_noun} behind the open coupling", time, speed, 1)
+    time, speed = run["time"].values - event, crank_speed(setup.drive, run)
+    turning = np.flatnonzero(np.abs(speed) > 0.02 * setup.config.run.crank_speed)
+    curve = fig.Curve(f"{setup.driver_noun} behind the open coupling", time, speed, 1)
     return curve, float(time[turning[-1]]) if turning.size else None
 
 
@@ -355,20 +351,20 @@ def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]
     return {_CURRENT: items}
 
 
-def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
+def _marks(runs: StudyRuns, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
     """The function that gives the marks in a panel of a run; its argument says whether the marks have words."""
-    run = study.runs[name]
+    run = runs.series[name]
 
     def marks(labelled: bool) -> list[fig.Item]:
         if event is not None:
-            loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
+            loads = (name for name in runs.drive.machine.model.input_layout.names if name not in _MOTION)
             changing = _load_change(
                 run, [*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"]
             )
             shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
             return [*shade, fig.Mark(0.0, words="event" if labelled else "")]
-        if name == "start_up" and study.answers:
-            return [fig.Mark(study.steady_begin, words="steady from here" if labelled else "")]
+        if name == "start_up" and runs.answers:
+            return [fig.Mark(runs.steady_begin, words="steady from here" if labelled else "")]
         return []
 
     return marks
@@ -387,21 +383,21 @@ def _load_change(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
     return float(time[places[0]]), float(time[places[-1] + 1])
 
 
-def _after(study: StudyRecord, run: str) -> Line:
+def _after(runs: StudyRuns, run: str) -> Line:
     """The sentence on the speed after the event."""
     caption: Line = "Upright, dashed: the event. Shaded: the loads change."
-    if run not in study.answers:
+    if run not in runs.answers:
         return caption
-    answers = cited(study.answers[run], f"runs.answers.{run}")
+    answers = cited(runs.answers[run], f"runs.answers.{run}")
     least, dip, recovery = map(number, (answers.speed_least, answers.speed_dip, answers.recovery_time))
     if dip.value is None or dip.value <= 0.0:
         caption = filled("{} The least speed is {}", caption, least)
     elif not forms(dip.value, "1", "dip")[0][1]:
         # a dip so large is shown as words in place of a number
-        caption = filled(f"{{}} The {study.driver_noun} {{}}", caption, dip)
+        caption = filled(f"{{}} The {runs.drive.driver_noun} {{}}", caption, dip)
     else:
         caption = filled("{} The speed dips by {}", caption, dip)
-    if not study.returns:
+    if not runs.returns:
         back: Line = "; the motor does not reach the speed asked for, so that there is no band to return to."
     elif recovery.value is None:
         back = "; it does not return to its steady band within the time followed."
@@ -409,35 +405,35 @@ def _after(study: StudyRecord, run: str) -> Line:
         back = "; it does not leave its steady band."
     else:
         back = filled("; it is back in its steady band after {}.", recovery)
-    return line(caption, back, _assumed(study, run) if run in study.spreads else ())
+    return line(caption, back, _assumed(runs, run) if run in runs.spreads else ())
 
 
-def _assumed(study: StudyRecord, run: str) -> Line:
+def _assumed(runs: StudyRuns, run: str) -> Line:
     """The ranges that an event assumes, and the torque of the driver over them."""
-    sizes = cited(assumed_ranges(study, run), f"runs.block_peaks.{run}")
+    sizes = cited(assumed_ranges(runs, run), f"runs.block_peaks.{run}")
     ranges = {
         name: filled("{} to {}", *(number(sizes[f"{name}_{end}"]) for end in ("low", "high")))
-        for name in (*study.spreads[run].ranges, *study.spreads[run].peaks)
+        for name in (*runs.spreads[run].ranges, *runs.spreads[run].peaks)
     }
-    assumptions = join(filled("{} {}", name, ranges[name]) for name in study.spreads[run].ranges)
-    peaks = f" Assumed: {{}}; the {study.driver_noun} torque peaks at {{}}."
+    assumptions = join(filled("{} {}", name, ranges[name]) for name in runs.spreads[run].ranges)
+    peaks = f" Assumed: {{}}; the {runs.drive.driver_noun} torque peaks at {{}}."
     return filled(peaks, assumptions, ranges["crank_torque"])
 
 
-@PICTURES.declare(lambda study: study.pins, "reactions.png")
+@PICTURES.declare(lambda study: study.runs.pins, "reactions.png")
 def _reactions(study: StudyRecord) -> fig.Figure:
-    reference = "steady" if "steady" in study.pins else next(iter(study.pins))
-    steady, pins = study.pins[reference], list(study.pins[reference])
-    largest = {pin: hardest_run(study.pins, pin) for pin in pins}
-    of_run = run_names.title(study, reference)
+    reference = "steady" if "steady" in study.runs.pins else next(iter(study.runs.pins))
+    steady, pins = study.runs.pins[reference], list(study.runs.pins[reference])
+    largest = {pin: hardest_run(study.runs.pins, pin) for pin in pins}
+    of_run, driver = run_names.title(study.runs, reference), study.setup.driver_noun
     places = np.arange(len(pins), dtype=float)
     bars: list[tuple[str, float, list[float | None], float, int, bool, tuple[str, ...]]] = [
         (f"{of_run}: peak", -0.2, [steady[pin]["peak"] for pin in pins], 0.38, 0, False, ()),
         (f"{of_run}: RMS", -0.2, [steady[pin]["rms"] for pin in pins], 0.14, 0, True, ()),
     ]
-    if len(study.pins) > 1:
-        titles = tuple(study.title_of(largest[pin]) for pin in pins)
-        peaks = [study.pins[largest[pin]][pin]["peak"] for pin in pins]
+    if len(study.runs.pins) > 1:
+        titles = tuple(study.runs.title_of(largest[pin]) for pin in pins)
+        peaks = [study.runs.pins[largest[pin]][pin]["peak"] for pin in pins]
         bars.append(("largest peak of all runs", 0.2, peaks, 0.38, 1, False, titles))
     items = tuple(
         fig.Bars(name, places + shift, sizes, height, look, slim=slim, words=beside)
@@ -445,12 +441,12 @@ def _reactions(study: StudyRecord) -> fig.Figure:
     )
     most = max(size or 0.0 for _, _, sizes, *_ in bars for size in sizes)
     # beside the bars there is room for the names of runs
-    x = fig.Axis("reaction", "N", low=0.0, high=(1.6 if len(study.pins) > 1 else 1.05) * most or None)
+    x = fig.Axis("reaction", "N", low=0.0, high=(1.6 if len(study.runs.pins) > 1 else 1.05) * most or None)
     return fig.Figure(
         "reactions",
         "Forces in the pins",
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
         ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
-        f"RMS is taken over whole {study.driver_noun} turns of {of_run}. Beside a bar: the run of the largest peak.",
+        f"RMS is taken over whole {driver} turns of {of_run}. Beside a bar: the run of the largest peak.",
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

@@ -9,7 +9,7 @@ from typing import Any
 from ..core.quantities import Layout, finite
 from ..study.bearings import hardest_run
 from ..study.measures import MEASURES, STARTED, Answers, measures_of
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudyRuns, StudySetup
 from ..study.window import Phase
 from . import blocks as b
 from . import run_names
@@ -22,18 +22,18 @@ from .terminal import plain_line
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """Tables of the answers of every run, the forces in the bearings and the speed loop."""
-    if study.answers:
+    if study.runs.answers:
         whole = table_of_runs(study)
         yield whole
         yield _beside_the_worst(study, whole)
-    if study.start is not None:
-        yield from _begin(study, "start_up", study.start, Phase.START_UP)
-    if study.settling is not None:
-        yield from _begin(study, "settling", study.settling, Phase.SETTLING)
-    if study.pins:
-        yield _pins(study)
-        yield _largest_pin(study)
-    if loops := cited(study.statics.loops, "findings.speed_loop"):
+    if study.runs.start is not None:
+        yield from _begin(study.runs, "start_up", study.runs.start, Phase.START_UP)
+    if study.runs.settling is not None:
+        yield from _begin(study.runs, "settling", study.runs.settling, Phase.SETTLING)
+    if study.runs.pins:
+        yield _pins(study.runs)
+        yield _largest_pin(study.runs)
+    if loops := cited(study.setup.statics.loops, "findings.speed_loop"):
         title = "The linearised speed loop; deviation and settling are those after a step of the load torque"
         rows = {
             spoken(loop) if len(loops) > 1 else "constant inertia": numbers(x) for loop, x in loops.items()
@@ -41,10 +41,10 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
         yield matrix(rows, title, first="")
 
 
-def _begin(study: StudyRecord, run: str, answers: Answers, phase: Phase) -> Iterator[b.Block]:
+def _begin(runs: StudyRuns, run: str, answers: Answers, phase: Phase) -> Iterator[b.Block]:
     """The demands of a phase before the steady turns: the start-up, or the settling."""
-    title, x = study.title_of(run), numbers(cited(answers, f"runs.{run}"))
-    sizes = [(v.described(study.driver_noun), x[v.name]) for v in measures_of(phase)]
+    title, x = runs.title_of(run), numbers(cited(answers, f"runs.{run}"))
+    sizes = [(v.described(runs.drive.driver_noun), x[v.name]) for v in measures_of(phase)]
     rows = [row for row in sizes if row[1].value is not None]
     said = join((line(f"{description} ", size) for description, size in rows), "; ")
     yield b.Text(line(f"{capital(title)}: ", said, "."), form="short")
@@ -60,97 +60,99 @@ def matrix(rows: Mapping[str, Mapping[str, Number]], title: str, first: str, **m
     return b.Table(tuple(cells), b.heads(first, *map(spoken, names)), title=title, **more)
 
 
-def by_side(study: StudyRecord, runs: Iterable[str]) -> list[str]:
+def by_side(runs: StudyRuns, names: Iterable[str]) -> list[str]:
     """The runs in an order in which the overloads of each side are neighbours."""
-    runs = list(runs)
-    sided_runs = [run for group in run_names.groups(study, runs) for run in group]
-    return [*(run for run in runs if run not in sided_runs), *sided_runs]
+    names = list(names)
+    sided_runs = [run for group in run_names.groups(runs, names) for run in group]
+    return [*(run for run in names if run not in sided_runs), *sided_runs]
 
 
 def over_runs(
-    study: StudyRecord, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
+    runs: StudyRuns, names: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
 ) -> b.Table:
     """A table with a column for each run; the columns of the overloads of a side form a group."""
-    columns = (b.Column(study.title_of(run), run_names.short(study, run)) for run in runs)
-    groups = (tuple(runs.index(run) + 1 for run in group) for group in run_names.groups(study, runs))
+    columns = (b.Column(runs.title_of(run), run_names.short(runs, run)) for run in names)
+    groups = (tuple(names.index(run) + 1 for run in group) for group in run_names.groups(runs, names))
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 
 
 def table_of_runs(study: StudyRecord) -> b.Table:
     """The table of all answers, with a column for each run."""
-    answers, unknown_names = study.answers, study.not_known
-    runs = by_side(study, answers)
+    setup, runs, answers = study.setup, study.runs, study.runs.answers
+    names, unknown_names = by_side(runs, answers), runs.not_known
     rows = (
         b.TableRow(
-            (v.described(study.driver_noun), *(number(study, run, v.name) for run in runs)),
+            (v.described(setup.driver_noun), *(number(runs, run, v.name) for run in names)),
             form="long" if MEASURES[v.name].minor else "both",
         )
         for v in Layout(Answers).variables
         # a coupling that is absent or stayed shut has no row; an answer that the motor does not give has dashes
         if v.name in unknown_names
-        or any(finite(getattr(answers[run], v.name)) is not None for run in runs)
-        or (v.name == "recovery_time" and study.returns and study.overloads)
+        or any(finite(getattr(answers[run], v.name)) is not None for run in names)
+        or (v.name == "recovery_time" and runs.returns and runs.overloads)
     )
     head: Line = ()
     if "steady" in answers:
-        head = line(study.driver_noun, " at ", number(study, "steady", "speed_mean"))
-    if not study.reaches:
-        head = filled("{}; {} NOT reached", head, asked_speed(study))
-    title = f"Demands of each run on the drive{_doubt(study)}"
-    return over_runs(study, runs, rows, title, plain_line(head, study.config.units))
+        head = line(setup.driver_noun, " at ", number(runs, "steady", "speed_mean"))
+    if not runs.reaches:
+        head = filled("{}; {} NOT reached", head, asked_speed(setup))
+    title = f"Demands of each run on the drive{_doubt(setup)}"
+    return over_runs(runs, names, rows, title, plain_line(head, setup.config.units))
 
 
-def _doubt(study: StudyRecord) -> str:
-    return "; the motor is insufficient" if study.insufficient else ""
+def _doubt(setup: StudySetup) -> str:
+    return "; the motor is insufficient" if setup.insufficient else ""
 
 
 def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
     """Of the table of all runs, steady running beside the overload with the largest crank torque, for one screen."""
-    runs = by_side(study, study.answers)
-    shown = [run for run in ("steady",) if run in runs] or runs[:1]
-    peaks = {run: study.answers[run].crank_torque_peak for run in study.overloads if run in runs}
+    runs, setup = study.runs, study.setup
+    names = by_side(runs, runs.answers)
+    shown = [run for run in ("steady",) if run in names] or names[:1]
+    peaks = {run: runs.answers[run].crank_torque_peak for run in runs.overloads if run in names}
     title = whole.title
     if peaks:
         shown.append(max(peaks, key=lambda run: abs(peaks[run])))
-        is_bare = study.proposal is not None and study.config.coupling is None
+        is_bare = setup.proposal is not None and setup.config.coupling is None
         bare = " (without torque limiter)" if is_bare else ""
-        title = f"Steady running beside the worst overload{bare}: {run_names.title(study, shown[-1])}{_doubt(study)}"
-    places = [0, *(1 + runs.index(run) for run in shown)]
+        worst = f"{run_names.title(runs, shown[-1])}{_doubt(setup)}"
+        title = f"Steady running beside the worst overload{bare}: {worst}"
+    places = [0, *(1 + names.index(run) for run in shown)]
     rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)
     columns = tuple(whole.columns[i] for i in places)
     return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")
 
 
-def _largest_pin(study: StudyRecord) -> b.Text:
+def _largest_pin(runs: StudyRuns) -> b.Text:
     """The pin with the largest force of all runs, for one screen."""
-    forces = {pin: _peak(study, pin) for pin in next(iter(study.pins.values()))}
+    forces = {pin: _peak(runs, pin) for pin in next(iter(runs.pins.values()))}
     pin = max(forces, key=lambda pin: forces[pin].value or 0.0)
-    worst = study.title_of(hardest_run(study.pins, pin))
+    worst = runs.title_of(hardest_run(runs.pins, pin))
     return b.Text(line(f"Largest force in a pin: {pin} ", forces[pin], f" ({worst})."), form="screen")
 
 
-def _peak(study: StudyRecord, pin: str) -> Number:
+def _peak(runs: StudyRuns, pin: str) -> Number:
     """The largest force in a pin of all runs."""
-    run = hardest_run(study.pins, pin)
-    return Number(study.pins[run][pin]["peak"], "N", path=f"runs.pins.{run}.{pin}.peak")
+    run = hardest_run(runs.pins, pin)
+    return Number(runs.pins[run][pin]["peak"], "N", path=f"runs.pins.{run}.{pin}.peak")
 
 
-def _pins(study: StudyRecord) -> b.Table:
-    reference = "steady" if "steady" in study.pins else next(iter(study.pins))
-    tables = study.pins[reference]
+def _pins(runs: StudyRuns) -> b.Table:
+    reference = "steady" if "steady" in runs.pins else next(iter(runs.pins))
+    tables = runs.pins[reference]
     sizes = list(next(iter(tables.values())))
 
     def row(pin: str) -> b.TableRow:
-        worst = hardest_run(study.pins, pin)
+        worst = hardest_run(runs.pins, pin)
         numbers = (
             Number(tables[pin][size], "N", path=f"runs.pins.{reference}.{pin}.{size}") for size in sizes
         )
         return b.TableRow(
-            (pin, *numbers, _peak(study, pin), study.title_of(worst), run_names.short(study, worst))
+            (pin, *numbers, _peak(runs, pin), runs.title_of(worst), run_names.short(runs, worst))
         )
 
     columns = (
-        b.Column(f"{run_names.title(study, reference)}, {spoken(size)}", f"{reference}, {spoken(size)}")
+        b.Column(f"{run_names.title(runs, reference)}, {spoken(size)}", f"{reference}, {spoken(size)}")
         for size in sizes
     )
     return b.Table(
@@ -166,8 +168,8 @@ def _pins(study: StudyRecord) -> b.Table:
     )
 
 
-def number(study: StudyRecord, run: str, name: str) -> Number:
+def number(runs: StudyRuns, run: str, name: str) -> Number:
     """The answer `name` of a run."""
-    back = name == "recovery_time" and run != "steady" and study.returns
-    answers = cited(study.answers[run], f"runs.answers.{run}")
+    back = name == "recovery_time" and run != "steady" and runs.returns
+    answers = cited(runs.answers[run], f"runs.answers.{run}")
     return cited_number(getattr(answers, name), none="not reached" if back else "-")

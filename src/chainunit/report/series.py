@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..core.files import atomic_file, netcdf
+from ..study.drive import Drive
 from ..study.readings import load_inertia, motor_shaft
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..work.interrupts import stoppable
@@ -32,11 +33,11 @@ STEADY_BEGIN = "steady_begin"
 """Attribute of the start-up: the time at which the turns of the load cycle begin [s]."""
 
 
-def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
+def _load_cycle(drive: Drive, turns: xr.Dataset, file: Path) -> Path:
     """Write the load at the motor shaft in the steady turns, in the form that sizing tools import: a row for each
     instant with time, speed, load torque and load inertia; the head has the units. The last row is the first instant
     of the next turn."""
-    time, drive = turns["time"].values, study.drive
+    time = turns["time"].values
     torque, speed = motor_shaft(drive, turns)
     columns = time - time[0], speed, torque, load_inertia(drive, turns)
     with atomic_file(file) as part, part.open("w", newline="", encoding="utf-8") as out:
@@ -50,12 +51,12 @@ def tree(study: StudyRecord) -> xr.DataTree:
     """The time series of all runs, a node for each run; each variable has its unit and description."""
     import xarray as xr
 
-    runs = {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
-    if has_steady_turns(study):
-        start_up = runs["/start_up"]
-        runs["/start_up"] = start_up.assign_attrs({STEADY_BEGIN: float(study.steady["time"][0])})
-    whole_study = xr.DataTree.from_dict(runs)
-    whole_study.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
+    runs = study.runs
+    nodes = {f"/{name}": run.assign_attrs(title=title(runs, name)) for name, run in runs.series.items()}
+    if has_steady_turns(runs):
+        nodes["/start_up"].attrs[STEADY_BEGIN] = float(runs.steady["time"][0])
+    whole_study = xr.DataTree.from_dict(nodes)
+    whole_study.attrs.update(title=study.setup.config.title, source=f"chainunit {__version__}")
     return whole_study
 
 
@@ -65,9 +66,9 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
     ``result.nc`` is netCDF-4 with a group per run, the `tree`.
     """
     files = []
-    if has_steady_turns(study):
-        files.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
-    if study.runs:
+    if has_steady_turns(study.runs):
+        files.append(_load_cycle(study.setup.drive, study.runs.steady, folder / LOAD_CYCLE))
+    if study.runs.series:
         file = folder / SERIES
         # an interrupt inside the library leaves its locks taken
         with stoppable(), atomic_file(file) as part, netcdf():

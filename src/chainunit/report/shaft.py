@@ -10,7 +10,7 @@ from ..study.analysis import is_examined
 from ..study.line.rigid_line import HOLDS_FROM, RigidLine
 from ..study.line.shaft import CLASSES, RIGID, ShaftAnswers
 from ..study.line.shaft_runs import shaft_findings
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudySetup
 from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
@@ -27,24 +27,24 @@ _BESIDE = 3
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the driveline."""
-    if not shaft_findings(study).answers:
+    if not shaft_findings(study.findings).answers:
         return
     yield _shaft(study)
-    if not is_examined("driveline", study.findings):
-        modes = quantity_rows(cited(study.statics.modes, "findings.driveline"), study.driver_noun)
+    if not is_examined("driveline", study.findings.by_analysis):
+        modes = quantity_rows(cited(study.setup.statics.modes, "findings.driveline"), study.setup.driver_noun)
         yield b.Table(modes, title="The driveline's torsion")
-    if study.statics.rigid_line is not None:
-        yield _rigid(study, study.statics.rigid_line)
+    if study.setup.statics.rigid_line is not None:
+        yield _rigid(study.setup, study.setup.statics.rigid_line)
     yield from PICTURES.figures(study)
 
 
-def _rigid(study: StudyRecord, rigid: RigidLine) -> b.Judgement:
+def _rigid(setup: StudySetup, rigid: RigidLine) -> b.Judgement:
     """The verdict on a rigid model of the drive, with its two numbers."""
     x = cited(rigid, "findings.rigid_line")
     verdict = (
         f"In steady running a rigid model of the drive {'holds' if rigid.holds else 'does not hold'} (VDI 2149: from "
         f"{HOLDS_FROM:g} times on): the lowest natural frequency of the line, {{}}, is {{}} times the frequency of "
-        f"the {study.driver_noun}'s turns, {{}}."
+        f"the {setup.driver_noun}'s turns, {{}}."
     )
     sizes = map(number, (x.natural_frequency, x.ratio, x.driver_frequency))
     return b.Judgement("good" if rigid.holds else "partly", filled(verdict, *sizes))
@@ -52,28 +52,28 @@ def _rigid(study: StudyRecord, rigid: RigidLine) -> b.Judgement:
 
 def _shaft(study: StudyRecord) -> b.Table:
     """The table of the demands of each run on the driveline."""
-    answers = cited(shaft_findings(study), "findings.shaft").answers
-    runs = by_side(study, answers)
+    answers = cited(shaft_findings(study.findings), "findings.shaft").answers
+    names = by_side(study.runs, answers)
     rows = (
-        b.TableRow((v.description, *(number(getattr(answers[run], v.name)) for run in runs)))
+        b.TableRow((v.description, *(number(getattr(answers[run], v.name)) for run in names)))
         for v in Layout(ShaftAnswers).variables
     )
-    return over_runs(study, runs, rows, "Torque in the driveline")
+    return over_runs(study.runs, names, rows, "Torque in the driveline")
 
 
-@PICTURES.declare(lambda study: shaft_findings(study).answers, "driveline.png")
+@PICTURES.declare(lambda study: shaft_findings(study.findings).answers, "driveline.png")
 def _driveline(study: StudyRecord) -> fig.Figure:
     """The torque in the driveline beside that in a rigid one, and its rainflow cycles."""
-    shaft = shaft_findings(study)
+    runs, shaft = study.runs, shaft_findings(study.findings)
     largest = max(answers.range_largest for answers in shaft.answers.values())
     above, below = [], []
     for name in shaft.answers:
-        since = 0.0 if name == START else study.steady_begin if name == STEADY else study.event[name]
-        until = study.steady_begin if name == START else None
-        run = study.runs[START if name == STEADY else name].sel(time=slice(since, until))
+        since = 0.0 if name == START else runs.steady_begin if name == STEADY else runs.event_times[name]
+        until = runs.steady_begin if name == START else None
+        run = runs.series[START if name == STEADY else name].sel(time=slice(since, until))
         time = run["time"].values - since
         x = fig.Axis("time", "s", low=0.0, high=float(time[-1]))
-        title = study.title_of(name)
+        title = runs.title_of(name)
         above.append(fig.Panel(x, TORQUE, tuple(shaft_torque(run, time)), title))
         classes = shaft.cycles[name].classes(largest)
         middle = [0.5 * (row.low + row.high) for row in classes]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudySetup
 from . import blocks as b
 from .capability import capabilities
 from .figure import Figure
@@ -32,13 +32,14 @@ _LABELS = ("project", "author", "date", "revision")
 
 def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     """The sheet of a study with this report."""
+    setup = study.setup
     report_sections = {section.name: section for section in report.sections}
     checked = [name for part in capabilities() for name in part.on_sheet() if name in report_sections]
     sections = (
         *(report_sections[name] for name in _FIRST),
         *(_on_sheet(report_sections[name]) for name in checked),
         b.Section(
-            "assumptions", "Assumptions: values that no file gives", tuple(_assumed(report_sections, study))
+            "assumptions", "Assumptions: values that no file gives", tuple(_assumed(report_sections, setup))
         ),
         _basis(study),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
@@ -48,11 +49,11 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     annex = (
         *(_without_figures(section) for section in report.sections if section.name not in shown),
         b.Section("plots", "Plots", tuple(report.figures)),
-        b.Section("given", "Other given values", tuple(_not_assumed(report_sections, study))),
-        b.Section("software", "Models and software", (software(study),)),
+        b.Section("given", "Other given values", tuple(_not_assumed(report_sections, setup))),
+        b.Section("software", "Models and software", (software(study.runs),)),
     )
     title = report.title or capital(report.kind)
-    return Sheet(title, _title_block(study, report), sections, annex, report.units)
+    return Sheet(title, _title_block(setup, report), sections, annex, report.units)
 
 
 def _on_sheet(section: b.Section) -> b.Section:
@@ -77,47 +78,47 @@ def _basis(study: StudyRecord) -> b.Section:
 
 def _speed(study: StudyRecord) -> Iterator[b.Block]:
     """The speed of the runs, and the reach of rigid links."""
-    if not study.answers:
+    if not study.runs.answers:
         return
-    text = f"The runs ask for a speed of the {study.driver_noun} of {{}}."
-    if study.drive.foreign_machine or not study.drive.machine.model.sides:
+    text = f"The runs ask for a speed of the {study.setup.driver_noun} of {{}}."
+    if study.setup.drive.foreign_machine or not study.setup.drive.machine.model.sides:
         text += " No highest speed was computed up to which the numbers hold"
         text += (
             "."
-            if study.drive.foreign_machine
+            if study.setup.drive.foreign_machine
             else ": rigid links set none. Another speed asks for another study."
         )
-    yield b.Text(filled(text, asked_speed(study)), "note", "long")
+    yield b.Text(filled(text, asked_speed(study.setup)), "note", "long")
 
 
-def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
-    labels: dict[str, Any] = {name: study.config.file.labels.get(name, "") for name in _LABELS}
-    machine = f"{capital(study.noun)}, {study.drive.machine.model.name}"
+def _title_block(setup: StudySetup, report: b.Report) -> dict[str, str]:
+    labels: dict[str, Any] = {name: setup.config.file.labels.get(name, "") for name in _LABELS}
+    machine = f"{capital(setup.noun)}, {setup.drive.machine.model.name}"
     return {
         **{capital(name): str(value) for name, value in labels.items()},
         "Machine": machine,
-        "Study file": Path(study.config.file.source).name,
+        "Study file": Path(setup.config.file.source).name,
         "Computed by": f"chainunit {__version__}",
         "Status": report.status if not report.failure else "stopped early",
     }
 
 
-def _assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
+def _assumed(report_sections: dict[str, b.Section], setup: StudySetup) -> Iterator[b.Block]:
     """The values that the files leave out, without chosen ones, which are the answer, and without the values of
     a motor of a catalogue beside its surroundings."""
-    yield _given(report_sections, lambda value: _is_used(value, study) and _is_assumed(value, study))
-    if study.plate is not None:
+    yield _given(report_sections, lambda value: _is_used(value, setup) and _is_assumed(value, setup))
+    if setup.plate is not None:
         text = 'Values of the motor and chosen values: section "Other given values" of the annex.'
         yield b.Text(text, "note", "long")
 
 
-def _not_assumed(report_sections: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
+def _not_assumed(report_sections: dict[str, b.Section], setup: StudySetup) -> Iterator[b.Block]:
     """The other given values; a value of an event that no file gives stands at the first of the events that have
     it."""
     listed: set[tuple[str, Any]] = set()
 
     def is_shown(value: b.GivenValue) -> bool:
-        if not _is_used(value, study) or _is_assumed(value, study):
+        if not _is_used(value, setup) or _is_assumed(value, setup):
             return False
         if not value.name.startswith("event.") or value.origin != "declared":
             return True
@@ -136,23 +137,23 @@ def _given(report_sections: dict[str, b.Section], is_shown: Callable[[b.GivenVal
     return b.Given(tuple(section for section in sections if section[1]))
 
 
-def _is_assumed(value: b.GivenValue, study: StudyRecord) -> bool:
+def _is_assumed(value: b.GivenValue, setup: StudySetup) -> bool:
     """Whether the files leave out a number that is neither chosen nor of an event, nor of a motor of a catalogue."""
-    chosen = "" if study.proposal is None else study.proposal.name
+    chosen = "" if setup.proposal is None else setup.proposal.name
     if value.origin in ("", "file", "linkage", chosen) or not isinstance(value.value, Number):
         return False
     table, _, name = value.name.partition(".")
-    if table == "event" or study.plate is None:
+    if table == "event" or setup.plate is None:
         return table != "event"
     return table != "motor" or name.startswith("ambient.")
 
 
-def _is_used(value: b.GivenValue, study: StudyRecord) -> bool:
+def _is_used(value: b.GivenValue, setup: StudySetup) -> bool:
     """Whether a value is of the files, or not of a starter that the motor of a catalogue does without."""
     table, _, name = value.name.partition(".")
-    if value.origin == "file" or study.plate is None or table not in ("motor", "starter"):
+    if value.origin == "file" or setup.plate is None or table not in ("motor", "starter"):
         return True
-    start = study.config.drive.start
+    start = setup.config.drive.start
     return _OF_START.get(name.partition(".")[0], start) == start
 
 

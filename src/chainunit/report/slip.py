@@ -13,7 +13,7 @@ from ..study.line.belt import BeltAnalysis, BeltAnswers, BeltFindings
 from ..study.line.fluid_coupling import CouplingAnalysis, CouplingAnswers, CouplingFindings
 from ..study.line.placed import PlacedPart
 from ..study.line.slipping import parts_of_runs
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudyRuns, StudySetup
 from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
@@ -34,7 +34,7 @@ _KINDS = (
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figures of both parts."""
     for kind, declared, name, noun in _KINDS:
-        findings = kind.found_in(study)
+        findings = kind.found_in(study.findings)
         if findings is None:
             continue
         x = cited(findings, f"findings.{name}")
@@ -48,19 +48,19 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
                 title="The V-belt over its load, at the rated speed",
                 form="long",
             )
-        runs = by_side(study, findings.answers)
+        names = by_side(study.runs, findings.answers)
         rows = (
-            b.TableRow((v.description, *(number(getattr(x.answers[run], v.name)) for run in runs)))
+            b.TableRow((v.description, *(number(getattr(x.answers[run], v.name)) for run in names)))
             for v in Layout(declared).variables
         )
-        yield over_runs(study, runs, rows, f"Load of the {noun}")
+        yield over_runs(study.runs, names, rows, f"Load of the {noun}")
     yield from PICTURES.figures(study)
 
 
-@PICTURES.declare(CouplingFindings.found_in, "coupling_torque.png")
+@PICTURES.declare(lambda study: CouplingFindings.found_in(study.findings), "coupling_torque.png")
 def _characteristic(study: StudyRecord) -> fig.Figure:
     """The torque of the fluid coupling over its slip, at three speeds of the motor."""
-    findings, placed = CouplingFindings.of_study(study), _part(study, "fluid_coupling")
+    findings, placed = CouplingFindings.of_study(study.findings), _part(study.setup, "fluid_coupling")
     slip, speed = np.linspace(0.0, 1.0, 201), placed.table.rated_speed
     curves = tuple(
         fig.Curve(
@@ -85,26 +85,26 @@ def _characteristic(study: StudyRecord) -> fig.Figure:
     )
 
 
-@PICTURES.declare(lambda study: [kind.found_in(study) for kind, *_ in _KINDS if kind.found_in(study)])
+@PICTURES.declare(lambda study: any(kind.found_in(study.findings) for kind, *_ in _KINDS))
 def _speeds(study: StudyRecord) -> Iterator[fig.Figure]:
     """The speed before and behind each part, over time."""
-    for part in study.drive.line:
+    for part in study.setup.drive.line:
         if part.slips:
-            yield _speeds_of(study, part)
+            yield _speeds_of(study.runs, part)
 
 
-def _speeds_of(study: StudyRecord, part: PlacedPart) -> fig.Figure:
+def _speeds_of(runs: StudyRuns, part: PlacedPart) -> fig.Figure:
     noun = {"fluid_coupling": "fluid coupling"}.get(part.name, part.name)
     panels = []
-    for name, run in parts_of_runs(study, part):
+    for name, run in parts_of_runs(runs, part):
         if name != STEADY:
-            time = run.time - (0.0 if name == START else study.event[name])
+            time = run.time - (0.0 if name == START else runs.event_times[name])
             curves = (
                 fig.Curve(f"before the {noun}", time, run.speed),
                 fig.Curve(f"behind the {noun}, at the shaft before it", time, run.driven, 1),
             )
             x = fig.Axis("time", "s", low=float(time[0]), high=float(time[-1]))
-            panels.append(fig.Panel(x, fig.Axis("speed", "rad/s", "speed"), curves, study.title_of(name)))
+            panels.append(fig.Panel(x, fig.Axis("speed", "rad/s", "speed"), curves, runs.title_of(name)))
     rows = tuple(
         (*panels[k : k + _BESIDE], *(None for _ in range(k + _BESIDE - len(panels) if k else 0)))
         for k in range(0, len(panels), _BESIDE)
@@ -118,7 +118,7 @@ def _speeds_of(study: StudyRecord, part: PlacedPart) -> fig.Figure:
     )
 
 
-def _part(study: StudyRecord, name: str) -> PlacedPart:
-    part = study.drive.line.part(name)
+def _part(setup: StudySetup, name: str) -> PlacedPart:
+    part = setup.drive.line.part(name)
     assert part is not None
     return part

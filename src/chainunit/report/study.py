@@ -17,7 +17,7 @@ from ..reading.text import shown_in
 from ..study.event_table import random_runs
 from ..study.given import GivenSection, description, given_sections, origin_of, place_of
 from ..study.provenance import Heading
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudyRuns, StudySetup
 from ..study.result import speed_control
 from ..study.transients import DIFFERENCE
 from . import answer, figures, run_names, runs, shaft, slip
@@ -30,6 +30,7 @@ from .given_numbers import asked_speed, motor_title, ratio, run_settings
 from .lines import Line, Number, capital, filled, join, line, spoken
 from .live.runs import stand_in, whole_of
 from .live.study import of_study
+from .runs import matrix
 from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
@@ -41,31 +42,31 @@ _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 def report(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """The report on a study; `result` has its numbers, as `chainunit.study.result.as_dict` gives them."""
-    with shown_in(study.config.units):
+    with shown_in(study.setup.config.units):
         sections = [
             b.Section(name, contents.heading, tuple(contents.blocks(study)), beside=name == QUESTION)
             for name, contents in _sections().items()
-            if name not in analysis_sections() or (contents.analysis or name) in study.findings
+            if name not in analysis_sections() or (contents.analysis or name) in study.findings.by_analysis
         ]
         # an analysis may have nothing to show
         sections = [
             section for section in sections if section.blocks or section.name not in analysis_sections()
         ]
         given = b.Section("given", "Given values", tuple(_given(b.Source(result), study)))
-        source = source_line(cited(Heading.of(study.config.title, study.config.file)))
+        source = source_line(cited(Heading.of(study.setup.config.title, study.setup.config.file)))
         return _report(study, result, [*sections, given], source)
 
 
 def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
     blocks: list[b.Block] = []
-    with shown_in(study.config.units):
+    with shown_in(study.setup.config.units):
         for block in answer.blocks(study):
             if isinstance(block, b.Text) and block.central:
                 blocks.append(block)
             elif isinstance(block, b.Judgement) and block.severity in b.VERDICTS:
                 blocks.append(replace(block, form="both"))
-        if study.answers:
+        if study.runs.answers:
             blocks.append(runs.table_of_runs(study).of_form("short"))
         return _report(study, result, [b.Section("summary", "Summary", tuple(blocks))])
 
@@ -73,19 +74,15 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
 def _report(
     study: StudyRecord, result: Mapping[str, Any], sections: Iterable[b.Section], source: Line = ()
 ) -> b.Report:
-    config, failure = study.config, _failure(study)
-    return b.Report(
-        config.title, study.kind, result, (), tuple(sections), source, failure, units=config.units
-    )
-
-
-def _failure(study: StudyRecord) -> Line:
-    return () if study.failure is None else cited(str(study.failure), "failure")
+    config, failure = study.setup.config, study.findings.failure
+    reason = () if failure is None else cited(str(failure), "failure")
+    kind = f"{capital(study.setup.noun)}: forces, torque and overload"
+    return b.Report(config.title, kind, result, (), tuple(sections), source, reason, units=config.units)
 
 
 def _motion(study: StudyRecord) -> list[b.Block]:
     # the links of a foreign FMU are unknown
-    return [motion(study)] if study.runs and not study.drive.foreign_machine else []
+    return [motion(study)] if study.runs.series and not study.setup.drive.foreign_machine else []
 
 
 # -- the question
@@ -99,82 +96,83 @@ _GIVEN_DRIVE = (
 
 def _question(study: StudyRecord) -> Iterator[b.Block]:
     # a linkage has its title in place of a noun
-    noun = f"this {study.noun}" if study.noun[:1].islower() else f'the machine "{study.noun}"'
-    if study.proposal is None:
+    setup, runs = study.setup, study.runs
+    noun = f"this {setup.noun}" if setup.noun[:1].islower() else f'the machine "{setup.noun}"'
+    if setup.proposal is None:
         question = filled(
-            of_driver(_GIVEN_DRIVE, study.driver_noun),
+            of_driver(_GIVEN_DRIVE, setup.driver_noun),
             noun,
-            study.drive.ratio_noun,
-            exact(ratio(study)),
-            asked_speed(study),
+            setup.drive.ratio_noun,
+            exact(ratio(setup)),
+            asked_speed(setup),
         )
     else:
-        question = filled(of_driver(study.proposal.question, study.driver_noun), noun, asked_speed(study))
-    run = run_settings(study)
-    if study.answers:
+        question = filled(of_driver(setup.proposal.question, setup.driver_noun), noun, asked_speed(setup))
+    run = run_settings(setup)
+    if runs.answers:
         question += filled(
             " The machine starts from rest{} and is evaluated over {} {} when steady.",
-            line(" in ", exact(run.ramp)) if study.drive.follows else "",
+            line(" in ", exact(run.ramp)) if setup.drive.follows else "",
             exact(run.turns),
-            "turn" if study.config.run.turns == 1.0 else "turns",
+            "turn" if setup.config.run.turns == 1.0 else "turns",
         )
-    if names := study.overloads:
-        titles = "; ".join(run_names.title(study, name) for name in names)
+    if names := runs.overloads:
+        titles = "; ".join(run_names.title(runs, name) for name in names)
         question += line(f" Then come overloads, each by itself: {titles}.")
-    for plan in random_runs(study.config.plans):
-        if plan.table in study.findings:
+    for plan in random_runs(setup.config.plans):
+        if plan.table in study.findings.by_analysis:
             sentence = " Then come {} overloads at random, each by itself: {}."
             counted = exact(cited(InUnit(plan.runs, "1"), f"findings.{plan.table}.runs"))
             question += filled(sentence, counted, plan.event.title)
     yield b.Text(question, form="long")
-    is_chosen, feed = study.proposal is not None, study.config.feed
+    is_chosen, feed = setup.proposal is not None, setup.config.feed
     rows: list[b.TableRow] = []
     if not is_chosen:
-        rows.append(b.TableRow(("motor", motor_title(study))))
-    driver, machine = study.driver_noun, cited(study.drive.machine.p, "given.machine")
+        rows.append(b.TableRow(("motor", motor_title(setup))))
+    driver, machine = setup.driver_noun, cited(setup.drive.machine.p, "given.machine")
     rows += quantity_rows(run, driver, only="crank_speed", as_given=True)
     rows += () if is_chosen else quantity_rows(machine, driver, only="ratio", as_given=True)
     rows += quantity_rows(cited(feed, "given.feed"), driver, as_given=True)
     yield b.Table(tuple(rows), title="In short", form="long")
-    if not study.drive.foreign_machine:
-        alt, model = f"{capital(noun)}: its pins, links and dimensions", study.drive.machine.model
-        caption = filled(of_driver(_DRAWING_CAPTION, study.driver_noun), model.angle_counts)
-        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, caption)
+    if not setup.drive.foreign_machine:
+        alt, model = f"{capital(noun)}: its pins, links and dimensions", setup.drive.machine.model
+        caption = filled(of_driver(_DRAWING_CAPTION, setup.driver_noun), model.angle_counts)
+        yield b.Drawing(drawing(setup.drive.machine), alt, DRAWING, caption)
 
 
 def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """All given values of the study, by section."""
     # a motor on the line follows no reference
-    unused_names = [] if study.drive.follows else ["run.ramp"]
+    unused_names = [] if study.setup.drive.follows else ["run.ramp"]
     unused_names += [
         name
         for part in capabilities()
-        for name in part.unused_values(study.config.machine, study.config.plans[part.name])
+        for name in part.unused_values(study.setup.config.machine, study.setup.config.plans[part.name])
     ]
     yield b.Given(
         tuple(
-            (section.title, tuple(_values(s, study, section, unused_names)))
+            (section.title, tuple(_values(s, study.setup, section, unused_names)))
             for section in given_sections(study)
         )
     )
 
 
 def _values(
-    s: b.Source, study: StudyRecord, section: GivenSection, unused_names: Iterable[str]
+    s: b.Source, setup: StudySetup, section: GivenSection, unused_names: Iterable[str]
 ) -> Iterator[b.GivenValue]:
     """The quantities and choices of a section as given values, except those with a name in `unused_names`. A range
     gives two values, its ends."""
-    for name, text, content in _contents(s, study, section):
+    for name, text, content in _contents(s, setup, section):
         full = f"{section.name}.{name}".removeprefix(".")
         if full not in unused_names:
-            yield b.GivenValue(full, text, content, origin_of(study, full), place_of(study, full))
+            yield b.GivenValue(full, text, content, origin_of(setup, full), place_of(setup, full))
 
 
-def _contents(s: b.Source, study: StudyRecord, section: GivenSection) -> Iterator[tuple[str, str, b.Content]]:
+def _contents(s: b.Source, setup: StudySetup, section: GivenSection) -> Iterator[tuple[str, str, b.Content]]:
     """Name, description and content of each value of a section. A finding of the same place is what the study uses
     in place of the value."""
     for v in () if section.values is None else variables(type(section.values)):
-        place, text = f"{section.place}.{v.name}", v.described(study.driver_noun)
+        place, text = f"{section.place}.{v.name}", v.described(setup.driver_noun)
         if v.name in section.ranges:
             for k, end in enumerate(("least", "most")):
                 yield v.name, f"{text}, {end}", s.number(place, k, as_given=True)
@@ -195,12 +193,12 @@ def _contents(s: b.Source, study: StudyRecord, section: GivenSection) -> Iterato
 
 def _live(study: StudyRecord) -> Iterator[b.Block]:
     """The live machine of the study; none of a machine whose equations are not known."""
-    if study.drive.foreign_machine:
+    setup, config = study.setup, study.setup.config
+    if setup.drive.foreign_machine:
         return
-    config = study.config
     yield b.Live(
-        lambda: of_study(config, study.drive, config.drive, study.proposal, study.verdict),
-        whole_of(stand_in(study.drive)),
+        lambda: of_study(config, setup.drive, config.drive, setup.proposal, study.findings.verdict),
+        whole_of(stand_in(setup.drive)),
     )
 
 
@@ -209,7 +207,7 @@ def _live(study: StudyRecord) -> Iterator[b.Block]:
 
 def _basis(study: StudyRecord) -> Iterator[b.Block]:
     yield from basis(study)
-    yield software(study)
+    yield software(study.runs)
     hint = (
         "Every number in the text of this page comes from result.json, which the page contains whole. Point at a "
         "number to see its place in result.json and more digits."
@@ -219,15 +217,15 @@ def _basis(study: StudyRecord) -> Iterator[b.Block]:
 
 def basis(study: StudyRecord) -> Iterator[b.Block]:
     """The notes on a study, and its energy certificate."""
-    yield from (b.Text(note.text, "note") for note in cited(study.notes, "notes"))
-    yield from answer.remark_tables(study.notes, "notes")
-    if study.certificate:
-        yield from _certificate(study)
+    yield from (b.Text(note.text, "note") for note in cited(study.findings.notes, "notes"))
+    yield from answer.remark_tables(study.findings.notes, "notes")
+    if study.runs.certificate:
+        yield from _certificate(study.runs)
 
 
-def software(study: StudyRecord) -> b.Table:
+def software(runs: StudyRuns) -> b.Table:
     """The FMUs, the control of the speed, and the versions of a study."""
-    gains = cited(speed_control(study.drive), "findings.control")
+    gains = cited(speed_control(runs.drive), "findings.control")
     control: Line = (
         gains
         if isinstance(gains, str)
@@ -238,7 +236,7 @@ def software(study: StudyRecord) -> b.Table:
     rows = (
         *(
             b.TableRow((f"{name} FMU", origin))
-            for name, origin in cited({name: str(x) for name, x in study.fmus.items()}, "runs.fmus").items()
+            for name, origin in cited({name: str(x) for name, x in runs.fmus.items()}, "runs.fmus").items()
         ),
         b.TableRow(("speed control", control)),
         b.TableRow(("versions", line("chainunit ", cited(__version__, "chainunit"), *libraries))),
@@ -246,13 +244,13 @@ def software(study: StudyRecord) -> b.Table:
     return b.Table(rows, title="Models and software", numeric=False, form="long")
 
 
-def _certificate(study: StudyRecord) -> Iterator[b.Block]:
+def _certificate(runs: StudyRuns) -> Iterator[b.Block]:
     shares = {
         run: {
             name: Number(finite(share), "1", path=f"runs.certificate.{run}.{name}")
             for name, share in entries.items()
         }
-        for run, entries in study.certificate.items()
+        for run, entries in runs.certificate.items()
     }
     method = (
         "The energy that the motor gave to the shaft, computed in the motor, is compared with the energy that the "
@@ -260,11 +258,11 @@ def _certificate(study: StudyRecord) -> Iterator[b.Block]:
         "moved."
     )
     yield b.Text(method, "note", "long")
-    rows = {study.title_of(run): sizes for run, sizes in shares.items()}
-    yield runs.matrix(rows, "Energy certificate", "run", form="long")
+    rows = {runs.title_of(run): sizes for run, sizes in shares.items()}
+    yield matrix(rows, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for sizes in shares.values() for name in sizes):
         compared_runs = [run for run, sizes in shares.items() if name in sizes]
-        run = max(compared_runs, key=lambda run: study.certificate[run][name])
+        run = max(compared_runs, key=lambda run: runs.certificate[run][name])
         text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {{}} of the energy moved."
         parts: tuple[Line, ...] = (shares[run][name],)
         if name.endswith(DIFFERENCE):
@@ -272,7 +270,7 @@ def _certificate(study: StudyRecord) -> Iterator[b.Block]:
                 f"Difference of {name.removesuffix(DIFFERENCE)} to the monolithic solution, in parts of its "
                 f"peak: at most {{}} ({{}}); runs compared: {len(compared_runs)}."
             )
-            parts += (study.title_of(run),)
+            parts += (runs.title_of(run),)
         yield b.Text(filled(text, *parts), form="short")
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..mechanism.machine import MachineState
 from ..mechanism.models import CrankMotion, names_of
+from ..study.drive import Drive
 from ..study.readings import crank_motion, crank_torque
-from ..study.record import StudyRecord
+from ..study.record import StudyRecord, StudyRuns
 from . import linkage, machine_picture, run_names
 from .capability import Supplement, capabilities
 from .lines import capital
@@ -28,13 +29,14 @@ _LOADS = "; a dotted one is a force of the loads"
 
 def motion(study: StudyRecord) -> Animation:
     """The animation of every run, at about 60 pictures per second of machine time, more where the crank is fast."""
-    machine = study.drive.machine
-    turn = study.config.operation.turn
+    drive = study.setup.drive
+    machine = drive.machine
+    turn = study.setup.config.operation.turn
     interval = min(1.0 / _PER_SECOND, turn / _PER_TURN)
-    spans = (float(np.ptp(run["time"].values)) for run in study.runs.values())
+    spans = (float(np.ptp(run["time"].values)) for run in study.runs.series.values())
     interval = max(interval, sum(spans) / MOST)
-    supplements = (part.supplement(study) for part in capabilities())
-    supplement = next((candidate for candidate in supplements if candidate is not None), Supplement(study))
+    supplements = (part.supplement(drive) for part in capabilities())
+    supplement = next((candidate for candidate in supplements if candidate is not None), Supplement(drive))
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
     parts = machine_picture.picture(machine, whole := machine.drive(angles * machine.ratio))
     loads = _LOADS if machine_picture.has_loads(whole) else ""
@@ -42,7 +44,7 @@ def motion(study: StudyRecord) -> Animation:
     return replace(
         parts,
         links=tuple(_links(parts.links, supplement)),
-        runs=tuple(_run(study, name, interval, supplement) for name in run_names.in_order(study)),
+        runs=tuple(_run(study.runs, name, interval, supplement) for name in run_names.in_order(study.runs)),
         turn=turn,
         caption=supplement.caption or _CAPTION.format(loads, thin),
         groups=tuple(dict.fromkeys(supplement.groups.values())),
@@ -61,32 +63,32 @@ def _links(links: Iterable[DrawnLink], supplement: Supplement) -> Iterator[Drawn
     )
 
 
-def _loads(study: StudyRecord, part: Any) -> dict[str, Any]:
+def _loads(drive: Drive, part: Any) -> dict[str, Any]:
     """The inputs of the machine in rows of a run, besides the motion of its shaft, by name."""
     return {
         v.name: part[f"machine.{v.name}"].values
-        for v in study.drive.machine.model.input_layout.variables
+        for v in drive.machine.model.input_layout.variables
         if f"machine.{v.name}" in part and v.name not in names_of(CrankMotion)
     }
 
 
-def machine_state(study: StudyRecord, part: Any) -> MachineState:
+def machine_state(drive: Drive, part: Any) -> MachineState:
     """The machine in rows of a run, at the place and speed that the crank has there."""
-    machine = study.drive.machine
-    angle, speed = crank_motion(study.drive, part)
+    machine = drive.machine
+    angle, speed = crank_motion(drive, part)
     motion = {"phi": angle * machine.ratio, "w": speed * machine.ratio}
-    return machine.state(machine.inputs({**motion, **_loads(study, part)}))
+    return machine.state(machine.inputs({**motion, **_loads(drive, part)}))
 
 
-def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement) -> Clip:
-    run, drive = study.runs[name], study.drive
+def _run(runs: StudyRuns, name: str, interval: float, supplement: Supplement) -> Clip:
+    run, drive = runs.series[name], runs.drive
     model = drive.machine.model
     time = run["time"].values
     instants = np.arange(time[0], time[-1] + 0.5 * interval, interval)
     part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, instants), len(time) - 1)))
     angle, speed = crank_motion(drive, part)
-    loads = _loads(study, part)
-    state = machine_state(study, part)
+    loads = _loads(drive, part)
+    state = machine_state(drive, part)
     details = supplement.details(part, state)
     forces = machine_picture.arrows(
         drive.machine,
@@ -94,7 +96,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         supplement.groups,
         supplement.hidden,
     )
-    has_motor, driver = name in run_names.motor_runs(study), capital(study.driver_noun)
+    has_motor, driver = name in run_names.motor_runs(runs), capital(runs.drive.driver_noun)
     readings = (
         Reading(f"{driver} angle", angle % (2.0 * math.pi), "rad"),
         Reading(f"{driver} speed", speed, "rad/s"),
@@ -105,10 +107,10 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
             if v.name in loads
         ),
     )
-    event = run_names.event_time(study, name)
+    event = run_names.event_time(runs, name)
     return Clip(
         name,
-        run_names.title(study, name),
+        run_names.title(runs, name),
         part["time"].values - (event or 0.0),
         {**linkage.places(state.m), **details.joints},
         readings,
@@ -116,5 +118,5 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         details.loads,
         linkage.blocks(state.m),
         event is not None,
-        still=study.steady_begin if event is None else 0.0,
+        still=runs.steady_begin if event is None else 0.0,
     )

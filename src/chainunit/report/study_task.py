@@ -72,11 +72,12 @@ def _fmus(config: Config) -> tuple[str, ...]:
 
 def _kept(record: StudyRecord, folder: Path) -> Iterator[Path]:
     yield from (folder / "fmu").iterdir()
-    yield from filter(None, (findings.store for findings in record.findings.values()))
+    yield from filter(None, (findings.store for findings in record.findings.by_analysis.values()))
 
 
 def _shortfall(record: StudyRecord) -> str | None:
-    return record.insufficient or (None if record.reaches else "The motor does not keep the speed asked for.")
+    too_slow = None if record.runs.reaches else "The motor does not keep the speed asked for."
+    return record.setup.insufficient or too_slow
 
 
 TASK: Task[Config, StudyRecord] = Task(
@@ -88,7 +89,7 @@ TASK: Task[Config, StudyRecord] = Task(
     writers=_writers,
     replaced=_fmus,
     kept=_kept,
-    failure=lambda record: record.failure,
+    failure=lambda record: record.findings.failure,
     shortfall=_shortfall,
     tells_remarks=True,
     content=StudyData,

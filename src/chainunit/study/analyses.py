@@ -35,7 +35,8 @@ class RippleWithout(Findings):
     def remark(self, study: StudyRecord) -> None:
         """The fluctuation with feed-forward beside it."""
         if self.ripple is not None:
-            study.say(_RIPPLE, STEADY, without=self.ripple, speed_ripple=study.answers[STEADY].speed_ripple)
+            ripple = study.runs.answers[STEADY].speed_ripple
+            study.findings.say(_RIPPLE, STEADY, without=self.ripple, speed_ripple=ripple)
 
 
 _RIPPLE = note(
@@ -60,9 +61,9 @@ class FeedForwardAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> RippleWithout:
         """The fluctuation over the steady turns."""
         with work.rig.plain.from_rest() as simulation:
-            run = simulation.run(work.steady, work.rig.step).sel(time=slice(study.steady_begin, None))
-        turns = whole_turns(study.drive, run, study.config.run.turns)
-        return RippleWithout(read_measure("speed_ripple", study.window(Phase.STEADY, turns)))
+            run = simulation.run(work.steady, work.rig.step).sel(time=slice(study.runs.steady_begin, None))
+        turns = whole_turns(study.setup.drive, run, study.setup.config.run.turns)
+        return RippleWithout(read_measure("speed_ripple", study.runs.window(Phase.STEADY, turns)))
 
 
 SWINGS = 1.5
@@ -93,8 +94,8 @@ class GearFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """The loss beside the power of the machine, and its parts."""
         loss = self.loss
-        noun = study.drive.transmission
-        study.say(
+        noun = study.setup.drive.transmission
+        study.findings.say(
             _LOSS,
             STEADY,
             gear=f"{noun} {'take' if ' and ' in noun else 'takes'}",
@@ -137,11 +138,12 @@ class GearAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> GearFindings | None:
         """The loss in the steady turns; None without them, and where no mean power of them stands for running
         that lasts."""
-        if STEADY not in study.answers:
+        if STEADY not in study.runs.answers:
             return None
-        window = study.window(Phase.STEADY, study.steady)
-        warm = [findings.gear_loss for findings in study.findings.values() if findings.gear_loss is not None]
-        total, net = warm[0] if warm else window.mean(gear_loss), study.answers[STEADY].power_mean
+        window = study.runs.window(Phase.STEADY, study.runs.steady)
+        losses = (findings.gear_loss for findings in study.findings.by_analysis.values())
+        warm = [loss for loss in losses if loss is not None]
+        total, net = warm[0] if warm else window.mean(gear_loss), study.runs.answers[STEADY].power_mean
         if net is None:
             return None
         without_load = min(total, window.mean(gear_drag))
@@ -154,7 +156,7 @@ class GearAnalysis(Analysis):
                 passed_power=window.mean(lambda drive, run: np.abs(shaft_power(drive, run))),
                 share=total / net if net > 0.0 else None,
             ),
-            1.0 / (1.0 + study.drive.gear_loss),
+            1.0 / (1.0 + study.setup.drive.gear_loss),
         )
 
 

@@ -21,10 +21,10 @@ from ..mechanism.sampled_quantities import ROUNDING, roots
 from ..reading.text import number
 from .event import Role
 from .readings import pull_out_torque
-from .record import StudyRecord
+from .record import StudyRecord, StudyRuns
 from .remark import note, warning
 from .starts import StartFindings, transient_words
-from .torques import from_event_on, on_coupling, peaks_in_events, quasi_static_peak
+from .torques import on_coupling, peaks_in_events, quasi_static_peak
 from .turn import TurnAnalysis, TurnFindings
 from .verdict import START
 from .window import Phase
@@ -76,10 +76,10 @@ class RamForce:
 
 def rams(study: StudyRecord) -> Iterator[RamForce]:
     """The rams of a linkage: links that slide on the ground and that a pin drives."""
-    description = getattr(study.drive.machine.model, "described_by", None)
-    if description is None or TurnAnalysis.name not in study.findings:
+    description = getattr(study.setup.drive.machine.model, "described_by", None)
+    if description is None or TurnAnalysis.name not in study.findings.by_analysis:
         return
-    turn = TurnFindings.of_study(study).loaded
+    turn = TurnFindings.of_study(study.findings).loaded
     joints = description.structure.joints
     for name, joint in joints.items():
         if joint.kind != PRISMATIC or GROUND not in (joint.on[0], joint.by[0]):
@@ -92,7 +92,7 @@ def rams(study: StudyRecord) -> Iterator[RamForce]:
             attrgetter(description.variable("joint", joint_name))(turn.outputs) for joint_name in (name, pin)
         )
         shape = turn.angle.shape
-        rate = np.broadcast_to(guide.v, shape) / study.config.run.crank_speed
+        rate = np.broadcast_to(guide.v, shape) / study.setup.config.run.crank_speed
         size = np.broadcast_to(_along(guide, force), shape)
         dead = max(_dead_centres(turn.angle, rate), key=lambda q: _before(turn.angle, size, q), default=None)
         if dead is not None and np.max(size) > 0.0:
@@ -138,32 +138,26 @@ class StartPeak:
     run: str = START
     angle: float | None = None
 
-    def title(self, study: StudyRecord) -> str:
+    def title(self, runs: StudyRuns) -> str:
         """The start in words."""
-        return study.title_of(self.run) if self.angle is None else f"start from {number(self.angle, 'rad')}"
+        return runs.title_of(self.run) if self.angle is None else f"start from {number(self.angle, 'rad')}"
 
-    def named(self, study: StudyRecord) -> str:
+    def named(self, runs: StudyRuns) -> str:
         """The start in words, with its article."""
-        return f"{'the' if self.run == START and self.angle is None else 'a'} {self.title(study)}"
+        return f"{'the' if self.run == START and self.angle is None else 'a'} {self.title(runs)}"
 
 
 def start_peaks(study: StudyRecord) -> list[StartPeak]:
     """The largest torques on the coupling in the parts of the start: the start-up with the settling under a feed that
     comes later, starts from other crank angles, starts under load."""
-    drive, events = study.drive, study.config.events
-    runs = {START: study.runs[START].sel(time=slice(None, study.steady_begin))}
-    runs |= {
-        name: from_event_on(study, name)
-        for name in study.event
-        if name in study.runs and events[name].from_rest
-    }
+    drive, events = study.setup.drive, study.setup.config.events
+    starts = {name: run for name, run in study.runs.event_parts.items() if events[name].from_rest}
     parts = [
         StartPeak(quasi_static_peak(drive, run, on_coupling), on_coupling(drive, run), name)
-        for name, run in runs.items()
+        for name, run in {START: study.runs.rise, **starts}.items()
     ]
-    if findings := StartFindings.found_in(study):
-        starts = findings.starts
-        parts += [StartPeak(x.coupling_torque, x.coupling_transient, angle=x.angle) for x in starts]
+    if findings := StartFindings.found_in(study.findings):
+        parts += [StartPeak(x.coupling_torque, x.coupling_transient, angle=x.angle) for x in findings.starts]
     return parts
 
 
@@ -184,14 +178,9 @@ TRIPS_IN_TRANSIENT = (
 """The response of a coupling to the electromagnetic transient, in words."""
 
 
-def pull_out(study: StudyRecord) -> float:
+def pull_out(runs: StudyRuns) -> float:
     """Largest torque of the warm motor at the crank in steady running [N m]."""
-    return pull_out_torque(study.drive, study.steady, study.window(Phase.STEADY, study.steady).warm)
-
-
-def at_motor_shaft(study: StudyRecord, torque: float) -> float:
-    """Torque at the motor's shaft [N m] for one at the crank [N m], see `Drive.at_motor_shaft`."""
-    return float(study.drive.at_motor_shaft(torque))
+    return pull_out_torque(runs.drive, runs.steady, runs.window(Phase.STEADY, runs.steady).warm)
 
 
 LESS_TORQUE = 0.1
@@ -201,36 +190,37 @@ LESS_TORQUE = 0.1
 def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     """Warn where a given coupling, set to `trip` [N m], does not protect the drive as it should."""
     # the limit of a foreign motor is not known
-    most = None if study.drive.foreign else pull_out(study)
-    peaks, shocks = peaks_in_events(study), peaks_in_events(study, Role.SHOCK)
+    setup, runs, findings = study.setup, study.runs, study.findings
+    most = None if setup.drive.foreign else pull_out(runs)
+    peaks, shocks = peaks_in_events(runs), peaks_in_events(runs, Role.SHOCK)
     start, quick = hardest_start(study), transient_of_starts(study)
     if start.torque > trip:
-        study.say(_OPENS_IN_START, START, trip=trip, where=start.title(study), start=start.torque)
+        findings.say(_OPENS_IN_START, START, trip=trip, where=start.title(runs), start=start.torque)
     elif quick.transient > trip:
-        study.say(
+        findings.say(
             _OPENS_IN_TRANSIENT,
             START,
             trip=trip,
-            where=quick.title(study),
+            where=quick.title(runs),
             start=start.torque,
-            transient=transient_words(study),
+            transient=transient_words(setup),
             most=quick.transient,
         )
-    openings = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
+    openings = [name for name in peaks if runs.answers[name].coupling_trip_time is not None]
     if nuisances := [name for name in openings if name not in shocks]:
-        study.say(_NUISANCE, *nuisances, trip=trip, where="; ".join(map(study.title_of, nuisances)))
+        findings.say(_NUISANCE, *nuisances, trip=trip, where="; ".join(map(runs.title_of, nuisances)))
     if shocks and not set(openings) & set(shocks):
-        study.say(
+        findings.say(
             _NEVER_OPENS,
             *shocks,
-            where="; ".join(map(study.title_of, shocks)),
+            where="; ".join(map(runs.title_of, shocks)),
             trip=trip,
             largest=max(shocks.values()),
-            steady=on_coupling(study.drive, study.steady),
+            steady=on_coupling(setup.drive, runs.steady),
             motor=most,
         )
-    elif most is not None and trip > (least := (1.0 - LESS_TORQUE) * most if study.plate else most):
-        study.say(_ABOVE_MOTOR, trip=trip, motor=most, least=least if study.plate else None)
+    elif most is not None and trip > (least := (1.0 - LESS_TORQUE) * most if setup.plate else most):
+        findings.say(_ABOVE_MOTOR, trip=trip, motor=most, least=least if setup.plate else None)
 
 
 _OPENS_IN_START = warning(
@@ -295,7 +285,7 @@ def remark_on_rams(study: StudyRecord, torque: float, set_for: str = "") -> None
     for group in alike.values():
         ram, names = group[0], [ram.ram for ram in group]
         angle, way = ram.overloaded(torque) or (None, None)
-        study.say(
+        study.findings.say(
             _RAM,
             trip=torque,
             set_for=set_for,

@@ -15,7 +15,7 @@ from .catalogue_drive import BOOST, SLIP
 from .config import FileContents
 from .event_table import random_runs
 from .parts import LENGTHS
-from .record import StudyRecord
+from .record import StudyRecord, StudySetup
 from .rules import all_rules
 from .sections import SystemTable, all_choices, all_sections
 
@@ -70,20 +70,18 @@ def _choice(value: Any) -> Any:
 
 def given_sections(study: StudyRecord) -> list[GivenSection]:
     """All given values of a study; with them the study can be repeated."""
-    config = study.config
+    setup, config, runs = study.setup, study.setup.config, study.runs
     sections = [
         GivenSection("", "Study", None, _of_study(config.file)),
         GivenSection("system", "System", None, _system(config.file.choices, is_chosen=config.motor is None)),
-        GivenSection("machine", "Machine", study.drive.machine.p),
+        GivenSection("machine", "Machine", setup.drive.machine.p),
         GivenSection("feed", "Feed in normal running", config.feed),
         *(
-            GivenSection(
-                f"event.{name}", study.title_of(name)[:1].upper() + study.title_of(name)[1:], event.p
-            )
+            GivenSection(f"event.{name}", runs.title_of(name)[:1].upper() + runs.title_of(name)[1:], event.p)
             for name, event in config.events.items()
         ),
         *_tables(study),
-        GivenSection("motor", "Motor", study.drive.parameters),
+        GivenSection("motor", "Motor", setup.drive.parameters),
     ]
     return [section for section in sections if section.values is not None or section.choices]
 
@@ -105,10 +103,10 @@ def _system(choices: Mapping[str, Any], *, is_chosen: bool) -> dict[str, Any]:
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
-    config = study.config
+    config = study.setup.config
     randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():
-        placed = study.drive.line.part(name)
+        placed = study.setup.drive.line.part(name)
         values = config.table(name) if placed is None or placed.table is None else placed.table
         if values is None or not section.is_used(study):
             continue
@@ -150,32 +148,32 @@ _CHOSEN = ("gear.efficiency", BOOST, SLIP)
 """Values that follow from a proposed drive where the file leaves them out, see `as_used` of `catalogue_drive`."""
 
 
-def origin_of(study: StudyRecord, name: str) -> str:
+def origin_of(setup: StudySetup, name: str) -> str:
     """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "linkage" (the
     file of the machine), "example", "tuned", "catalogue" (by the motor that the file names), the name of a proposal,
     or "declared"."""
-    config, (section, _, parameter) = study.config, name.partition(".")
-    if name in _CHOSEN and study.proposal is not None and _of(config.file, name) == "declared":
-        return study.proposal.name
+    config, (section, _, parameter) = setup.config, name.partition(".")
+    if name in _CHOSEN and setup.proposal is not None and _of(config.file, name) == "declared":
+        return setup.proposal.name
     if name == SLIP and config.drive.start == "inverter" and _of(config.file, name) == "declared":
         return "catalogue"
-    if section == "motor" and (tuning := study.drive.tuning) and parameter in tuning.parameters:
+    if section == "motor" and (tuning := setup.drive.tuning) and parameter in tuning.parameters:
         return "file" if name in config.file.given else "tuned"
     if section == "machine" and parameter in LENGTHS and config.file.gives("ratios"):
         return "file"
     if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.file.of_example:
         return "example"
     if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
-        name_in_file = _name_in_file(study, parameter)
+        name_in_file = _name_in_file(setup, parameter)
         if not name_in_file:
-            return "catalogue" if study.proposal is None else study.proposal.name
+            return "catalogue" if setup.proposal is None else setup.proposal.name
         name = name_in_file
     return _of(config.file, name)
 
 
-def place_of(study: StudyRecord, name: str) -> str:
+def place_of(setup: StudySetup, name: str) -> str:
     """The file and the line that give the value of a quantity ("jaw.toml, line 23"); empty where no file does."""
-    file, origin = study.config.file, origin_of(study, name)
+    file, origin = setup.config.file, origin_of(setup, name)
     if origin == "file" and (line := file.lines.get(name)):
         return f"{Path(file.source).name}, line {line}"
     return f"{file.linkage}, line {_linkage_line(file, name)}" if origin == "linkage" else ""
@@ -205,9 +203,9 @@ def _linkage_line(file: FileContents, name: str) -> int:
 _GRAVITY = {"g": "gravity"}
 
 
-def _name_in_file(study: StudyRecord, parameter: str) -> str:
+def _name_in_file(setup: StudySetup, parameter: str) -> str:
     """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
-    config, proposal = study.config, study.proposal
+    config, proposal = setup.config, setup.proposal
     if proposal is not None and parameter in proposal.keys:
         return proposal.keys[parameter]
     if parameter == "ratio":

@@ -42,26 +42,26 @@ def need_of(
 def inverter_need(study: StudyRecord) -> InverterNeed | None:
     """The inverter of a study, by its runs and the runs of the choice; None on the line. An overload that opens a
     recommended torque limiter counts until the limiter opens."""
-    rated, overload = study.drive.rated_current, study.config.drive.starter.overload
-    if rated is None or study.config.drive.start != "inverter":
+    rated, overload = study.setup.drive.rated_current, study.setup.config.drive.starter.overload
+    if rated is None or study.setup.config.drive.start != "inverter":
         return None
-    named = (("start_up", study.start), *study.answers.items())
+    named = (("start_up", study.runs.start), *study.runs.answers.items())
     currents = {name: a.current_peak for name, a in named if a and a.current_peak is not None}
     until_trip = study.currents_until_trip
     peaks = {
-        f"{study.title_of(name)}{', with the torque limiter' * (name in until_trip)}": until_trip.get(
+        f"{study.runs.title_of(name)}{', with the torque limiter' * (name in until_trip)}": until_trip.get(
             name, current
         )
         for name, current in currents.items()
     }
     lasting: list[float] = []
-    if starts := StartFindings.found_in(study):
+    if starts := StartFindings.found_in(study.findings):
         worst = max(starts.starts, key=lambda start: start.current)
         peaks[f"a start from {number(worst.angle, 'rad')}"] = worst.current
         lasting = [start.long_current for start in starts.starts]
-    steady = study.answers.get(STEADY)
+    steady = study.runs.answers.get(STEADY)
     need = need_of(rated, None if steady is None else steady.current_rms, lasting, peaks, overload)
-    chosen = None if study.proposal is None else study.proposal.inverter_current
+    chosen = None if study.setup.proposal is None else study.setup.proposal.inverter_current
     if chosen is None or chosen <= need.current:
         return need
     return replace(need, current=chosen, case="the runs of the choice")

@@ -11,7 +11,7 @@ from .coupling import LESS_TORQUE
 from .event import Role
 from .limits import Check, given_motor, reaches
 from .readings import has_turn, less_than_a_turn, motor_run_up
-from .record import StudyRecord
+from .record import StudyRecord, StudyRuns
 from .rig import worst_residual
 from .start_runs import longest_of
 from .starts import StartFindings
@@ -21,24 +21,24 @@ from .window import Phase
 
 def model_verdict(study: StudyRecord) -> Verdict:
     """The verdict on the model of the machine, from the numbers of the runs."""
-    config, answers = study.config, study.answers
+    config, answers = study.setup.config, study.runs.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
-    speed, residuals = max(config.run.crank_speed, mean), _residuals(study.certificate)
-    if study.drive.machine.model.sides and not study.drive.foreign_machine:
+    speed, residuals = max(config.run.crank_speed, mean), _residuals(study.runs.certificate)
+    if study.setup.drive.machine.model.sides and not study.setup.drive.foreign_machine:
         verdict: Verdict = config.organs.verdict(study, speed, mean, residuals)
         return verdict
     faults = balance_faults(residuals)
-    if study.drive.foreign_machine:
+    if study.setup.drive.foreign_machine:
         return Verdict("energy balance", None, speed, faults, mean)
-    return Verdict("machine", "rigid links", speed, faults, mean, study.driver_noun)
+    return Verdict("machine", "rigid links", speed, faults, mean, study.setup.driver_noun)
 
 
-def wrong_runs(study: StudyRecord) -> list[str]:
+def wrong_runs(runs: StudyRuns) -> list[str]:
     """The runs whose energy balance is not kept, so that their numbers count as wrong; start-up and steady running
     are one run."""
     # a balance of NaN is not kept either
-    return [name for name, residual in _residuals(study.certificate).items() if not residual < RESIDUAL]
+    return [name for name, residual in _residuals(runs.certificate).items() if not residual < RESIDUAL]
 
 
 def _residuals(certificate: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
@@ -49,18 +49,19 @@ def _residuals(certificate: Mapping[str, Mapping[str, float]]) -> dict[str, floa
 def motor_limits(study: StudyRecord) -> dict[str, Check]:
     """The values of the motor in its start and in steady running beside its limits, by name. Of a
     proposed motor only the temperature is checked here, as its starts and its duty were checked before."""
-    steady, start = study.answers.get(STEADY), study.start
+    setup, runs = study.setup, study.runs
+    steady, start = runs.answers.get(STEADY), runs.start
     if steady is None or start is None:
         return {}
-    time, findings = start.start_time, StartFindings.found_in(study)
+    time, findings = start.start_time, StartFindings.found_in(study.findings)
     if findings is not None:
         # the worst crank angle counts
         others = longest_of(findings.starts)
         time = None if others is None or time is None else max(time, others)
-    time = motor_run_up(study.drive, study.runs[START].sel(time=slice(None, study.steady_begin)), time)
-    config, permitted = study.config, study.config.permitted_temperature[1]
+    time = motor_run_up(setup.drive, runs.rise, time)
+    config, permitted = setup.config, setup.config.permitted_temperature[1]
     return given_motor(
-        study.drive, config.plate, permitted, steady.winding_temperature, steady.current_rms, time
+        setup.drive, config.plate, permitted, steady.winding_temperature, steady.current_rms, time
     )
 
 
@@ -86,14 +87,14 @@ def no_reserve(run: str, reserve: float) -> str:
     return f"{when} its torque exceeds the pull-out torque by {over}"
 
 
-def slowed(study: StudyRecord) -> dict[str, float]:
+def slowed(runs: StudyRuns) -> dict[str, float]:
     """The overloads that pull the motor below half its speed without standing still or opening a coupling, with the
     dip of the speed, a share of it."""
-    events = study.config.events
+    events = runs.events
     return {
         name: answers.speed_dip
-        for name, answers in study.answers.items()
-        if name in study.overloads
+        for name, answers in runs.answers.items()
+        if name in runs.overloads
         and events[name].role is Role.SHOCK
         and not events[name].from_rest
         and answers.stall_time is None
@@ -102,22 +103,22 @@ def slowed(study: StudyRecord) -> dict[str, float]:
     }
 
 
-def lasts(study: StudyRecord) -> bool:
+def lasts(runs: StudyRuns) -> bool:
     """Whether means of steady running stand for running that lasts, see `Window.lasts`."""
-    return study.window(Phase.STEADY, study.steady).lasts
+    return runs.window(Phase.STEADY, runs.steady).lasts
 
 
 def _not_judged(study: StudyRecord, speed: str) -> str:
     """Why a motor is not said to keep its speed though the mean `speed` is near: it does not start from another
     angle, or its turns are not steady; empty where neither is so."""
-    findings, driver = StartFindings.found_in(study), study.driver_noun
+    findings, driver = StartFindings.found_in(study.findings), study.setup.driver_noun
     if findings is not None and findings.stuck:
         where = " and ".join(number(start.angle, "rad") for start in findings.stuck)
         return f"The motor does NOT bring the {driver} to its speed from {where}, though it turns at {speed} here"
-    if lasts(study):
+    if lasts(study.runs):
         return ""
-    steady, why = study.answers[STEADY], less_than_a_turn(study.drive, study.steady)
-    if has_turn(study.drive, study.steady):
+    steady, why = study.runs.answers[STEADY], less_than_a_turn(study.setup.drive, study.runs.steady)
+    if has_turn(study.setup.drive, study.runs.steady):
         gap, energy = (number(abs(x), "1", "percent") for x in (steady.cycle_gap, steady.energy_gap))
         why = f"their ends differ by {gap}, and the moving masses take up or give {energy} of the energy that passes"
     return (
@@ -145,14 +146,14 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
     does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
     another limit is exceeded, or no motor was found that suffices. The least reserve is given with its
     run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
-    steady = study.answers.get(STEADY)
+    setup, runs, steady = study.setup, study.runs, study.runs.answers.get(STEADY)
     if steady is None:
         return None
-    wrong = wrong_runs(study)
-    left_out = [name for name in study.answers if name in wrong]
+    wrong = wrong_runs(runs)
+    left_out = [name for name in runs.answers if name in wrong]
     reserves = {
         name: answers.torque_reserve
-        for name, answers in study.answers.items()
+        for name, answers in runs.answers.items()
         if name not in left_out and answers.torque_reserve is not None
     }
     run = min(reserves, key=lambda name: float(reserves[name]), default=None)
@@ -160,31 +161,31 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
     limits = {} if STEADY in left_out else motor_limits(study)
     used = {name: check.utilisation for name, check in limits.items()}
     excesses = [name for name, share in used.items() if share is None or share > 1.0]
-    stalls, (keeps_speed, text) = slowed(study), _on_speed(study, steady.speed_mean)
-    if study.proposal is not None and study.insufficient:
-        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the {study.proposal.name}"
+    stalls, (keeps_speed, text) = slowed(runs), _on_speed(study, steady.speed_mean)
+    if setup.proposal is not None and setup.insufficient:
+        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the {setup.proposal.name}"
     if excesses:
-        link = ", but" if keeps_speed and not study.insufficient else ";"
+        link = ", but" if keeps_speed and not setup.insufficient else ";"
         text += f"{link} {', '.join(_EXCESSES[name] for name in excesses)}"
     text += f"; {_on_reserve(study, run, reserve)}"
     if stalls:
-        dips = (f"{study.title_of(name)}: by {number(dip, '1', 'percent')}" for name, dip in stalls.items())
+        dips = (f"{runs.title_of(name)}: by {number(dip, '1', 'percent')}" for name, dip in stalls.items())
         text += f"; its speed dips as in a stall ({', '.join(dips)})"
     if left_out:
-        names = ", ".join(map(study.title_of, left_out))
+        names = ", ".join(map(runs.title_of, left_out))
         text += f"; runs whose energy balance is not kept are left out ({names})"
-    is_ample = reserve is not None and reserve >= (AMPLE if study.plate is None else LESS_TORQUE)
-    holds: Holds = "true" if is_ample and not (stalls or study.insufficient or excesses) else "in part"
+    is_ample = reserve is not None and reserve >= (AMPLE if setup.plate is None else LESS_TORQUE)
+    holds: Holds = "true" if is_ample and not (stalls or setup.insufficient or excesses) else "in part"
     if not keeps_speed or "temperature" in excesses:
         holds = "false"
-    asked = study.config.run.crank_speed
+    asked = setup.config.run.crank_speed
     return MotorVerdict(holds, f"{text}.", steady.speed_mean, asked, reserve, run, left_out, used)
 
 
 def _on_speed(study: StudyRecord, mean: float) -> tuple[bool, str]:
     """Whether the motor keeps the speed asked for, by the `mean` speed of steady running [rad/s], and the begin of
     the sentence on it."""
-    asked, driver = study.config.run.crank_speed, study.driver_noun
+    asked, driver = study.setup.config.run.crank_speed, study.setup.driver_noun
     speed = number(shown_speed(mean, asked), "rad/s", "speed", beside=False)
     asked_words = number(asked, "rad/s", "speed", full=False, beside=False)
     if not reaches(mean, asked) and mean > asked:
@@ -207,9 +208,9 @@ def _on_reserve(study: StudyRecord, run: str | None, reserve: float | None) -> s
         return "its reserve of torque is not known"
     if not reserve >= 0.0:
         bare = ", without the recommended torque limiter" if run in study.currents_until_trip else ""
-        return f"{no_reserve(run, reserve)} ({study.title_of(run)}{bare})"
-    text = f"least reserve of torque {number(reserve, '1', 'percent')} ({study.title_of(run)})"
-    if study.plate is not None and reserve < LESS_TORQUE:
+        return f"{no_reserve(run, reserve)} ({study.runs.title_of(run)}{bare})"
+    text = f"least reserve of torque {number(reserve, '1', 'percent')} ({study.runs.title_of(run)})"
+    if study.setup.plate is not None and reserve < LESS_TORQUE:
         weaker = number(LESS_TORQUE, "1", "percent")
         text += f", less than the {weaker} by which IEC 60034-1 permits it to be weaker"
     return text

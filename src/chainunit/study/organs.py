@@ -99,14 +99,14 @@ class TwoBars(OrganModel):
         self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]
     ) -> Verdict:
         """See `chainunit.study.verdict.two_bars`."""
-        config = study.config
-        empty = {name for name in study.overloads if config.events[name].empties}
-        slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
+        config = study.setup.config
+        empty = {name for name in study.runs.overloads if config.events[name].empties}
+        slack_speed, resonance = slack_and_mode(study.setup.drive.chain_unit, config.feed)
         return verdict.two_bars(
             speed,
             resonance,
             slack_speed,
-            study.pulls,
+            study.runs.pulls,
             residuals,
             empty={""} if has_empty_side(config.feed) else empty,
             actual=actual,

@@ -21,7 +21,7 @@ from .measures import STARTED, Answers
 from .parts import LENGTHS
 from .permitted_starts import standard_inertia
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
-from .record import LOAD_CYCLE, StudyRecord
+from .record import LOAD_CYCLE, StudyRecord, StudyRuns, StudySetup
 from .registry import capabilities, parts_of_line
 from .remark import DECLARED, SEVERITIES, Remark, RemarkCode, fault, note, warning
 from .start_runs import speed_in_star
@@ -49,45 +49,45 @@ NO_ACCELERATION = fault(
 
 def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
-    config, machine = study.config, study.drive.foreign_machine
+    config, machine = study.setup.config, study.setup.drive.foreign_machine
     if config.file.is_packaged:
-        study.say(_PACKAGED)
+        study.findings.say(_PACKAGED)
     elif config.file.of_example:
-        study.say(_OF_EXAMPLE)
+        study.findings.say(_OF_EXAMPLE)
     elif machine:
-        study.say(_FOREIGN, description=machine.model.description)
+        study.findings.say(_FOREIGN, description=machine.model.description)
     else:
-        study.say(_DEFAULTS)
-    if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
-        study.say(_FRICTION)
+        study.findings.say(_DEFAULTS)
+    if any(value for name, value in study.setup.drive.machine.by_name.items() if name.endswith("friction")):
+        study.findings.say(_FRICTION)
     for value in config.file.unusual:
         if value.with_unit:
-            study.say(_UNUSUAL, value=str(value))
+            study.findings.say(_UNUSUAL, value=str(value))
     if (lengths := lengths_of_example(config.file.given, bool(config.machine.model.sides))) is not None:
-        study.remarks.append(lengths)
-    if left_out := list(_left_out(study)):
-        study.say(_LEFT_OUT, what=" and ".join(left_out))
-    if study.answers:
-        study.verdict = replace(model_verdict(study), step=config.run.step)
-        motor = study.drive.foreign
+        study.findings.remarks.append(lengths)
+    if left_out := list(_left_out(study.setup)):
+        study.findings.say(_LEFT_OUT, what=" and ".join(left_out))
+    if study.runs.answers:
+        study.findings.verdict = replace(model_verdict(study), step=config.run.step)
+        motor = study.setup.drive.foreign
         if motor is not None and "a" not in motor.connectors:
-            study.say(NO_ACCELERATION, title=motor.title)
-            study.verdict = study.verdict.without_acceleration()
-        study.remarks += study.verdict.details(study.titles)
+            study.findings.say(NO_ACCELERATION, title=motor.title)
+            study.findings.verdict = study.findings.verdict.without_acceleration()
+        study.findings.remarks += study.findings.verdict.details(study.runs.titles)
     config.organs.remark(study)
-    if STEADY in study.answers:
+    if STEADY in study.runs.answers:
         _on_start(study)
         _on_star(study)
         _on_inertia(study)
         _on_limits(study)
-        _on_steady_running(study, study.answers[STEADY])
-        if study.drive.foreign is None:
+        _on_steady_running(study, study.runs.answers[STEADY])
+        if study.setup.drive.foreign is None:
             _on_rotor(study)
-    of_drive = None if study.proposal is None else study.proposal.findings
+    of_drive = None if study.setup.proposal is None else study.setup.proposal.findings
     if of_drive is not None:
         of_drive.remark(study)
     if config.coupling is not None:
-        if STEADY in study.answers:
+        if STEADY in study.runs.answers:
             remark_on_coupling(study, config.coupling.trip_torque)
         remark_on_rams(study, config.coupling.trip_torque)
     _on_runs(study)
@@ -95,7 +95,7 @@ def conclude(study: StudyRecord) -> None:
     _on_assumptions(study)
     for part in parts_of_line():
         part.remark(study)
-    for findings in study.findings.values():
+    for findings in study.findings.by_analysis.values():
         if findings is not of_drive:
             findings.remark(study)
 
@@ -143,18 +143,18 @@ _RATING = ("limit.i", "limit.v", "armature.k")
 """Parameters that limit the torque of a motor without a nameplate."""
 
 
-def _left_out(study: StudyRecord) -> Iterator[str]:
+def _left_out(setup: StudySetup) -> Iterator[str]:
     """Values that decide the result, but that the file leaves out, so that the packaged values are used."""
-    config, coupling = study.config, study.config.coupling
+    config, coupling = setup.config, setup.config.coupling
     if config.file.is_packaged:
         return
     if coupling is not None and "coupling.trip_torque" not in config.file.given:
         yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
     if config.plate is not None and "system.motor" in config.file.of_example:
         yield f"the motor ({config.plate.designation})"
-    elif study.proposal is None and study.drive.foreign is None:
-        values = study.drive.motor.parameter_layout.by_name(study.drive.parameters)
-        units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
+    elif setup.proposal is None and setup.drive.foreign is None:
+        values = setup.drive.motor.parameter_layout.by_name(setup.drive.parameters)
+        units = {v.name: v.unit for v in setup.drive.motor.parameter_layout.variables}
         names = [name for name in _RATING if f"motor.{name}" in config.file.of_example]
         if names:
             sizes = (f"{name} = {number(values[name], units[name], full=False)}" for name in names)
@@ -163,15 +163,15 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
 
 def _on_start(study: StudyRecord) -> None:
     """Warn where the feed came to a machine that did not have its speed yet."""
-    feed_time = study.started.rig.fed_from if study.started else None
+    feed_time = study.runs.started.rig.fed_from if study.runs.started else None
     if feed_time is None:
         return
-    run = study.runs["start_up"]
-    speed = float(np.interp(feed_time, run["time"].values, crank_speed(study.drive, run)))
-    requested = study.config.run.crank_speed
+    run = study.runs.series["start_up"]
+    speed = float(np.interp(feed_time, run["time"].values, crank_speed(study.setup.drive, run)))
+    requested = study.setup.config.run.crank_speed
     # the row at which the speed is passed is the last of the start
     if speed < STARTED * requested:
-        study.say(
+        study.findings.say(
             _FED_BEFORE_SPEED,
             START,
             fed=feed_time,
@@ -218,8 +218,8 @@ _NO_RESERVE = fault(
 
 def _on_limits(study: StudyRecord) -> None:
     """Warn where the motor exceeds a limit in its start or in steady running."""
-    steady = study.answers[STEADY]
-    key, permitted = study.config.permitted_temperature
+    runs, findings, steady = study.runs, study.findings, study.runs.answers[STEADY]
+    key, permitted = study.setup.config.permitted_temperature
     for name, check in motor_limits(study).items():
         if not check.over:
             continue
@@ -229,30 +229,30 @@ def _on_limits(study: StudyRecord) -> None:
             if not math.isfinite(value):
                 # that case has its own remark
                 continue
-        study.say(
+        findings.say(
             _LIMITS[name],
             START if name == "start" else STEADY,
             value=(value, check.unit),
             limit=(limit, check.unit),
-            **({"peak": study.start.current_peak if study.start else 0.0} if name == "start" else {}),
+            **({"peak": runs.start.current_peak if runs.start else 0.0} if name == "start" else {}),
             key=key,
         )
     if steady.torque_reserve is not None and steady.torque_reserve < 0.0:
-        study.say(
+        findings.say(
             _NO_RESERVE,
             STEADY,
-            turns="" if _stall_speed(study, steady) is None else None,
+            turns="" if _stall_speed(runs, steady) is None else None,
             passes=no_reserve(STEADY, steady.torque_reserve),
             over=-steady.torque_reserve,
         )
 
 
-def _stall_speed(study: StudyRecord, steady: Answers) -> float | None:
+def _stall_speed(runs: StudyRuns, steady: Answers) -> float | None:
     """The crank speed [rad/s] below which a load stalls the motor, if this motor is stalled; else None, as of one
     that still speeds up. It is not known for a foreign motor."""
-    if study.reaches or study.drive.foreign is not None or steady.energy_gap > STORED:
+    if runs.reaches or runs.drive.foreign is not None or steady.energy_gap > STORED:
         return None
-    breakdown = breakdown_speed(study.drive, study.steady)
+    breakdown = breakdown_speed(runs.drive, runs.steady)
     return breakdown if steady.speed_mean < breakdown else None
 
 
@@ -278,13 +278,13 @@ _BY_SLIP = _speed_missed(
 )
 
 
-def _why_missed(study: StudyRecord, steady: Answers) -> RemarkCode:
+def _why_missed(runs: StudyRuns, steady: Answers) -> RemarkCode:
     """The remark on a crank that does not turn at the requested speed, by the reason."""
-    if _stall_speed(study, steady) is not None:
+    if _stall_speed(runs, steady) is not None:
         return _STALLED
     if steady.energy_gap > STORED:
         return _SPEEDS_UP
-    return _AT_ITS_LIMIT if study.drive.follows else _BY_SLIP
+    return _AT_ITS_LIMIT if runs.drive.follows else _BY_SLIP
 
 
 _NO_MEAN = (
@@ -326,24 +326,24 @@ _NO_THERMAL = fault(
 
 
 def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
-    requested = study.config.run.crank_speed
-    never = study.drive.simulated_machine.model.never_repeats
-    refused = None if lasts(study) else ""
-    if not study.reaches:
-        from_here = any(not study.config.events[name].from_rest for name in study.overloads)
-        below = _stall_speed(study, steady)
-        study.say(
-            _why_missed(study, steady),
+    setup, runs, findings = study.setup, study.runs, study.findings
+    requested, never = setup.config.run.crank_speed, setup.drive.simulated_machine.model.never_repeats
+    refused = None if lasts(runs) else ""
+    if not runs.reaches:
+        from_here = any(not setup.config.events[name].from_rest for name in runs.overloads)
+        below = _stall_speed(runs, steady)
+        findings.say(
+            _why_missed(runs, steady),
             STEADY,
             speed_mean=shown_speed(steady.speed_mean, requested),
             asked=number(requested, "rad/s", "speed", full=False),
             below=None if below is None else number(below, "rad/s", "speed", beside=False),
             overloads="" if from_here else None,
         )
-    if not has_turn(study.drive, study.steady):
-        study.say(_NO_TURN, STEADY, made=less_than_a_turn(study.drive, study.steady), refused=refused)
+    if not has_turn(setup.drive, runs.steady):
+        findings.say(_NO_TURN, STEADY, made=less_than_a_turn(setup.drive, runs.steady), refused=refused)
     elif steady.cycle_gap > CLOSED:
-        study.say(
+        findings.say(
             _NOT_CLOSED,
             STEADY,
             cycle_gap=steady.cycle_gap,
@@ -351,23 +351,23 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             repeats=never or "the machine has not settled",
         )
     elif abs(steady.speed_drift) > DRIFT and not never:
-        study.say(
+        findings.say(
             _SPEED_DRIFTS,
             STEADY,
             moves="speeds up" if steady.speed_drift > 0.0 else "slows down",
             speed_drift=abs(steady.speed_drift),
         )
     elif abs(steady.energy_gap) > STORED and not never:
-        study.say(
+        findings.say(
             _ENERGY_TAKEN,
             STEADY,
             take="still take up energy" if steady.energy_gap > 0.0 else "still give energy",
             energy_gap=abs(steady.energy_gap),
-            lasts="" if lasts(study) else None,
+            lasts="" if lasts(runs) else None,
             refused=refused,
         )
     if steady.winding_temperature is not None and not math.isfinite(steady.winding_temperature):
-        study.say(_NO_THERMAL, STEADY)
+        findings.say(_NO_THERMAL, STEADY)
 
 
 _STAR_TOO_SHORT = warning(
@@ -400,11 +400,11 @@ _STANDS_IN_STAR = warning(
 
 def _on_star(study: StudyRecord) -> None:
     """Warn of a motor that stands in star, and of a change from star to delta at too low a speed, in any start."""
-    drive, time, run = study.drive, study.drive.time_in_star, study.runs["start_up"]
+    drive, time, run = study.setup.drive, study.setup.drive.time_in_star, study.runs.series["start_up"]
     first = speed_in_star(drive, run)
-    if first is None or study.plate is None:
+    if first is None or study.setup.plate is None:
         return
-    findings, times = StartFindings.found_in(study), run["time"].values
+    findings, times = StartFindings.found_in(study.findings), run["time"].values
     starts = () if findings is None else findings.starts
     after = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.switched_until]
     delta = float(max([*after, *(start.current for start in starts)], default=0.0))
@@ -413,15 +413,15 @@ def _on_star(study: StudyRecord) -> None:
         angles = ", ".join(number(angle, "rad") for angle in held)
         where = f"from {len(held)} of {len(starts)} angles ({angles})"
         least = min((share for angle, share in by_angle.items() if angle not in held), default=None)
-        study.say(_STANDS_IN_STAR, START, where=where, share=least, delta=delta)
+        study.findings.say(_STANDS_IN_STAR, START, where=where, share=least, delta=delta)
         return
     share, angle = min([(first, 0.0), *((share, angle) for angle, share in by_angle.items())])
     if times[-1] <= drive.switched_until or share >= _LITTLE_STAR:
         return
     if share < FULL_STAR:
-        study.say(_STAR_TOO_SHORT, START, time=time, share=share, angle=angle, delta=delta)
+        study.findings.say(_STAR_TOO_SHORT, START, time=time, share=share, angle=angle, delta=delta)
     else:
-        study.say(_STAR_JUST_LONG, START, share=share, angle=angle)
+        study.findings.say(_STAR_JUST_LONG, START, share=share, angle=angle)
 
 
 _HEAVY = warning(
@@ -434,11 +434,12 @@ _HEAVY = warning(
 
 def _on_inertia(study: StudyRecord) -> None:
     """Warn of an inertia beyond the one that each motor brings up to speed."""
-    if study.plate is None:
+    setup, plate = study.setup, study.setup.plate
+    if plate is None:
         return
-    limit = standard_inertia(study.drive, study.plate.nameplate, study.steady, study.config.drive.start)
+    limit = standard_inertia(setup.drive, plate.nameplate, study.runs.steady, setup.config.drive.start)
     if limit is not None and limit[0] > limit[1]:
-        study.say(_HEAVY, START, inertia=limit[0], most=limit[1])
+        study.findings.say(_HEAVY, START, inertia=limit[0], most=limit[1])
 
 
 _HAPPENINGS = {
@@ -477,16 +478,14 @@ _HAPPENINGS = {
 
 def _on_runs(study: StudyRecord) -> None:
     """A remark for each kind of happening in the runs, with all runs in which it occurred."""
-    happenings = [(name, *happening) for name in study.answers for happening in _happenings(study, name)]
+    ran, drive = study.runs, study.runs.drive
+    happenings = [(name, *happening) for name in ran.answers for happening in _happenings(ran, name)]
     for code in dict.fromkeys(code for _, code, *_ in happenings):
         runs = {name: (text, sizes) for name, kind, text, sizes in happenings if kind == code}
-        where = (f"{study.title_of(name)}{aside(text)}" for name, (text, _) in runs.items())
-        limit = (
-            {"passed": study.drive.motor.current_limit(study.drive.parameters)}
-            if code == "current-limit"
-            else {}
-        )
-        study.say(
+        where = (f"{ran.title_of(name)}{aside(text)}" for name, (text, _) in runs.items())
+        passed = {"passed": drive.motor.current_limit(drive.parameters)}
+        limit = passed if code == "current-limit" else {}
+        study.findings.say(
             _HAPPENINGS[code],
             *runs,
             where="; ".join(where),
@@ -495,21 +494,21 @@ def _on_runs(study: StudyRecord) -> None:
         )
 
 
-def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[str, float | None]]]:
+def _happenings(runs: StudyRuns, name: str) -> Iterator[tuple[str, str, dict[str, float | None]]]:
     """Each happening in a run: its code, its numbers in words, and its numbers as data."""
-    config, answers = study.config, study.answers[name]
+    answers, drive = runs.answers[name], runs.drive
     pulls = answers.web_pull_least, answers.wall_pull_least
     is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and is_pushed:
         yield "rod-end-pushed", "", {}
-    largest = study.drive.motor.current_limit(study.drive.parameters)
+    largest = drive.motor.current_limit(drive.parameters)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current-limit", "", {}
     if answers.stall_time is not None:
-        late = answers.stall_time > 10.0 * config.run.step
+        late = answers.stall_time > 10.0 * runs.operation.run.step
         after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"
         yield "stall", after, {"stall_time": answers.stall_time}
-    if (dip := slowed(study).get(name)) is not None:
+    if (dip := slowed(runs).get(name)) is not None:
         yield "slowed", f"by {number(dip, '1', 'percent')}", {"speed_dip": dip}
     if answers.coupling_trip_time is not None:
         names = ("coupling_trip_time", "energy_after_trip", "energy_behind")
@@ -520,10 +519,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
             stays = f"{behind} stay behind it"
         yield "trip", f"after {time}; {energy} pass it while it opens, {stays}", sizes
     elif (
-        name in config.events
-        and answers.recovery_time is None
-        and answers.stall_time is None
-        and study.returns
+        name in runs.events and answers.recovery_time is None and answers.stall_time is None and runs.returns
     ):
         yield "not-recovered", "", {}
 
@@ -567,36 +563,36 @@ _INVERTER = note(
 
 def _on_rotor(study: StudyRecord) -> None:
     """Note a peak of the motor's torque that is not of the load, but of the rotor, whose speed swings."""
-    torque, acceleration = (study.steady[f"motor.{name}"].values for name in ("air_gap_tau", "a"))
-    most, load = peak(torque), peak(torque - study.drive.fmu_parameters.rotor.J * acceleration)
+    torque, acceleration = (study.runs.steady[f"motor.{name}"].values for name in ("air_gap_tau", "a"))
+    most, load = peak(torque), peak(torque - study.setup.drive.fmu_parameters.rotor.J * acceleration)
     if most > 1.05 * load:
-        ripple = study.answers[STEADY].speed_ripple
-        study.say(_ROTOR, STEADY, load=load, most=most, ripple=ripple)
+        ripple = study.runs.answers[STEADY].speed_ripple
+        study.findings.say(_ROTOR, STEADY, load=load, most=most, ripple=ripple)
 
 
 def _on_inverter(study: StudyRecord) -> None:
     """Note slip compensation or droop, and the inverter to order by the currents of all starts and events."""
-    rated_current = study.drive.rated_current
-    if rated_current is None or study.config.drive.start != "inverter":
+    rated_current = study.setup.drive.rated_current
+    if rated_current is None or study.setup.config.drive.start != "inverter":
         return
-    if SLIP not in study.config.file.given:
-        slip, droop = study.drive.parameters.inverter.slip, study.config.drive.starter.droop
+    if SLIP not in study.setup.config.file.given:
+        slip, droop = study.setup.drive.parameters.inverter.slip, study.setup.config.drive.starter.droop
         if droop:
-            study.say(_DROOP, droop=droop)
+            study.findings.say(_DROOP, droop=droop)
         elif slip:
-            study.say(_SLIP, slip=slip)
+            study.findings.say(_SLIP, slip=slip)
         else:
-            study.say(_NO_SLIP)
-    need, overload = inverter_need(study), study.config.drive.starter.overload
+            study.findings.say(_NO_SLIP)
+    need, overload = inverter_need(study), study.setup.config.drive.starter.overload
     if need is None:
         return
     high = {case: peak for case, peak in need.peaks.items() if peak > 1.001 * overload * rated_current}
     if not high and need.current <= 1.001 * rated_current:
-        if study.proposal is not None:
-            study.say(_RATED_SUFFICES, rated=rated_current, overload=f"{overload:g}")
+        if study.setup.proposal is not None:
+            study.findings.say(_RATED_SUFFICES, rated=rated_current, overload=f"{overload:g}")
         return
     held, limited = _limited(study)
-    study.say(
+    study.findings.say(
         _INVERTER,
         overload=f"{overload:g}",
         current=need.current,
@@ -611,12 +607,13 @@ def _on_inverter(study: StudyRecord) -> None:
 def _limited(study: StudyRecord) -> tuple[float | None, str]:
     """The current limit of an inverter with the rated current of the motor [A], and words on the starts with it; None
     where there are none."""
-    findings = StartFindings.found_in(study)
+    findings = StartFindings.found_in(study.findings)
     if findings is None or findings.current_limit is None:
         return None, ""
     if stuck := [start for start in findings.limited if start.start_time is None]:
         where = " and ".join(number(start.angle, "rad") for start in stuck)
-        return findings.current_limit, f"does not bring the {study.driver_noun} to its speed from {where}"
+        driver = study.setup.driver_noun
+        return findings.current_limit, f"does not bring the {driver} to its speed from {where}"
     time = number(max(start.start_time or 0.0 for start in findings.limited), "s")
     return findings.current_limit, f"starts in up to {time}"
 
@@ -631,11 +628,11 @@ _ASSUMPTION = note(
 
 def _on_assumptions(study: StudyRecord) -> None:
     """Note the effect of the assumption of an event on its peaks."""
-    coupling = study.config.coupling
-    for name, spread in study.spreads.items():
-        event = study.config.events[name]
+    coupling = study.setup.config.coupling
+    for name, spread in study.runs.spreads.items():
+        event = study.setup.config.events[name]
         low, high = spread.peaks["crank_torque"]
-        study.say(
+        study.findings.say(
             _ASSUMPTION,
             name,
             title=event.title,

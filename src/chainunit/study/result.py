@@ -21,7 +21,7 @@ from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import Answers, measures_of
 from .provenance import Heading
-from .record import StudyRecord
+from .record import StudyRecord, StudyRuns, StudySetup
 from .remark import Remark
 from .verdict import Verdict
 from .window import Phase
@@ -112,26 +112,26 @@ class StudyData:
 def as_dict(study: StudyRecord) -> ResultEntries:
     """All results except the time series, ready for JSON, each number with its unit; given values, runs and findings
     are three parts."""
-    with shown_in(study.config.units):
+    with shown_in(study.setup.config.units):
         base, given_part = as_data(_data(study)), _given_values(study)
         runs, findings = base.pop("runs"), base.pop("findings") | _parts(study)
         return ResultEntries(base | {"given": given_part, "runs": runs, "findings": findings})
 
 
 def _data(study: StudyRecord) -> StudyData:
-    drive, failure = study.drive, study.failure
+    setup, findings, failure = study.setup, study.findings, study.findings.failure
     return StudyData(
-        heading=Heading.of(study.config.title, study.config.file),
-        sentence=None if study.proposal is None else study.proposal.sentence(study),
+        heading=Heading.of(setup.config.title, setup.config.file),
+        sentence=None if setup.proposal is None else setup.proposal.sentence(study),
         status=f"failed: {failure}" if failure else "complete",
         failure=str(failure) if failure else None,
-        verdict=Verdicts(study.verdict, motor_verdict(study)),
-        warnings=study.warnings,
-        notes=study.notes,
-        slips=study.config.file.slips,
-        driver=study.driver_noun,
-        runs=_runs(study),
-        findings=DriveFindings(study.statics.loops, study.statics.rigid_line, speed_control(drive)),
+        verdict=Verdicts(findings.verdict, motor_verdict(study)),
+        warnings=findings.warnings,
+        notes=findings.notes,
+        slips=setup.config.file.slips,
+        driver=setup.driver_noun,
+        runs=_runs(study.runs),
+        findings=DriveFindings(setup.statics.loops, setup.statics.rigid_line, speed_control(setup.drive)),
     )
 
 
@@ -147,21 +147,21 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
     value, `places` the file and the line of each value that a file gives."""
     sections = given_sections(study)
     names = [name for section in sections for name in section.names]
-    values: dict[str, Any] = {"event": {}, "motor": _motor(study)}
+    values: dict[str, Any] = {"event": {}, "motor": _motor(study.setup)}
     for section in sections:
         if section.name != "motor":
             _put(values, section.place, section.data)
-    origins = {name: origin for name in names if (origin := origin_of(study, name)) != "declared"}
-    places = {name: place for name in names if (place := place_of(study, name))}
+    origins = {name: origin for name in names if (origin := origin_of(study.setup, name)) != "declared"}
+    places = {name: place for name in names if (place := place_of(study.setup, name))}
     return {"origins": origins, "places": places} | values
 
 
-def _motor(study: StudyRecord) -> dict[str, Any]:
-    kind, plate = study.drive.graph.components["motor"].title, study.plate
-    titles = {"kind": kind, "title": study.motor_title}
+def _motor(setup: StudySetup) -> dict[str, Any]:
+    kind, plate = setup.drive.graph.components["motor"].title, setup.plate
+    titles = {"kind": kind, "title": setup.motor_title}
     rating = {} if plate is None else as_data(MotorRating.of(plate))
     # the parameters of a foreign motor are not known
-    return titles | rating | ({} if study.drive.parameters is None else entries(study.drive.parameters))
+    return titles | rating | ({} if setup.drive.parameters is None else entries(setup.drive.parameters))
 
 
 def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
@@ -171,7 +171,7 @@ def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
     tree |= values
 
 
-def _runs(study: StudyRecord) -> RunData:
+def _runs(runs: StudyRuns) -> RunData:
     def begin(phase: Phase, answers: Answers | None) -> dict[str, InUnit] | None:
         if answers is None:
             return None
@@ -179,23 +179,23 @@ def _runs(study: StudyRecord) -> RunData:
 
     return RunData(
         events={
-            name: EventData(event.kind, event.side or None, event.title, study.event.get(name))
-            for name, event in study.config.events.items()
+            name: EventData(event.kind, event.side or None, event.title, runs.event_times.get(name))
+            for name, event in runs.events.items()
         },
-        answers=study.answers,
-        start_up=begin(Phase.START_UP, study.start),
-        settling=begin(Phase.SETTLING, study.settling),
-        pins=study.pins,
-        certificate=study.certificate,
-        block_peaks={name: assumed_ranges(study, name) for name in study.spreads},
-        fmus={name: str(origin) for name, origin in study.fmus.items()},
+        answers=runs.answers,
+        start_up=begin(Phase.START_UP, runs.start),
+        settling=begin(Phase.SETTLING, runs.settling),
+        pins=runs.pins,
+        certificate=runs.certificate,
+        block_peaks={name: assumed_ranges(runs, name) for name in runs.spreads},
+        fmus={name: str(origin) for name, origin in runs.fmus.items()},
     )
 
 
-def assumed_ranges(study: StudyRecord, name: str) -> dict[str, InUnit]:
+def assumed_ranges(runs: StudyRuns, name: str) -> dict[str, InUnit]:
     """The range of the assumed quantities of an event, and the peaks over it."""
-    spread = study.spreads[name]
-    units = {v.name: v.unit for v in variables(study.config.events[name].Parameters)}
+    spread = runs.spreads[name]
+    units = {v.name: v.unit for v in variables(runs.events[name].Parameters)}
     ranges = [(key, ends, units[key], "assumed") for key, ends in spread.ranges.items()]
     ranges += [(key, ends, "N.m", "") for key, ends in spread.peaks.items()]
     return {
@@ -207,20 +207,20 @@ def assumed_ranges(study: StudyRecord, name: str) -> dict[str, InUnit]:
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
-    parts = {name: findings.data(study) for name, findings in study.findings.items()}
-    if study.statics.modes is not None:
+    parts = {name: findings.data(study) for name, findings in study.findings.by_analysis.items()}
+    if study.setup.statics.modes is not None:
         parts |= _driveline(study)
     return parts
 
 
 def _driveline(study: StudyRecord) -> dict[str, Any]:
-    shaft = shaft_findings(study)
+    shaft = shaft_findings(study.findings)
     largest = max((answers.range_largest for answers in shaft.answers.values()), default=0.0)
     return {
         "driveline": {
-            "damping_ratio": entry(study.config.plans["driveline"].damping_ratio, "1"),
-            **entries(driveline_of(study.drive)),
-            **entries(study.statics.modes),
+            "damping_ratio": entry(study.setup.config.plans["driveline"].damping_ratio, "1"),
+            **entries(driveline_of(study.setup.drive)),
+            **entries(study.setup.statics.modes),
         },
         "shaft": as_data(shaft),
         "torque_cycles": {name: as_data(cycles.classes(largest)) for name, cycles in shaft.cycles.items()},

@@ -30,14 +30,14 @@ from .event_table import random_runs
 from .measures import read_answers, read_measure
 from .organ_limits import least_pulls
 from .readings import crank_angle
-from .record import Spread, StudyRecord
+from .record import Spread, StudyFindings, StudyRecord, StudyRuns, StudySetup
 from .relay import class_holding, locked_rotor, protecting_class, start_seconds
 from .remarks import EVENT_LEFT_OUT, STATE_NOT_SAVED, WITHOUT_COMPILER, conclude
 from .rig import Rig
 from .start_up import start_up
 from .starts import StartAnalysis, StartFindings
 from .statics import statics
-from .torques import from_event_on, on_coupling, quasi_static_peak
+from .torques import on_coupling, quasi_static_peak
 from .transients import Transient, coast, compare, follow, lead_times, release
 from .window import Phase, Trip
 
@@ -78,25 +78,25 @@ def run_study(
         if check and drive.foreign_titles:
             titles = " and ".join(drive.foreign_titles)
             raise InputError(f"check: the equations of {titles} are not known; leave it out")
-        study = StudyRecord(config, drive, statics(drive, turns, config.run.step), choice.proposal)
+        setup = StudySetup(config, drive, statics(drive, turns, config.run.step), choice.proposal)
+        runs = StudyRuns(drive, config.operation, config.events)
+        study = StudyRecord(setup, runs, StudyFindings(drive.driver_noun))
         if choice.proposal is not None:
-            study.findings[choice.proposal.name] = choice.proposal.findings
+            study.findings.by_analysis[choice.proposal.name] = choice.proposal.findings
         unmade = Rig(config.operation, drive, {})
-        for runs in random_runs(config.plans):
-            runs.check(unmade)
+        for plan in random_runs(config.plans):
+            plan.check(unmade)
         _analyse(study, Work(unmade, progress), needs_runs=False)
-        files, study.fmus = export_drive(
-            drive, folder / "fmu", backend, lambda what: progress(what, 0.0, 1.0)
-        )
+        files, runs.fmus = export_drive(drive, folder / "fmu", backend, lambda what: progress(what, 0.0, 1.0))
         rig = Rig(config.operation, drive, files)
-        if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
-            study.say(WITHOUT_COMPILER)
+        if backend is None and "python" in {origin.backend for origin in runs.fmus.values()}:
+            study.findings.say(WITHOUT_COMPILER)
         runner = Runner(study, rig, progress)
         with _ending(study):
             runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
             work = Work(runner.rig, progress, folder, scheduler, runner.stop)
             _analyse(study, work, needs_runs=True)
-        if not isinstance(study.failure, InterruptedRunError):
+        if not isinstance(study.findings.failure, InterruptedRunError):
             with _ending(study):
                 _analyse(study, Work(runner.rig, progress), needs_runs=True, at_end=True)
         conclude(study)
@@ -112,21 +112,21 @@ def _ending(study: StudyRecord) -> Iterator[None]:
     except RunError as ended:
         error = ended
         if error.partial is not None:
-            study.runs["unfinished"] = error.partial
+            study.runs.series["unfinished"] = error.partial
     except KeyboardInterrupt:
         # Ctrl-C came between two runs, or in a run that is not a co-simulation
         error = InterruptedRunError("interrupted")
-    study.failure = study.failure or error
+    study.findings.failure = study.findings.failure or error
 
 
 def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool = False) -> None:
     """Make every analysis for which the system has the parts."""
     for analysis in all_analyses():
         is_due = (analysis.needs_runs, analysis.at_end) == (needs_runs, at_end)
-        if is_due and analysis.applies(study.drive, study.config.plans):
+        if is_due and analysis.applies(study.setup.drive, study.setup.config.plans):
             findings = analysis.find(study, work)
             if findings is not None:
-                study.findings[analysis.name] = findings
+                study.findings.by_analysis[analysis.name] = findings
             if analysis.name == StartAnalysis.name:
                 # before an analysis reads the answers that depend on it
                 _with_class_of_all_starts(study)
@@ -135,33 +135,33 @@ def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool =
 def _with_class_of_all_starts(study: StudyRecord) -> None:
     """Where the starts from all crank angles, or a stall, take a relay of another class, read its trips in the events
     once more."""
-    findings, plate = StartFindings.found_in(study), study.plate
-    if findings is None or plate is None or study.drive.follows:
+    setup, runs = study.setup, study.runs
+    findings, plate = StartFindings.found_in(study.findings), setup.plate
+    if findings is None or plate is None or setup.drive.follows:
         return
-    least, before = max(findings.start_class, study.relay_class), study.answers[verdict.STEADY].current_rms
+    least, before = max(findings.start_class, runs.relay_class), runs.answers[verdict.STEADY].current_rms
     trip_class = protecting_class(least, findings.relay_seconds, *locked_rotor(plate.nameplate, before))
-    if trip_class == study.relay_class:
+    if trip_class == runs.relay_class:
         return
-    study.relay_class = trip_class
-    for name in study.overloads:
-        if study.answers[name].coupling_trip_time is None:
-            event = study.config.events[name]
+    runs.relay_class = trip_class
+    for name in runs.overloads:
+        if runs.answers[name].coupling_trip_time is None:
+            event = setup.config.events[name]
             phase = Phase.LOADED_START if event.from_rest else Phase.EVENT
-            window = study.window(phase, from_event_on(study, name), study.event[name], event=event)
+            window = runs.window(phase, runs.event_parts[name], runs.event_times[name], event=event)
             later = read_measure("thermal_trip_time", window)
-            study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
+            runs.answers[name] = replace(runs.answers[name], thermal_trip_time=later)
 
 
 class Runner:
     """Makes the runs of a study on its rig, and writes the results into the record."""
 
     def __init__(self, study: StudyRecord, rig: Rig, progress: TaskProgress) -> None:
-        config = study.config
-        self.study, self.rig, self.progress = study, rig, progress
+        self.study, self.runs, self.rig, self.progress = study, study.runs, rig, progress
         operation = rig.operation
         self.stop = operation.stop
         """time to which the start-up is run [s]; later where the motor takes longer to settle"""
-        taken = [event for event in config.events.values() if rig.takes(event)]
+        taken = [event for event in study.runs.events.values() if rig.takes(event)]
         self.events = [event for event in taken if not event.from_rest]
         self.starts = [event for event in taken if event.from_rest]
         self.total = self.stop * (1 + len(self.starts))
@@ -172,16 +172,16 @@ class Runner:
         """Make every run of the study. With `check` each is compared with the monolithic solution; `coasting`
         writes the FMU of the machine behind an open coupling."""
         self._export_coasting = coasting
-        for event in self.study.config.events.values():
+        for event in self.runs.events.values():
             if event not in (*self.events, *self.starts):
-                self.study.say(EVENT_LEFT_OUT, event.name, title=event.title, reason=event.without)
+                self.study.findings.say(EVENT_LEFT_OUT, event.name, title=event.title, reason=event.without)
         with self.rig.from_rest() as simulation:
             self._start_up(simulation)
             for part in simulation.without_states if self.events else ():
                 title = self.rig.graph.components[part].title
-                self.study.say(STATE_NOT_SAVED, *(event.name for event in self.events), title=title)
-            begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
-            angle = float(crank_angle(self.rig.drive, self.study.runs["start_up"])[-1])
+                self.study.findings.say(STATE_NOT_SAVED, *(event.name for event in self.events), title=title)
+            begin, speed = simulation.save(), self.runs.answers["steady"].speed_mean
+            angle = float(crank_angle(self.rig.drive, self.runs.series["start_up"])[-1])
             progress, transients = 0.0, []
             leads = lead_times(self.rig, simulation, self.events, angle, speed)
             for event, lead in zip(self.events, leads, strict=True):
@@ -210,33 +210,33 @@ class Runner:
         RunError
             where the torque limiter opens in one of them.
         """
-        study, rig, config = self.study, self.rig, self.study.config
+        runs, rig, coupling = self.runs, self.rig, self.runs.operation.coupling
         progress = self._progress("start-up and steady running", 0.0)
-        study.started = start_up(rig, simulation, progress, rig.guards)
-        run, self.stop = study.started.run, study.started.stop
-        self.rig = rig = study.started.rig
+        runs.started = start_up(rig, simulation, progress, rig.guards)
+        run, self.stop = runs.started.run, runs.started.stop
+        self.rig = rig = runs.started.rig
         self._certify("start_up", run)
         if simulation.time < self.stop - 0.5 * rig.step:
             raise RunError(self._opens_in_start(simulation.time))
-        steady = study.steady
-        study.answers["steady"] = read_answers(study.window(Phase.STEADY, steady))
+        steady = runs.steady
+        runs.answers["steady"] = read_answers(runs.window(Phase.STEADY, steady))
         self._pins_and_pulls("steady", steady)
         # the start of an empty machine ends where the feed comes
         begin = steady["time"].values[0]
         end = begin if rig.fed_from is None else rig.fed_from
         start = run.sel(time=slice(None, end))
         # if the feed comes before the machine is at speed, the start goes on under the feed
-        whole = study.window(Phase.START_UP, run.sel(time=slice(None, begin)))
+        whole = runs.window(Phase.START_UP, run.sel(time=slice(None, begin)))
         start_time = read_measure("start_time", whole)
-        study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=start_time)
+        runs.start = replace(read_answers(runs.window(Phase.START_UP, start)), start_time=start_time)
         self._relay(run)
         self._pins_and_pulls(verdict.START, start)
         if rig.fed_from is not None:
             settling = run.sel(time=slice(end, begin))
-            study.settling = read_answers(study.window(Phase.SETTLING, settling))
+            runs.settling = read_answers(runs.window(Phase.SETTLING, settling))
             self._pins_and_pulls(verdict.SETTLING, settling)
         torque = on_coupling(rig.drive, steady)
-        if config.coupling and torque > config.coupling.trip_torque:
+        if coupling and torque > coupling.trip_torque:
             raise RunError(
                 f"the torque limiter opens in steady running, which puts {number(torque, 'N.m', digits=4)} on it; "
                 "coupling.trip_torque must be above that"
@@ -245,15 +245,15 @@ class Runner:
     def _relay(self, run: Dataset) -> None:
         """Record the trip class of the relay that the start-up needs; that of a proposed drive holds from
         every crank angle."""
-        study, drive = self.study, self.rig.drive
-        time, rated = study.start_end, drive.rated_current
+        runs, proposal, drive = self.runs, self.study.setup.proposal, self.rig.drive
+        time, rated = runs.start_end, drive.rated_current
         if time is None or rated is None or drive.follows:
             return
         rise = run.sel(time=slice(None, time))
         current = drive.relay_current(rise["time"].values, rise[f"motor.{drive.motor.current}"].values)
-        study.relay_class = class_holding(start_seconds(rise["time"].values, current, rated))
-        if study.proposal is not None:
-            study.relay_class = max(study.relay_class, study.proposal.start_class)
+        runs.relay_class = class_holding(start_seconds(rise["time"].values, current, rated))
+        if proposal is not None:
+            runs.relay_class = max(runs.relay_class, proposal.start_class)
 
     def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
         stop = begin + event.time_followed(self.rig.operation.turn)
@@ -274,25 +274,26 @@ class Runner:
     def _close(self, simulation: Simulation, transient: Transient, stop: float, phase: Phase) -> None:
         """Read the answers of a transient. Where the coupling opened, follow it until it passes no torque,
         and the machine behind it until it comes to rest."""
-        study, rig, coupling = self.study, self.rig, self.study.config.coupling
+        runs, rig, coupling = self.runs, self.rig, self.runs.operation.coupling
         name, run, trip = transient.event.name, transient.run, None
-        study.event[name] = transient.begin
+        runs.event_times[name] = transient.begin
         if coupling and simulation.time < stop - 0.5 * rig.step:
             time = simulation.time
             run, energy = release(rig, simulation, run, coupling.release_time)
             self._coasting = self._coasting or self._export_coasting()
             coasting = coast(rig, transient, run, stop, self._coasting) if self._coasting else None
             if coasting is not None:
-                study.runs[f"{name}_coasting"] = coasting
+                runs.series[f"{name}_coasting"] = coasting
             trip = Trip(time, energy, coasting)
         self._certify(name, run, transient.lead)
         after = run.sel(time=slice(transient.begin, None))
-        study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip, transient.event))
+        window = runs.window(phase, after, transient.begin, trip, transient.event)
+        runs.answers[name] = read_answers(window)
         self._pins_and_pulls(name, after)
 
     def _opens_in_start(self, time: float) -> str:
         """The reason why a study ends whose coupling opens in the start-up, at `time` [s]."""
-        coupling, share = self.study.config.coupling, ""
+        coupling, share = self.runs.operation.coupling, ""
         assert coupling is not None
         with self.rig.from_rest() as simulation:
             run = simulation.run(time + _AFTER_TRIP, self.rig.step)
@@ -313,14 +314,14 @@ class Runner:
     def _pins_and_pulls(self, name: str, run: Dataset) -> None:
         """Record the loads of the pins and the pulls in the rods."""
         drive = self.rig.drive
-        if pulls := least_pulls(drive, run, drive.machine.loaded_sides(self.study.config.feed)):
-            self.study.pulls[name] = pulls
+        if pulls := least_pulls(drive, run, drive.machine.loaded_sides(self.runs.operation.feed)):
+            self.runs.pulls[name] = pulls
         if loads := pin_loads(self.rig.drive, run):
-            self.study.pins[name] = loads
+            self.runs.pins[name] = loads
 
     def _certify(self, name: str, run: Dataset, lead: Dataset | None = None) -> None:
-        self.study.certificate[name] = self.rig.residuals(run, lead)
-        self.study.runs[name] = run
+        self.runs.certificate[name] = self.rig.residuals(run, lead)
+        self.runs.series[name] = run
 
     def _assumption(self, simulation: Simulation, transient: Transient, before: float) -> None:
         """Record the peaks over the range of the assumption of an event, run from the saved steady state. The
@@ -330,12 +331,12 @@ class Runner:
         if not variants:
             return
         self.progress(f"{event.title}, over the range of its assumption", before, self.total)
-        answers = self.study.answers[event.name]
+        answers = self.runs.answers[event.name]
         peaks = {name: [] if self.rig.guards else [getattr(answers, f"{name}_peak")] for name in _PEAKS}
         for variant in (*variants, event) if self.rig.guards else variants:
             stop = begin + event.time_followed(self.rig.operation.turn)
             run = follow(self.rig, simulation, variant, begin, stop).run.sel(time=slice(begin, None))
-            window = self.study.window(Phase.EVENT, run, begin)
+            window = self.runs.window(Phase.EVENT, run, begin)
             for name in _PEAKS:
                 peaks[name].append(read_measure(f"{name}_peak", window))
         ranges = {
@@ -343,7 +344,7 @@ class Runner:
             for name in vars(event.p)
             if any(getattr(variant.p, name) != getattr(event.p, name) for variant in variants)
         }
-        self.study.spreads[event.name] = Spread(
+        self.runs.spreads[event.name] = Spread(
             {name: (min(x), max(x)) for name, x in ranges.items()},
             # the torque of a foreign motor is not known
             {name: (min(x), max(x)) for name, x in peaks.items() if None not in x},
@@ -354,6 +355,6 @@ class Runner:
     ) -> dict[str, float]:
         """Compare a run with the monolithic solution; the states at its end."""
         self.progress(f"monolithic reference: {title}", self.total, self.total)
-        differences, end = compare(self.rig, self.study.runs[name], transient, states)
-        self.study.certificate[name] |= differences
+        differences, end = compare(self.rig, self.runs.series[name], transient, states)
+        self.runs.certificate[name] |= differences
         return end

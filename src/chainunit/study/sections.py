@@ -228,7 +228,7 @@ SECTIONS: Mapping[str, FileSection] = {
         Transmission,
         default=KINDS["gear"],
         title="Gear",
-        is_used=lambda study: study.config.of_catalogue,
+        is_used=lambda study: study.setup.config.of_catalogue,
         follows={
             "ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
             "efficiency": "98 % a stage of a helical gear, 70 % of a worm gear, 95 % of a V-belt; see "
@@ -238,7 +238,7 @@ SECTIONS: Mapping[str, FileSection] = {
     "starter": FileSection(
         Starter,
         title="Starter",
-        is_used=lambda study: study.config.of_catalogue and study.config.drive.start != "direct",
+        is_used=lambda study: study.setup.config.of_catalogue and study.setup.config.drive.start != "direct",
         follows={
             "inverter.boost": "5 %, or the drop of the rated current across the stator if less; with [sizing] "
             "two or three times as much, if the machine does not start with less",

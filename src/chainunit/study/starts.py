@@ -15,7 +15,7 @@ from .analysis import Analysis, Findings, Work
 from .catalogue_drive import usual_boost
 from .drive import Drive
 from .operation import DriveTables
-from .record import StudyRecord
+from .record import StudyFindings, StudyRecord, StudySetup
 from .remark import fault, warning
 from .rig import Rig
 from .sections import SOFTER
@@ -88,46 +88,46 @@ class StartFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of a start that the gear does not carry, or that puts much more on it than running does, and of angles
         from which the motor does not start."""
-        worst, start = self.worst, _STARTERS[study.config.drive.start]
+        worst, start = self.worst, _STARTERS[study.setup.config.drive.start]
         numbers: dict[str, Any] = {
             "start": start,
             "torque": worst.quasi_static,
             "angle": worst.angle,
-            "transient": transient_words(study),
+            "transient": transient_words(study.setup),
             "most": self.transient,
-            "softer": SOFTER[study.config.drive.start],
+            "softer": SOFTER[study.setup.config.drive.start],
         }
         if worst.quasi_static > self.limit:
-            study.say(_OVER_LIMIT, START, limit=self.limit, **numbers)
+            study.findings.say(_OVER_LIMIT, START, limit=self.limit, **numbers)
         elif (
-            study.drive.is_geared
+            study.setup.drive.is_geared
             and math.isinf(self.limit)
             and worst.quasi_static > START_FACTOR * self.running
         ):
-            study.say(
+            study.findings.say(
                 _OVER_RUNNING,
                 START,
                 large=f"{START_FACTOR:g}",
                 over=self.over_running,
                 running=self.running,
-                running_in=running_words(study, self.running_in),
+                running_in=running_words(study.runs, self.running_in),
                 **numbers,
             )
         hunting = max(self.starts, key=lambda start: start.backwards)
-        if study.drive.follows and study.plate is not None and hunting.backwards > BACKWARDS:
-            p = study.drive.fmu_parameters
-            usual, boost = usual_boost(p, study.plate.nameplate), float(p.inverter.boost)
+        if study.setup.drive.follows and study.setup.plate is not None and hunting.backwards > BACKWARDS:
+            p = study.setup.drive.fmu_parameters
+            usual, boost = usual_boost(p, study.setup.plate.nameplate), float(p.inverter.boost)
             least = f"to {number(usual, '1', 'percent')} for this motor"
             if boost <= usual:
                 least = f"below {number(boost, '1', 'percent')}"
-            study.say(_HUNTS, START, backwards=hunting.backwards, angle=hunting.angle, least=least)
+            study.findings.say(_HUNTS, START, backwards=hunting.backwards, angle=hunting.angle, least=least)
         if self.stuck:
-            study.say(
+            study.findings.say(
                 _NO_START,
                 START,
                 where=" and ".join(number(stuck_start.angle, "rad") for stuck_start in self.stuck),
                 ramp=", or a higher voltage of the soft starter"
-                if study.config.drive.start == "soft"
+                if study.setup.config.drive.start == "soft"
                 else "",
             )
 
@@ -177,17 +177,17 @@ def _with_own_limit(
     return tuple(limited), limit
 
 
-def weak_in_star(study: StudyRecord) -> bool:
+def weak_in_star(findings: StudyFindings) -> bool:
     """Whether the change from star to delta comes too early in a start, see `StartFindings.weak_star`."""
-    starts = StartFindings.found_in(study)
+    starts = StartFindings.found_in(findings)
     return starts is not None and bool(starts.weak_star)
 
 
-def transient_words(study: StudyRecord) -> str:
+def transient_words(setup: StudySetup) -> str:
     """The title of the largest torque of a start at the output of the gear, with the electromagnetic transient."""
     line = (
         "with the stiffness of the driveline"
-        if study.drive.line.is_elastic
+        if setup.drive.line.is_elastic
         else "an upper bound, as the shafts are rigid"
     )
     return f"electromagnetic transient of the motor puts more on it for some milliseconds ({line})"
@@ -215,12 +215,12 @@ class StartAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> StartFindings | None:
         """The starts; None where the motor does not start at all."""
-        if study.start is None or study.start.start_time is None:
+        if study.runs.start is None or study.runs.start.start_time is None:
             return None
-        work.progress(f"starts from other {study.driver_noun} angles", 1.0, 1.0)
-        rig, longest = work.rig, longest_start(work.rig.operation.ramp_end, study.start.start_time)
+        work.progress(f"starts from other {study.setup.driver_noun} angles", 1.0, 1.0)
+        rig, longest = work.rig, longest_start(work.rig.operation.ramp_end, study.runs.start.start_time)
         starts = starts_from_all(rig, longest)
-        tables = study.config.drive
+        tables = study.setup.config.drive
         limited, limit = _with_own_limit(tables, rig, starts, longest)
         permitted = tables.gear.start_limit if "gear.torque_limit" in tables.given else math.inf
         running = running_peak(study, at_gear)

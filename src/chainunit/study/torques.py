@@ -19,7 +19,7 @@ from .readings import crank_torque, load_inertia
 from .verdict import START, STEADY
 
 if TYPE_CHECKING:
-    from .record import StudyRecord
+    from .record import StudyRecord, StudyRuns
 
 
 PeakOf = Callable[[Drive, Dataset], float]
@@ -101,53 +101,41 @@ def all_feed_on(side: str) -> str:
     return f"all_feed_on_the_{side}"
 
 
-def from_event_on(study: StudyRecord, name: str) -> Dataset:
-    """The part of a run from the begin of its event on."""
-    return study.runs[name].sel(time=slice(study.event[name], None))
-
-
-def peaks_in_events(study: StudyRecord, *roles: Role) -> dict[str, float]:
+def peaks_in_events(runs: StudyRuns, *roles: Role) -> dict[str, float]:
     """Peak torque on a coupling in each event with one of these `roles`, or in every event without `roles` [N m]."""
-    events = study.config.events
     return {
-        name: on_coupling(study.drive, from_event_on(study, name))
-        for name in study.event
-        if name in study.runs and (not roles or events[name].role in roles)
+        name: on_coupling(runs.drive, run)
+        for name, run in runs.event_parts.items()
+        if not roles or runs.events[name].role in roles
     }
 
 
-def gear_peaks(study: StudyRecord) -> dict[str, float]:
+def gear_peaks(runs: StudyRuns) -> dict[str, float]:
     """Peak torque at the output of the gear in steady running, in the start-up and in each event [N m], by the name
     of the run. If the supply is switched, in starts and in disturbances, it is that by load and acceleration."""
-    events, rise = study.config.events, study.runs["start_up"].sel(time=slice(None, study.steady_begin))
-    peaks = {
-        STEADY: at_gear(study.drive, study.steady),
-        START: quasi_static_peak(study.drive, rise),
-    }
-    for name in study.event:
-        if name in study.runs:
-            is_switched = events[name].from_rest or events[name].role is Role.DISTURBANCE
-            peak_of = quasi_static_peak if is_switched else at_gear
-            peaks[name] = peak_of(study.drive, from_event_on(study, name))
+    peaks = {STEADY: at_gear(runs.drive, runs.steady), START: quasi_static_peak(runs.drive, runs.rise)}
+    for name, run in runs.event_parts.items():
+        is_switched = runs.events[name].from_rest or runs.events[name].role is Role.DISTURBANCE
+        peaks[name] = (quasi_static_peak if is_switched else at_gear)(runs.drive, run)
     return peaks
 
 
 def running_peak(study: StudyRecord, peak_of: PeakOf = on_coupling) -> DutyPeak:
     """The largest torque of normal duty without the starts: of steady running, of events that may last, and of the
     runs from which a drive was chosen."""
-    events = study.config.events
+    runs, proposal = study.runs, study.setup.proposal
     lasting = [
-        (name, from_event_on(study, name))
-        for name in study.event
-        if name in study.runs and events[name].role is Role.DUTY and not events[name].from_rest
+        (name, run)
+        for name, run in runs.event_parts.items()
+        if runs.events[name].role is Role.DUTY and not runs.events[name].from_rest
     ]
-    peaks = [duty_peak(study.drive, [(STEADY, study.steady), *lasting], peak_of)]
-    if study.proposal is not None and study.proposal.duty is not None:
-        peaks.append(study.proposal.duty)
+    peaks = [duty_peak(runs.drive, [(STEADY, runs.steady), *lasting], peak_of)]
+    if proposal is not None and proposal.duty is not None:
+        peaks.append(proposal.duty)
     return max(peaks, key=lambda peak: peak.torque)
 
 
-def running_words(study: StudyRecord, run: str) -> str:
+def running_words(runs: StudyRuns, run: str) -> str:
     """The case of normal duty of a run, in words."""
-    title = study.title_of(run)
+    title = runs.title_of(run)
     return title if run == STEADY else f"running ({title})"

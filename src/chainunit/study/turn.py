@@ -84,7 +84,7 @@ class TurnAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> TurnFindings:
         """The turn at the crank speed of the study, by inverse dynamics."""
-        config, machine = study.config, study.drive.machine
+        config, machine = study.setup.config, study.setup.drive.machine
         feed, w = config.feed, config.run.crank_speed
         loaded, free = (cycle(machine, w, load, POINTS) for load in (feed, no_feed(feed)))
         inertia = np.broadcast_to(loaded.outputs.J * machine.ratio**2, loaded.angle.shape)

@@ -51,7 +51,7 @@ class PinLife(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of a life that is too short."""
         if self.is_short:
-            study.say(
+            study.findings.say(
                 TOO_SHORT,
                 STEADY,
                 pin=self.pin,
@@ -83,9 +83,9 @@ class PinLifeAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> PinLife:
         """The life at the load and speed of steady running."""
-        plan: LifePlan = study.config.plans["pin_life"]
-        turns = whole_turns(study.drive, study.steady)
-        machine = study.drive.simulated_machine
+        plan: LifePlan = study.setup.config.plans["pin_life"]
+        turns = whole_turns(study.setup.drive, study.runs.steady)
+        machine = study.setup.drive.simulated_machine
         name = machine.model.pins[plan.pin]
         force = np.hypot(*(turns[f"machine.{name}.{axis}"].values for axis in ("fx", "fy")))
         angle = machine.pin_turns(machine_series(turns))[name]

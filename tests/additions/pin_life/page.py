@@ -14,7 +14,7 @@ from .analysis import PinLife
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table of the life."""
-    yield life_table(PinLife.of_study(study), "findings.pin_life")
+    yield life_table(PinLife.of_study(study.findings), "findings.pin_life")
 
 
 def life_table(findings: PinLife, path: str) -> b.Table:

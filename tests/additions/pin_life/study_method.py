@@ -22,7 +22,7 @@ class PinLifeResult(ReportedResult[Config, StudyRecord]):
     @property
     def found(self) -> PinLife:
         """Equivalent load, speed and life of the pin, and the load rating for the wanted life."""
-        found: PinLife = self._outcome.findings["pin_life"]
+        found: PinLife = self._outcome.findings.by_analysis["pin_life"]
         return found
 
 

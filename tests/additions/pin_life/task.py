@@ -29,19 +29,19 @@ def _report(study: StudyRecord) -> b.Report:
     result = {name: result[name] for name in _HEAD if name in result} | {
         "warnings": [each for each in result["warnings"] if each["code"] == "pin-life"],
     }
-    warnings = [warning for warning in study.warnings if warning.code == "pin-life"]
-    heading = cited(Heading.of(study.config.title, study.config.file))
-    life = PinLife.found_in(study)
-    with shown_in(study.config.units):
+    warnings = [warning for warning in study.findings.warnings if warning.code == "pin-life"]
+    heading = cited(Heading.of(study.setup.config.title, study.setup.config.file))
+    life = PinLife.found_in(study.findings)
+    with shown_in(study.setup.config.units):
         found = () if life is None else (page.life_table(life, "pin_life"),)
         return b.Report(
-            study.config.title,
+            study.setup.config.title,
             "Rating life of a pin",
             result,
             (*found, *(b.Judgement("warning", warning.text) for warning in cited(warnings, "warnings"))),
             (),
             source=source_line(heading),
-            units=study.config.units,
+            units=study.setup.config.units,
             opening_title="The answer",
         )
 
@@ -57,7 +57,11 @@ def _compute(config: Config, folder: Path, progress: TaskProgress, **options: An
 
 
 def _shortfall(study: StudyRecord) -> str | None:
-    return "" if "pin_life" in study.findings and study.findings["pin_life"].is_short else None
+    return (
+        ""
+        if "pin_life" in study.findings.by_analysis and study.findings.by_analysis["pin_life"].is_short
+        else None
+    )
 
 
 TASK: Task[Config, StudyRecord] = Task(

@@ -38,9 +38,9 @@ crank_angle = "180 deg"
 def test_a_lump_that_the_web_folds_before_is_told(tmp_path):
     """On one stroke the lump pulls the web and loads the drive; on the other stroke the web folds."""
     study = run_study(parse(SHORT + LUMPS), tmp_path)
-    peaks = {run: study.answers[run].crank_torque_peak for run in ("steady", "jam_right", "pulled")}
+    peaks = {run: study.runs.answers[run].crank_torque_peak for run in ("steady", "jam_right", "pulled")}
     assert peaks["pulled"] > 2.0 * peaks["jam_right"] and peaks["jam_right"] < 1.1 * peaks["steady"], peaks
-    remarks = [remark for remark in study.warnings if remark.code == "lump-not-felt"]
+    remarks = [remark for remark in study.findings.warnings if remark.code == "lump-not-felt"]
     assert [remark.runs for remark in remarks] == [("jam_right",)]
     assert 'crank_angle = "180 deg"' in remarks[0].text
 
@@ -48,7 +48,7 @@ def test_a_lump_that_the_web_folds_before_is_told(tmp_path):
 @pytest.mark.slow
 def test_random_overloads_of_chains(tmp_path):
     study = run_study(parse("event = []\n" + SHORT + "[monte_carlo]\nruns = 2\nduration = 0.2\n"), tmp_path)
-    assert study.failure is None and "monte_carlo" in study.findings
+    assert study.findings.failure is None and "monte_carlo" in study.findings.by_analysis
 
 
 @pytest.mark.parametrize(

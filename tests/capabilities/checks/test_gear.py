@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from records import like
 from reports import at
 
 from chainunit.capabilities.checks.gear import (
@@ -179,11 +180,11 @@ def test_running_puts_its_torque_of_the_run_on_the_gear_not_that_of_the_curve(mo
 
     monkeypatch.setattr(torques, "at_gear", of_run)
     monkeypatch.setattr(torques, "quasi_static_peak", lambda *given: 0.4 * of_run(*given))
-    study = SimpleNamespace(
-        drive=None, config=SimpleNamespace(events={}), event={}, runs={"start_up": run}, steady_begin=2.5,
+    study = like(
+        drive=None, events={}, event_parts={}, rise=run.sel(time=slice(None, 2.5)),
         steady=run.sel(time=slice(2.5, None)),
     )  # fmt: skip
-    assert torques.gear_peaks(study) == {"steady": 5.0, "start_up": pytest.approx(3.6)}
+    assert torques.gear_peaks(study.runs) == {"steady": 5.0, "start_up": pytest.approx(3.6)}
 
 
 @pytest.mark.second

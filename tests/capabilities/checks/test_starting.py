@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from records import like
 
 from chainunit.capabilities.checks import starting
 from chainunit.capabilities.checks.row import Checks
@@ -108,7 +109,7 @@ def test_the_inertia_that_a_standard_has_every_motor_start(monkeypatch, inertia,
     the sheet said nothing."""
     plate = next(m.nameplate for m in catalogue() if m.designation == "IE3 4-pole 11 kW, 160M")
     flywheel, rotor = 0.01, SimpleNamespace(J=plate.J + 0.01)
-    study = SimpleNamespace(
+    study = like(
         drive=SimpleNamespace(foreign=None, line=Line(), fmu_parameters=SimpleNamespace(rotor=rotor)),
         plate=SimpleNamespace(nameplate=dataclasses.replace(plate, starts=0.0)),
         config=SimpleNamespace(drive=SimpleNamespace(start=start)),

@@ -46,7 +46,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("compare")
     for name, values in (("a", FIRST), ("b", SECOND)):
         study = run_study(parse(STUDY.format(**values)), folder / name)
-        assert study.failure is None
+        assert study.findings.failure is None
         (folder / name / "result.json").write_text(json.dumps(as_dict(study), allow_nan=False))
     done = chainunit("compare", "a", "b", "-o", "out", cwd=folder)
     assert done.returncode == 0, done.stderr

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from records import like
 from reports import write
 
 from chainunit.app import cli
@@ -79,12 +80,12 @@ FACTORS = {"load 1": 1.0, "half": 0.5, "empty": 0.0}
 @pytest.fixture(scope="module", params=["direct", pytest.param("inverter", marks=pytest.mark.second)])
 def study(request, tmp_path_factory):
     made = run_study(parse(STUDY.format(start=request.param)), tmp_path_factory.mktemp(request.param))
-    assert made.failure is None
+    assert made.findings.failure is None
     return made
 
 
 def found(study) -> EnergyFindings:
-    return study.findings["energy"]
+    return study.findings.by_analysis["energy"]
 
 
 def test_the_losses_by_place_add_up_to_the_electric_power(study):
@@ -108,8 +109,8 @@ def test_a_year_is_the_integral_over_a_simulated_day(study):
     """The feed changes its size through a day of the shares, scaled down; the supply's power of the compiled system
     is integrated from a steady state to the same steady state. Material that comes with a change brings its energy
     with it; the day has enough turns for that not to count."""
-    drive = warm(study.drive, found(study).own.temperature)
-    operation, turn = study.config.operation, study.config.operation.turn
+    drive = warm(study.setup.drive, found(study).own.temperature)
+    operation, turn = study.setup.config.operation, study.setup.config.operation.turn
     whole = 2000.0 * turn
     at, changes = 30.0 * turn, {}
     names = Layout(type(operation.feed)).by_name(operation.feed)
@@ -130,7 +131,7 @@ def test_a_year_is_the_integral_over_a_simulated_day(study):
         run = simulation.run(end, 2e-3, names=names)
     power = run["motor.supply_power"].values
     if drive.follows:
-        plate = study.plate.nameplate
+        plate = study.setup.plate.nameplate
         losses = inverter.typical_losses(plate.power)
         f = run["motor.supply.frequency"].values / plate.frequency
         power = power + inverter.loss(losses, f, run["motor.air_gap_tau"].values / plate.torque)
@@ -160,9 +161,9 @@ def test_cost_and_co2_follow_from_the_energy(study):
 
 
 def test_an_inverter_has_losses_and_a_line_has_none(study):
-    assert (found(study).own.mean.inverter is not None) == study.drive.follows
-    kinds = {remark.code for remark in study.remarks}
-    assert "losses-in-iron" in kinds and ("losses-of-the-inverter" in kinds) == study.drive.follows
+    assert (found(study).own.mean.inverter is not None) == study.setup.drive.follows
+    kinds = {remark.code for remark in study.findings.remarks}
+    assert "losses-in-iron" in kinds and ("losses-of-the-inverter" in kinds) == study.setup.drive.follows
     # half of the feed goes with the loss of the whole feed in the gear
     assert "gear-at-other-loads" in kinds
 
@@ -267,15 +268,15 @@ def test_a_motor_of_75_kw_below_ie4_is_warned_of(tmp_path):
     assert next_class(old) == ("IE4", 0.96) and next_class(dataclasses.replace(old, efficiency=0.961)) is None
     text = 'event = []\ncatalogue = "motors.csv"\n[system]\nmotor = "Old 75"\n[run]\nsettle_turns = 1\n'
     made = run_study(parse(text, source=str(tmp_path / "study.toml")), tmp_path / "out")
-    assert isinstance(made.findings["motor_class"], MotorClass)
-    (warning,) = [remark for remark in made.warnings if remark.code == "efficiency-class"]
+    assert isinstance(made.findings.by_analysis["motor_class"], MotorClass)
+    (warning,) = [remark for remark in made.findings.warnings if remark.code == "efficiency-class"]
     assert "is IE3" in warning.text and "asks IE4" in warning.text and "brake motors" in warning.text
 
 
 def test_a_study_without_usage_has_no_new_findings(tmp_path):
     text = STUDY.format(start="direct").partition("[usage]")[0]
     made = run_study(parse(text), tmp_path)
-    assert not {"energy", "motor_class"} & set(made.findings)
+    assert not {"energy", "motor_class"} & set(made.findings.by_analysis)
 
 
 # -- input
@@ -287,7 +288,7 @@ def test_a_feed_is_scaled_within_its_bounds():
 
 
 def test_a_year_without_prices_has_energy_alone(study):
-    plan = study.config.plans["energy"]
+    plan = study.setup.config.plans["energy"]
     bare = dataclasses.replace(plan.table, price=0.0, co2=0.0, tonnes_per_hour=0.0)
     year = year_of(dataclasses.replace(plan, table=bare), 1000.0, None)
     assert (year.cost, year.co2, year.energy_per_tonne, year.life_cost) == (None,) * 4
@@ -348,7 +349,7 @@ def short_study(start="direct", table="", loads=""):
 
 def test_the_winding_has_the_temperature_of_the_duty(study):
     """A difference of 5 K would change the energy by more than 0.1 %."""
-    own, drive = found(study).own, study.drive
+    own, drive = found(study).own, study.setup.drive
     settled = drive.motor.settled_temperature(
         drive.fmu_parameters, own.mean.winding, own.temperature, own.speed
     )
@@ -359,10 +360,10 @@ def test_the_winding_has_the_temperature_of_the_duty(study):
 def test_a_duty_that_is_too_hot_is_warned_of(tmp_path):
     made = run_study(parse(short_study(loads="[[usage.load]]\nfactor = 10\n")), tmp_path)
     own = found(made).own
-    assert own.too_hot and own.temperature == made.config.permitted_temperature[1]
+    assert own.too_hot and own.temperature == made.setup.config.permitted_temperature[1]
     (warning,) = [
         remark
-        for remark in made.warnings
+        for remark in made.findings.warnings
         if remark.code == "energy-of-a-winding-too-hot"
         and own.motor in remark.text.split("winding of")[1][:30]
     ]
@@ -410,7 +411,7 @@ def motor_energy(plan, name, power, price):
     ],
 )
 def test_the_life_decides_whether_a_motor_pays(study, price, words):
-    plan = study.config.plans["energy"]
+    plan = study.setup.config.plans["energy"]
     own = motor_energy(plan, "own", 1000.0, 400.0)
     other = motor_energy(plan, "other", 950.0, price)
     comparison = compared(own, other)
@@ -467,7 +468,7 @@ def test_a_study_tells_that_the_class_of_its_motor_is_not_checked(name, poles, w
     motor = next(m for m in catalogue() if m.designation == name)
     motor = dataclasses.replace(motor, nameplate=dataclasses.replace(motor.nameplate, poles=poles))
     notes = []
-    study = SimpleNamespace(
+    study = like(
         plate=motor,
         drive=SimpleNamespace(foreign=None),
         config=SimpleNamespace(plans={"energy": None}),

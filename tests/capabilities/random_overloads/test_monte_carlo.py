@@ -24,6 +24,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from records import like
 
 from chainunit.capabilities.random_overloads import page
 from chainunit.capabilities.random_overloads import runs as monte_carlo
@@ -444,7 +445,7 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
     random = SimpleNamespace(quantiles=quantiles, shortage="", damaged_batches=1, file_name="runs.nc")
     notes = {}
-    study = SimpleNamespace(drive=drive, say=lambda code, **values: notes.update({code.code: values}))
+    study = like(drive=drive, say=lambda code, **values: notes.update({code.code: values}))
     monte_carlo.MonteCarloResult.remark(random, study)
     at = notes.get("random-overloads-at-current-limit")
     assert at == ({"limit": 4.4} if told else None)
@@ -493,7 +494,7 @@ def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
         {"side": ("run", [])} | {v.name: ("run", []) for v in Layout(monte_carlo.Sample).variables}
     )
     findings = monte_carlo.MonteCarloResult(no_runs, Path("runs.nc"), task.method)
-    (block,) = page.blocks(SimpleNamespace(findings={"monte_carlo": findings}))
+    (block,) = page.blocks(like(by_analysis={"monte_carlo": findings}))
     assert plain_line(block.line) == f"The random overloads were run {words}."
 
 

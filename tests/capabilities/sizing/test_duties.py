@@ -33,9 +33,11 @@ def test_the_choices_of_the_table_are_the_programs(name, motor, ratio, flywheel,
     study = run_study(load(DUTIES / f"{name}.toml"), tmp_path)
     result = as_dict(study)
     (tmp_path / "result.json").write_text(json.dumps(result), encoding="utf-8")
-    assert study.plate.designation == motor and study.drive.ratio == pytest.approx(ratio, abs=0.005)
+    assert study.setup.plate.designation == motor and study.setup.drive.ratio == pytest.approx(
+        ratio, abs=0.005
+    )
     # the search ends at a tenth of the flywheel
-    assert study.drive.added_inertia == pytest.approx(flywheel, rel=0.02)
+    assert study.setup.drive.added_inertia == pytest.approx(flywheel, rel=0.02)
     sizing = result.get("sizing") or {}
     orders = (("gear", "rated_torque", gear), ("protection", "relay_current", relay))
     for part, name, value in orders:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from command import chainunit
 from event_tables import HEAVY_TABLES
+from records import like
 from sizings import sized_by
 
 from chainunit.capabilities.handover.tables import candidates_csv, checks_csv
@@ -201,7 +202,7 @@ def test_a_gear_that_just_carries_an_overload_is_not_too_weak(sized, monkeypatch
     monkeypatch.setattr(findings, "gear_order", lambda *of: order)
     data = dataclasses.replace(found.best.sold.data, rated_torque=rated)
     best = dataclasses.replace(found.best, sold=dataclasses.replace(found.best.sold, data=data))
-    study = SimpleNamespace(insufficient="")
+    study = like(insufficient="")
     listed = dataclasses.replace(found, candidates=[best]).parts(study, None)
     assert any("an overload takes one that permits 501 N m" in words for words in listed.open) == is_weak
 

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from event_tables import HEAVY_MACHINE, demanding
+from records import like
 from sizings import duty_by, sized_by, task_of, trials_of
 
 from chainunit.capabilities.sizing import search as sizing
@@ -246,7 +247,7 @@ def test_a_belt_is_ordered_by_its_design_power_and_no_gear_with_it():
     plan = parse("[sizing]\ngear_kind = 'belt'\nload_class = 'heavy'\nhours = 12").plans["sizing"]
     motor = next(m for m in catalogue() if m.nameplate.power == 75e3 and m.nameplate.poles == 4)
     drive = SimpleNamespace(transmission="belt", is_geared=False, ratio=5.4)
-    study = SimpleNamespace(
+    study = like(
         insufficient=False,
         drive=drive,
         plate=motor,
@@ -262,11 +263,11 @@ def test_a_belt_is_ordered_by_its_design_power_and_no_gear_with_it():
         and belt.speed.value == pytest.approx(0.5 * belt.small_pulley.value * motor.nameplate.speed)
     )
     both = dataclasses.replace(plan, load_class="uniform")
-    study.drive = SimpleNamespace(transmission="belt and gear", is_geared=True, ratio=150.0)
+    study.setup.drive = SimpleNamespace(transmission="belt and gear", is_geared=True, ratio=150.0)
     assert ordered_belt(study, both, TrialResult(inertia_factor=20.0)).ratio.value == pytest.approx(
         3.75, rel=0.02
     )
-    study.drive = SimpleNamespace(transmission="gear", is_geared=True, ratio=150.0)
+    study.setup.drive = SimpleNamespace(transmission="gear", is_geared=True, ratio=150.0)
     assert ordered_belt(study, plan, TrialResult()) is None
 
 

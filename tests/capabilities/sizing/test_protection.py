@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from event_tables import HEAVY_MACHINE, event_line
+from records import changed, like
 from reports import page_of, said_of
 from scipy.integrate import solve_ivp
 
@@ -78,13 +79,13 @@ def chosen_in(study):
 
 
 def sizing_of(study):
-    return study.findings["sizing"]
+    return study.findings.by_analysis["sizing"]
 
 
 def having(study, **changes):
     """The study with another setting, or other ways to a coupling."""
     own = dataclasses.replace(sizing_of(study), **changes)
-    return dataclasses.replace(study, findings=study.findings | {"sizing": own})
+    return changed(study, by_analysis=study.findings.by_analysis | {"sizing": own})
 
 
 def sentence(study):
@@ -119,21 +120,25 @@ def test_a_relay_trips_within_the_times_of_its_class(trip_class):
 @pytest.mark.second
 def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
     """A start from another angle takes a heavier class: then its trips in the events are those of that class."""
-    study = dataclasses.replace(on_line, answers=dict(on_line.answers), findings=dict(on_line.findings))
-    light = {name: study.answers[name].thermal_trip_time for name in study.overloads}
+    study = changed(
+        on_line, answers=dict(on_line.runs.answers), by_analysis=dict(on_line.findings.by_analysis)
+    )
+    light = {name: study.runs.answers[name].thermal_trip_time for name in study.runs.overloads}
     tripped = [name for name, time in light.items() if time is not None]
-    assert tripped and study.relay_class == 10
-    heavy = [dataclasses.replace(s, start_class=30) for s in study.findings["starts"].starts]
-    study.findings["starts"] = dataclasses.replace(study.findings["starts"], starts=tuple(heavy))
+    assert tripped and study.runs.relay_class == 10
+    heavy = [dataclasses.replace(s, start_class=30) for s in study.findings.by_analysis["starts"].starts]
+    study.findings.by_analysis["starts"] = dataclasses.replace(
+        study.findings.by_analysis["starts"], starts=tuple(heavy)
+    )
     _with_class_of_all_starts(study)
-    assert study.relay_class == 30
+    assert study.runs.relay_class == 30
     for name in tripped:
-        after = study.runs[name].sel(time=slice(study.event[name], None))
-        since, current = after["time"].values - study.event[name], after["motor.i"].values
+        after = study.runs.series[name].sel(time=slice(study.runs.event_times[name], None))
+        since, current = after["time"].values - study.runs.event_times[name], after["motor.i"].values
         lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
-        before = study.window(Phase.STEADY, study.steady).rms("motor.i")
-        by_hand = relay_trip(since, current, study.drive.rated_current, before, lasts, 30)
-        later = study.answers[name].thermal_trip_time
+        before = study.runs.window(Phase.STEADY, study.runs.steady).rms("motor.i")
+        by_hand = relay_trip(since, current, study.setup.drive.rated_current, before, lasts, 30)
+        later = study.runs.answers[name].thermal_trip_time
         assert later == by_hand and (later is None or later > light[name])
     # an analysis that reads the trips comes after the class is known, so that a report has one time
     order = [analysis.name for analysis in all_analyses()]
@@ -145,17 +150,21 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
 
         @staticmethod
         def find(study, work):
-            seen.append((study.relay_class, {n: study.answers[n].thermal_trip_time for n in light}))
+            seen.append((study.runs.relay_class, {n: study.runs.answers[n].thermal_trip_time for n in light}))
 
     class Starts(StartAnalysis):
         @staticmethod
         def find(study, work):
-            return study.findings["starts"]
+            return study.findings.by_analysis["starts"]
 
-    later = {name: study.answers[name].thermal_trip_time for name in light}
-    study.relay_class, study.answers = 10, dict(on_line.answers)
+    later = {name: study.runs.answers[name].thermal_trip_time for name in light}
+    study.runs.relay_class, study.runs.answers = 10, dict(on_line.runs.answers)
     monkeypatch.setattr(run, "all_analyses", lambda: (Starts, Reader))
-    run._analyse(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None), needs_runs=True)
+    run._analyse(
+        study,
+        Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None),
+        needs_runs=True,
+    )
     assert seen == [(30, later)]
     protection = as_dict(study)["sizing"]["protection"]
     assert protection["relay_class"]["value"] == "class 30"
@@ -166,27 +175,28 @@ def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
     """Turns that begin in the start take up energy: no mean of them stands for running that lasts. A motor that does
     not start from another angle is not told as one that keeps the speed."""
     assert motor_verdict(on_line).text.startswith("The motor keeps the crank at")
-    found = on_line.findings["starts"]
+    found = on_line.findings.by_analysis["starts"]
     stuck = dataclasses.replace(found.starts[3], start_time=None)
-    study = dataclasses.replace(
-        on_line, findings={"starts": dataclasses.replace(found, starts=(found.starts[0], stuck))}
+    study = changed(
+        on_line, by_analysis={"starts": dataclasses.replace(found, starts=(found.starts[0], stuck))}
     )
     verdict = motor_verdict(study)
     assert verdict.holds == "false" and "does NOT bring the crank to its speed from 135 deg" in verdict.text
-    early = dataclasses.replace(
+    early = changed(
         on_line,
-        started=dataclasses.replace(on_line.started, steady_from=0.0),
-        answers=dict(on_line.answers),
-        findings={},
+        started=dataclasses.replace(on_line.runs.started, steady_from=0.0),
+        answers=dict(on_line.runs.answers),
+        by_analysis={},
         remarks=[],
     )
-    window = early.window(
-        Phase.STEADY, on_line.runs["start_up"].sel(time=slice(0.05, on_line.config.operation.turn))
+    window = early.runs.window(
+        Phase.STEADY,
+        on_line.runs.series["start_up"].sel(time=slice(0.05, on_line.setup.config.operation.turn)),
     )
-    assert not window.lasts and on_line.window(Phase.STEADY, on_line.steady).lasts
-    early.runs = {**on_line.runs, "start_up": window.run}
-    early.answers["steady"] = read_answers(window)
-    refused = early.answers["steady"]
+    assert not window.lasts and on_line.runs.window(Phase.STEADY, on_line.runs.steady).lasts
+    early.runs.series = {**on_line.runs.series, "start_up": window.run}
+    early.runs.answers["steady"] = read_answers(window)
+    refused = early.runs.answers["steady"]
     assert refused.power_mean is refused.supply_power_mean is refused.winding_temperature is None
     verdict = motor_verdict(early)
     assert verdict.holds == "false" and verdict.text.startswith("The motor is not judged: the crank turns at")
@@ -262,8 +272,8 @@ def test_a_setting_carries_every_start():
 
 def test_a_limiter_that_nothing_opens_names_the_overloads_of_the_study():
     """It spoke of "the jams, lumps and blocks of this study" in a study with a surge alone."""
-    study = SimpleNamespace(title_of={"surge_rock": "rock rises"}.get)
-    words = _bound(study, Setting(200.0, 350.0, 600.0, 1000.0, {"surge_rock": 240.0}))
+    study = like(title_of={"surge_rock": "rock rises"}.get)
+    words = _bound(study.runs, Setting(200.0, 350.0, 600.0, 1000.0, {"surge_rock": 240.0}))
     assert words == "the overloads of this study give less: rock rises (240 N m)"
 
 
@@ -297,9 +307,7 @@ def test_the_line_of_the_relay_tells_of_the_tolerance_of_the_current(trip_class,
     values = {v.name: 1.0 for v in variables(StartNumbers)} | {"relay_seconds": seconds}
     found = StartFindings((StartNumbers(**values),), 1.0, math.inf, "steady")
     drive = SimpleNamespace(follows=False, star_delta=None)
-    study = SimpleNamespace(
-        drive=drive, relay_class=trip_class, findings={"starts": found}, answers={}, plate=None
-    )
+    study = like(drive=drive, relay_class=trip_class, by_analysis={"starts": found}, answers={}, plate=None)
 
     def line():
         protection = _relay_of(study, 8.04)
@@ -308,7 +316,7 @@ def test_the_line_of_the_relay_tells_of_the_tolerance_of_the_current(trip_class,
 
     assert line() == f"relay at 8.04 A, class {trip_class}" if words is None else line().endswith(f"{words})")
     # a start that fails is no start of a motor with more current
-    study.findings["starts"] = dataclasses.replace(
+    study.findings.by_analysis["starts"] = dataclasses.replace(
         found, starts=(StartNumbers(**values | {"start_time": None}),)
     )
     assert line() == f"relay at 8.04 A, class {trip_class}"
@@ -319,23 +327,23 @@ def test_a_relay_that_trips_too_late_is_ordered_with_thermistors():
     praised the class."""
     plate = next(each.nameplate for each in catalogue() if each.designation == "IE3 4-pole 37 kW, 225S")
     plate = dataclasses.replace(plate, locked_time=12.0)
-    study = SimpleNamespace(
+    study = like(
         drive=SimpleNamespace(follows=False, star_delta=None),
-        findings={},
+        by_analysis={},
         answers={"steady": SimpleNamespace(current_rms=0.8 * plate.rated_current)},
         plate=SimpleNamespace(nameplate=plate),
     )
     stall = plate.rated_current * plate.locked_current_ratio
     for trip_class in (10, 20, 30):
-        study.relay_class = trip_class
+        study.runs.relay_class = trip_class
         named = next(each for each in CLASSES if each.name == str(trip_class))
         trip = stall_trip(named, plate.rated_current, 0.8 * plate.rated_current, stall)
         words = _relay_of(study, plate.rated_current).setting_words
         assert ("order the motor with PTC thermistors" in words) == (trip > 12.0), trip_class
-    study.relay_class = 30
+    study.runs.relay_class = 30
     assert "thermistors" in _relay_of(study, plate.rated_current).setting_words
     # the trip of a relay heavier than class 30 is not known
-    study.relay_class = 40
+    study.runs.relay_class = 40
     assert "thermistors" not in _relay_of(study, plate.rated_current).setting_words
 
 
@@ -396,18 +404,18 @@ def on_line(tmp_path_factory):
 def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     """By the rule of the gear, and the electromagnetic transient stands beside it; a start that is harder than the
     shocks leaves no coupling. There are ways to a lower one."""
-    setting, starts = sizing_of(on_line).setting, on_line.findings["starts"].starts
-    worst = on_line.findings["starts"].worst
+    setting, starts = sizing_of(on_line).setting, on_line.findings.by_analysis["starts"].starts
+    worst = on_line.findings.by_analysis["starts"].worst
     assert setting.obstacle is None and setting.start == pytest.approx(worst.quasi_static, rel=1e-3)
     # rigid shafts carry one torque
     assert all(each.coupling_torque == pytest.approx(each.quasi_static, rel=1e-12) for each in starts)
     transient = max(each.coupling_transient for each in starts)
     # the rows of the start-up are two milliseconds apart and miss some of the peak
-    assert 0.9 * transient < largest(on_line, "start_up") < 1.001 * transient
+    assert 0.9 * transient < largest(on_line.runs, "start_up") < 1.001 * transient
     assert transient > max(setting.overloads.values()) > setting.least > 1.2 * setting.start
     words = sentence(on_line)
     assert words.startswith("Recommended torque limiter: ") and "puts on it by load and acceleration" in words
-    assert "held" not in words and not on_line.insufficient
+    assert "held" not in words and not on_line.setup.insufficient
     assert f"rigid): {number(transient, 'N.m')}. A friction clutch slips in it" in words
     harder = dataclasses.replace(setting, start=1200.0, effects={})
     none = having(on_line, setting=harder)
@@ -434,7 +442,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     ]
     for row, each in zip(cells, sizing_of(on_line).alternatives, strict=True):
         assert row.startswith(each.way) and number(each.numbers.setting, "N.m") in row
-        assert row.endswith("nothing" if not each.opens else on_line.title_of([*each.opens][-1]))
+        assert row.endswith("nothing" if not each.opens else on_line.runs.title_of([*each.opens][-1]))
     # a sentence in a cell that does not wrap made the page twice as wide as the screen
     assert "alternatives, 0" not in page
     said = said_of(none)
@@ -442,27 +450,28 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     assert "With a soft starter" in said and "slip clutch" in said
     # what has to be ordered, with the reason where nothing is
     plate, gear = sizing_of(on_line).best.motor.nameplate, as_dict(none)["sizing"]["gear"]
-    start, fB = on_line.findings["starts"].worst.quasi_static, gear["service_factor"]["value"]
+    start, fB = on_line.findings.by_analysis["starts"].worst.quasi_static, gear["service_factor"]["value"]
     loads = gear["running"]["value"] / 0.9, start * fB / 2.0, gear["overload"]["value"] / 2.0 / 0.9
-    rated = plate.torque * on_line.drive.ratio * on_line.config.drive.gear.efficiency
+    rated = plate.torque * on_line.setup.drive.ratio * on_line.setup.config.drive.gear.efficiency
     assert gear["rated_torque"]["value"] == pytest.approx(max(*loads, fB * rated), rel=0.01)
-    assert gear["transient"]["value"] == on_line.findings["starts"].transient > 1.3 * start
+    assert gear["transient"]["value"] == on_line.findings.by_analysis["starts"].transient > 1.3 * start
     assert gear["decided_by"].endswith(", rounded up")
     ordered = f"gear with a rated output torque >= {gear['rated_torque']['value']:.0f} N m"
     assert f"{ordered}, decided by {gear['decided_by']}" in said
     # without a coupling the gear carries the whole overload, with one what passes it; a gear for it is ordered
-    block = float(np.max(np.abs(crank_torque(on_line.drive, on_line.runs["blocked"]))))
+    block = float(np.max(np.abs(crank_torque(on_line.setup.drive, on_line.runs.series["blocked"]))))
     assert gear["overload"]["value"] == pytest.approx(block, rel=1e-3)
-    quick = dataclasses.replace(on_line.config.drive.gear, start_factor=1.0)
-    given = on_line.config.file.given | {"gear.start_factor"}
-    light = dataclasses.replace(on_line.findings["starts"].worst, quasi_static=1.0)
-    gentle = dataclasses.replace(on_line.findings["starts"], starts=(light,))
-    own = dataclasses.replace(
+    quick = dataclasses.replace(on_line.setup.config.drive.gear, start_factor=1.0)
+    given = on_line.setup.config.file.given | {"gear.start_factor"}
+    light = dataclasses.replace(on_line.findings.by_analysis["starts"].worst, quasi_static=1.0)
+    gentle = dataclasses.replace(on_line.findings.by_analysis["starts"], starts=(light,))
+    own = changed(
         none,
         config=dataclasses.replace(
-            on_line.config, drive=dataclasses.replace(on_line.config.drive, gear=quick, given=given)
+            on_line.setup.config,
+            drive=dataclasses.replace(on_line.setup.config.drive, gear=quick, given=given),
         ).with_file(given=given),
-        findings=none.findings | {"starts": gentle},
+        by_analysis=none.findings.by_analysis | {"starts": gentle},
     )
     ordered = as_dict(own)["sizing"]["gear"]
     assert ordered["rated_torque"]["value"] == pytest.approx(block / 0.9, rel=0.01)
@@ -491,26 +500,26 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     if way is Way.INVERTER:
         text = text.replace("[run]\n", f"[run]\nramp = {numbers.ramp}\n")
         text += f"[starter.inverter]\nboost = {numbers.boost}\n"
-    text += f'[system]\nmotor = "{MOTOR}"\n[gear]\nratio = {on_line.drive.ratio!r}\n'
+    text += f'[system]\nmotor = "{MOTOR}"\n[gear]\nratio = {on_line.setup.drive.ratio!r}\n'
     trial = run_study(config.parse(text + f"[coupling]\ntrip_torque = {numbers.setting}\n"), tmp_path)
-    assert trial.failure is None
+    assert trial.findings.failure is None
     # the gear carries as much as the sentence says, until no torque passes the coupling; this one opens at the end of
     # the communication step in which the torque passes its setting
-    late = trial.config.run.step / Coupling().release_time
+    late = trial.setup.config.run.step / Coupling().release_time
     for name, effect in each.effects.items():
-        peak, size = trial.answers[name].crank_torque_peak, effect.with_coupling
+        peak, size = trial.runs.answers[name].crank_torque_peak, effect.with_coupling
         assert 0.98 * size < peak < 1.02 * size + late * (size - numbers.setting)
         assert f"{size:.0f} N m at the output of the gear in place of {effect.without:.0f} N m" in way_words(
             on_line, each, sizing_of(on_line).setting
         )
     assert list(each.effects) == list(each.opens)
     shocks = set(sizing_of(on_line).setting.overloads)
-    opened = {n for n, a in trial.answers.items() if a.coupling_trip_time is not None} & shocks
+    opened = {n for n, a in trial.runs.answers.items() if a.coupling_trip_time is not None} & shocks
     # the study reads the torque at its communication steps: one that just reaches the setting may open there or not
-    near = {n for n in opened if trial.answers[n].crank_torque_peak < 1.02 * numbers.setting}
+    near = {n for n in opened if trial.runs.answers[n].crank_torque_peak < 1.02 * numbers.setting}
     assert opened - near == set(each.opens) - near and opened - near
-    assert largest(trial, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
-    assert not [warning for warning in trial.warnings if warning.code == "coupling-opens-in-start"]
+    assert largest(trial.runs, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
+    assert not [warning for warning in trial.findings.warnings if warning.code == "coupling-opens-in-start"]
 
 
 @pytest.mark.slow
@@ -531,7 +540,9 @@ def test_a_way_is_judged_by_the_limits_of_the_motor(on_line, way):
         Way.INVERTER: coupling_alternatives._inverter,
         Way.SLIP_CLUTCH: coupling_alternatives._slip_clutch,
     }[way]
-    left_out = make(hot, Rig(on_line.config.operation, on_line.drive, None), sizing.setting, chosen_in(hot))
+    left_out = make(
+        hot, Rig(on_line.setup.config.operation, on_line.setup.drive, None), sizing.setting, chosen_in(hot)
+    )
     assert left_out.numbers.setting is None and left_out.numbers.start is None and not left_out.opens
     assert "limits of this motor" in way_words(hot, left_out, sizing.setting)
 
@@ -549,7 +560,7 @@ def test_the_gear_that_is_ordered_follows_from_the_printed_numbers(on_line, serv
     assert order.rated == ordered_torque(exact) and exact <= order.rated <= 1.01 * exact
     assert (times == service) if service == 9.0 else rule
     # without the limiter the overloads count whole
-    bare = max(gear_peaks(on_line)[name] for name in sizing_of(on_line).setting.overloads) / 2.0 / 0.9
+    bare = max(gear_peaks(on_line.runs)[name] for name in sizing_of(on_line).setting.overloads) / 2.0 / 0.9
     assert order.without == max(order.rated, ordered_torque(bare))
 
 
@@ -562,19 +573,23 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
         rigs = list(trials)
         tried.append(({rig.drive.parameters.inverter.boost for rig, *_ in rigs}, len(rigs)))
         rig, _, numbers, _ = rigs[0]
-        return (rig, on_line.findings["starts"].starts, numbers) if numbers["boost"] == 0.15 else None
+        return (
+            (rig, on_line.findings.by_analysis["starts"].starts, numbers)
+            if numbers["boost"] == 0.15
+            else None
+        )
 
     monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
     monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))
-    rig = Rig(on_line.config.operation, on_line.drive, None)
+    rig = Rig(on_line.setup.config.operation, on_line.setup.drive, None)
     found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting, chosen_in(on_line))
     assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
-    tables = on_line.config.drive
+    tables = on_line.setup.config.drive
     tables = dataclasses.replace(tables, given=tables.given | {"starter.inverter.boost"})
-    given = dataclasses.replace(on_line.config, drive=tables)
+    given = dataclasses.replace(on_line.setup.config, drive=tables)
     tried.clear()
     none = coupling_alternatives._inverter(
-        dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting, chosen_in(on_line)
+        changed(on_line, config=given), rig, sizing_of(on_line).setting, chosen_in(on_line)
     )
     assert tried == [({0.05}, 5)] and none.numbers.start is None
 
@@ -586,7 +601,7 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
 
     def without(*names):
         bad = {name: {"energy_residual_share": 0.2} for name in names}
-        return dataclasses.replace(on_line, certificate={**on_line.certificate, **bad})
+        return changed(on_line, certificate={**on_line.runs.certificate, **bad})
 
     kept = recommended_setting(without("blocked"))
     # a jam that counts as wrong does not decide the torque of the rocker either
@@ -594,7 +609,7 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
     ordered = as_dict(without("blocked"))["sizing"]["gear"]["decided_by"]
     wrong = "the energy balance is not kept (the rocker is blocked)"
     assert ordered.endswith(f"; a lower bound, as {wrong}: shorten run.step before you order")
-    assert _rocker_until(on_line, right) < _rocker_until(on_line, kept)
+    assert _rocker_until(on_line.runs, right) < _rocker_until(on_line.runs, kept)
     assert set(kept.overloads) == set(sizing_of(on_line).setting.overloads) - {"blocked"} and kept.wrong == [
         "blocked"
     ]
@@ -608,7 +623,7 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
 @pytest.mark.second
 def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     """It is withdrawn where it saves nothing; where it leaves more than the gear may carry, it says how much more."""
-    shocks, ratio = sizing_of(on_line).setting.overloads, on_line.drive.ratio
+    shocks, ratio = sizing_of(on_line).setting.overloads, on_line.setup.drive.ratio
     own = Setting(280.0, 0.0, 3000.0, 900.0, shocks)
     spared, late = (
         dataclasses.replace(own, effects={"blocked": CouplingEffect(1324.0, peak)})
@@ -616,7 +631,7 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     )
     words = sentence(having(on_line, setting=spared))
     # the loss of the gear is on the side of the motor
-    at_motor = 350.0 / ratio / on_line.config.drive.gear.efficiency
+    at_motor = 350.0 / ratio / on_line.setup.config.drive.gear.efficiency
     assert f"350 N m at the crank, {at_motor:.2f} N m at the motor's shaft" in words
     assert (
         "It opens where the rocker is blocked (700 N m at the output of the gear in place of 1324 N m)"
@@ -636,11 +651,11 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     release, gear = _in_time(on_line, over)
     assert release.numbers.release_time == 0.002 and gear.numbers.gear == 1100.0
     # as long as its release time the gear carries what it may
-    limit = dataclasses.replace(on_line.config.drive.gear, torque_limit=900.0)
-    study = dataclasses.replace(
+    limit = dataclasses.replace(on_line.setup.config.drive.gear, torque_limit=900.0)
+    study = changed(
         on_line,
         config=dataclasses.replace(
-            on_line.config, drive=dataclasses.replace(on_line.config.drive, gear=limit)
+            on_line.setup.config, drive=dataclasses.replace(on_line.setup.config.drive, gear=limit)
         ),
     )
     effect = effects(study, over.least)["blocked"]
@@ -652,11 +667,13 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
 @pytest.mark.second
 def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on_line):
     """Its torque in starts from eight angles and with all feed on either side, against single runs by hand."""
-    drive = dataclasses.replace(on_line.drive, added_inertia=2.0 * on_line.drive.parameters.rotor.J)
-    study = dataclasses.replace(on_line, config=dataclasses.replace(on_line.config, events={}))
-    rig = Rig(study.config.operation, drive, None)
+    drive = dataclasses.replace(
+        on_line.setup.drive, added_inertia=2.0 * on_line.setup.drive.parameters.rotor.J
+    )
+    study = changed(on_line, config=dataclasses.replace(on_line.setup.config, events={}))
+    rig = Rig(study.setup.config.operation, drive, None)
     way = _before_flywheel(study, rig, sizing_of(on_line).setting)
-    hardest = max(on_line.findings["starts"].starts, key=lambda start: start.coupling_torque)
+    hardest = max(on_line.findings.by_analysis["starts"].starts, key=lambda start: start.coupling_torque)
     with from_angle(rig, hardest.angle).from_rest() as simulation:
         run = simulation.run(1.0, 1e-3)
     rotor, w, a = drive.parameters.rotor, run["motor.w"].values, run["motor.a"].values
@@ -671,12 +688,12 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
     )
     quick = np.max(np.abs(run["motor.air_gap_tau"].values - rotor.d * w - rotor.J * a)) * more
     assert 0.999 * by_hand <= way.numbers.start < 0.9 * quick
-    feed = one_sided_event(study.config.events, "right")
+    feed = one_sided_event(study.setup.config.events, "right")
     with rig.from_rest() as simulation:
         simulation.run(4.0, 2e-3)
         begin = simulation.save()
         moved = follow(
-            rig, simulation, feed, begin, begin + feed.p.shift + 2.0 * study.config.operation.turn
+            rig, simulation, feed, begin, begin + feed.p.shift + 2.0 * study.setup.config.operation.turn
         ).run
     steady = on_motor_side(drive, run.sel(time=slice(0.6, None)))
     assert way.numbers.running == pytest.approx(on_motor_side(drive, moved), rel=0.02)
@@ -688,12 +705,15 @@ def test_a_coupling_that_starts_open_ends_the_study(on_line, tmp_path, monkeypat
     """The message names the torque of the start, and no coupling is held shut."""
     coupling = f"[coupling]\ntrip_torque = {sizing_of(on_line).setting.least_in_running}\n"
     study = ran(heavy() + coupling, tmp_path, monkeypatch)
-    message = str(study.failure)
+    message = str(study.findings.failure)
     assert "opens in the start-up" in message and "held" not in message
-    assert f"up to {largest(on_line, 'start_up'):.0f} N m on it" in message and "milliseconds" not in message
+    assert (
+        f"up to {largest(on_line.runs, 'start_up'):.0f} N m on it" in message
+        and "milliseconds" not in message
+    )
     # a setting that load and acceleration keep, through rigid shafts
     coupling = f"[coupling]\ntrip_torque = {sizing_of(on_line).setting.least}\n"
-    message = str(ran(heavy() + coupling, tmp_path / "least", monkeypatch).failure)
+    message = str(ran(heavy() + coupling, tmp_path / "least", monkeypatch).findings.failure)
     assert "on it for some milliseconds (the electromagnetic transient of the motor" in message
     with pytest.raises(InputError, match="held_in_start"):
         config.parse(heavy() + coupling + "held_in_start = true\n")
@@ -707,10 +727,10 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
     trip = 0.95 * min(peaks.values())
     text = f'start = "soft"\n{heavy(*SIX)}[starter]\nsoft_start = {{ voltage = 0.3, time = 5 }}\n'
     trials = ran(f"{text}[coupling]\ntrip_torque = {trip}\n", tmp_path, monkeypatch)
-    assert trials.failure is None
-    opened = {n for n, a in trials.answers.items() if a.coupling_trip_time is not None}
+    assert trials.findings.failure is None
+    opened = {n for n, a in trials.runs.answers.items() if a.coupling_trip_time is not None}
     assert opened == {*peaks, "dip"} and sizing_of(on_line).setting.disturbances["dip"] > trip
-    (nuisance,) = [warning for warning in trials.warnings if warning.code == "nuisance-trip"]
+    (nuisance,) = [warning for warning in trials.findings.warnings if warning.code == "nuisance-trip"]
     assert "nuisance trip that protects nothing: the voltage dips." in nuisance.text
     assert nuisance.runs == ("dip",)
     assert sizing_of(trials).setting is None and set(as_dict(trials)["sizing"]["protection"]) == {
@@ -718,10 +738,10 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
         "relay_class",
         "device",
     }
-    for name, peak in on_line.spreads["blocked"].peaks.items():
+    for name, peak in on_line.runs.spreads["blocked"].peaks.items():
         # another start leaves another steady turn
-        assert trials.spreads["blocked"].peaks[name] == pytest.approx(peak, rel=0.02), name
-    (note,) = [note.text for note in trials.notes if note.code == "assumption"]
+        assert trials.runs.spreads["blocked"].peaks[name] == pytest.approx(peak, rel=0.02), name
+    (note,) = [note.text for note in trials.findings.notes if note.code == "assumption"]
     assert "These peaks are without the torque limiter" in note
 
 
@@ -729,7 +749,7 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
 def test_the_torque_through_a_coupling_by_hand(on_line):
     """It is the torque of the motor less the one that accelerates the inertia on the motor's side, and less friction;
     between motor and flywheel less the rotor's own alone."""
-    run, drive = on_line.runs["start_up"], on_line.drive
+    run, drive = on_line.runs.series["start_up"], on_line.setup.drive
     w, a, gap = (run[f"motor.{name}"].values for name in ("w", "a", "air_gap_tau"))
     p = drive.fmu_parameters.rotor
     loss = drive.gear_loss
@@ -746,15 +766,17 @@ def test_the_torque_through_a_coupling_by_hand(on_line):
 def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
     """While it slips it passes its setting on: motor and machine run as if each had this torque alone."""
     (clutch,) = [each for each in sizing_of(on_line).alternatives if each.way is Way.SLIP_CLUTCH]
-    drive, capacity = on_line.drive, clutch.numbers.setting / on_line.drive.ratio
-    starts = on_line.findings["starts"].starts
+    drive, capacity = on_line.setup.drive, clutch.numbers.setting / on_line.setup.drive.ratio
+    starts = on_line.findings.by_analysis["starts"].starts
     angle = max(starts, key=lambda start: start.start_time).angle * drive.ratio
     times = np.linspace(0.0, 2.0 * clutch.numbers.slip_time, 4001)
     motor = ModelComponent(drive.motor, drive.fmu_parameters)
     speed = monolithic(System({"motor": motor}), {"motor.load.tau_bias": capacity}, times)["motor.w"].values
     model = coasting_model(drive)
     p = model.parameter_layout.from_names(coasting_parameters(drive) | {"phi_start": angle})
-    loads = {full: x for full, x in drive.loads(on_line.config.feed).items() if full.startswith("machine.")}
+    loads = {
+        full: x for full, x in drive.loads(on_line.setup.config.feed).items() if full.startswith("machine.")
+    }
     machine = System({"machine": ModelComponent(model, p)})
     driven = monolithic(machine, {**loads, "machine.tau": capacity}, times)["machine.w"].values
     stuck = int(np.flatnonzero((driven >= speed) & (times > 0.02))[0])
@@ -763,15 +785,15 @@ def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
     assert clutch.numbers.slip_time == pytest.approx(times[stuck], rel=0.1)
     assert clutch.numbers.slip_energy == pytest.approx(float(heat), rel=0.1)
     assert clutch.numbers.start == pytest.approx(clutch.numbers.setting, rel=1e-3)
-    assert clutch.numbers.slip_power == clutch.numbers.setting * on_line.config.run.crank_speed
+    assert clutch.numbers.slip_power == clutch.numbers.setting * on_line.setup.config.run.crank_speed
 
 
 @pytest.mark.second
 def test_the_energy_of_a_start_with_a_slip_clutch(on_line):
     """The motor's energy is the heat of the slip, and the energy that the machine stores and loses."""
     setting = sizing_of(on_line).setting.least_in_running
-    rig = Rig(on_line.config.operation, on_line.drive, None)
-    slowest = max(on_line.findings["starts"].starts, key=lambda start: start.start_time)
+    rig = Rig(on_line.setup.config.operation, on_line.setup.drive, None)
+    slowest = max(on_line.findings.by_analysis["starts"].starts, key=lambda start: start.start_time)
     run = slip_run(rig, slowest, setting)
     time = run["time"].values
     heat = np.trapezoid(run["clutch.dissipated_power"].values, time)
@@ -785,7 +807,10 @@ def test_the_energy_of_a_start_with_a_slip_clutch(on_line):
     slips = np.trapezoid((power > 0.01 * np.max(power)).astype(float), time)
     assert clutch.numbers.slip_time == pytest.approx(slips, rel=0.1)
     # the machine has its speed, so that no later slip is left out
-    assert float(run["machine.w0"][-1]) >= 0.95 * on_line.config.run.crank_speed * on_line.drive.machine.ratio
+    assert (
+        float(run["machine.w0"][-1])
+        >= 0.95 * on_line.setup.config.run.crank_speed * on_line.setup.drive.machine.ratio
+    )
     # once it sticks the shafts turn alike
     assert float(run["clutch.slip"][-1]) < 0.05 * float(run["motor.w"][-1])
 
@@ -822,24 +847,24 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     load is no shock; a gear that permits twice its rating in a shock is not told as passed."""
     text = 'start = "soft"\n' + heavy("feed_right", "start_loaded_left", "jam_right")
     study = ran(text + "[gear]\ntorque_limit = 450\n", tmp_path, monkeypatch)
-    assert study.failure is None and not study.insufficient
+    assert study.findings.failure is None and not study.setup.insufficient
     result = sizing_of(study).setting
     assert set(result.overloads) == {"jam_right"} and not result.disturbances
     assert sizing_of(study).alternatives == ()
-    start = quasi_static_peak(study.drive, study.runs["start_loaded_left"])
-    hardest = max(each.coupling_torque for each in study.findings["starts"].starts)
+    start = quasi_static_peak(study.setup.drive, study.runs.series["start_loaded_left"])
+    hardest = max(each.coupling_torque for each in study.findings.by_analysis["starts"].starts)
     assert result.normal == pytest.approx(
         max(start, hardest, sizing_of(study).best.trial.duty.torque), rel=1e-3
     )
-    fed = float(abs(study.runs["feed_right"]["motor.tau"]).max()) * study.drive.ratio
+    fed = float(abs(study.runs.series["feed_right"]["motor.tau"]).max()) * study.setup.drive.ratio
     assert sizing_of(study).best.trial.duty.torque == pytest.approx(fed, rel=0.01)
     assert sizing_of(study).best.trial.duty.run == "all_feed_on_the_right"
-    rows = {row.title: row for row in study.findings["checks"].rows if row.of == "gear"}
+    rows = {row.title: row for row in study.findings.by_analysis["checks"].rows if row.of == "gear"}
     running = rows["torque of running"]
     assert (running.limit, running.holds) == (450.0, True)
     (largest,) = (row for title, row in rows.items() if title.startswith("largest torque"))
     assert largest.value > 450.0 and largest.limit == 900.0
-    told = [warning.text for warning in study.warnings if "the output" in warning.text]
+    told = [warning.text for warning in study.findings.warnings if "the output" in warning.text]
     assert bool(told) == (largest.value > 900.0)
 
 
@@ -887,10 +912,10 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
 
 def test_a_relay_of_a_star_delta_starter_has_its_place():
     """It sits in the phases of the delta, where 8.04 A of the line are 4.64 A; that of the line stood alone."""
-    started = SimpleNamespace(
+    started = like(
         drive=SimpleNamespace(follows=False, star_delta=True),
         relay_class=10,
-        findings={},
+        by_analysis={},
         answers={},
         plate=None,
     )
@@ -905,7 +930,7 @@ def test_a_relay_of_a_star_delta_starter_has_its_place():
         == words
         == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
     )
-    started.drive.star_delta = None
+    started.setup.drive.star_delta = None
     assert "line_current" not in as_data(_relay_of(started, 8.04), titled=True)
 
 
@@ -917,7 +942,7 @@ def test_the_order_names_the_starter():
         star_delta=StarDelta(time=3.0),
     )
     numbers = {"inverter_current": 45.4, "frequency": 50.3, "speed": 156.8}
-    study = SimpleNamespace(plate=None)
+    study = like(plate=None)
     order = SizedDrive(
         None, False, "crank", None, False, inverter=OrderedInverter(InUnit(49.1, "A"), "a start")
     )
@@ -925,14 +950,14 @@ def test_the_order_names_the_starter():
     def said(start):
         of_drive = DriveNumbers(**dict.fromkeys(Layout(DriveNumbers).names) | numbers)
         drive = SimpleNamespace(start=start, starter=starter)
-        study.config = SimpleNamespace(drive=drive, run=Run(crank_speed=3.0, ramp=2.0))
-        lines = _starter(study, order, cited(order), cited(of_drive))
+        study.setup.config = SimpleNamespace(drive=drive, run=Run(crank_speed=3.0, ramp=2.0))
+        lines = _starter(study.setup, order, cited(order), cited(of_drive))
         return "; ".join(map(terminal.plain_line, lines))
 
     assert said("soft") == "soft starter, 50 % voltage, 1 s"
     # delta is for the voltage of the supply; the order did not name the winding
     for voltage, winding, other in ((400.0, "400/690 V", "230/400 V"), (480.0, "480/830 V", "280/480 V")):
-        study.plate = SimpleNamespace(nameplate=SimpleNamespace(voltage=voltage))
+        study.setup.plate = SimpleNamespace(nameplate=SimpleNamespace(voltage=voltage))
         assert said("star-delta").startswith(
             f"star-delta starter, 3 s in star; motor winding {winding}, in delta at the {voltage:g} V of the supply "
             f"(one of {other}, "
@@ -955,7 +980,7 @@ def test_the_order_names_the_starter():
 @pytest.mark.second
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
-    assert study.insufficient and sizing_of(study).setting is None
+    assert study.setup.insufficient and sizing_of(study).setting is None
     assert "protection" not in as_dict(study)["sizing"]
     text = said_of(study)
     assert "Insufficient motor:" in text and "relay at" not in text
@@ -968,15 +993,19 @@ def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
         return event_line("jam_left", turns=1, force=force) + "[run]\nstep = 0.002\n"
 
     study = run_study(config.parse(light(2000) + "[coupling]\ntrip_torque = 5000\n"), tmp_path)
-    (remark,) = [warning.text for warning in study.warnings if warning.code == "coupling-never-opens"]
-    assert f"opens in no overload of this study ({study.title_of('jam_left')})" in remark
+    (remark,) = [
+        warning.text for warning in study.findings.warnings if warning.code == "coupling-never-opens"
+    ]
+    assert f"opens in no overload of this study ({study.runs.title_of('jam_left')})" in remark
     # what the jam asks, and the motor's current limit times its torque constant through the gear
-    assert f"{study.answers['jam_left'].crank_torque_peak:.0f} N m on it at most" in remark
+    assert f"{study.runs.answers['jam_left'].crank_torque_peak:.0f} N m on it at most" in remark
     assert f"motor gives {4.4 * 1.27 * 50:.0f} N m at most" in remark
     study = run_study(config.parse(light(9000) + "[coupling]\ntrip_torque = 320\n"), tmp_path)
-    assert study.answers["jam_left"].coupling_trip_time is not None
-    assert any(w.code == "coupling-above-motor" and "may stall the motor" in w.text for w in study.warnings)
-    assert not any(warning.code == "coupling-never-opens" for warning in study.warnings)
+    assert study.runs.answers["jam_left"].coupling_trip_time is not None
+    assert any(
+        w.code == "coupling-above-motor" and "may stall the motor" in w.text for w in study.findings.warnings
+    )
+    assert not any(warning.code == "coupling-never-opens" for warning in study.findings.warnings)
 
 
 @pytest.mark.second
@@ -984,16 +1013,16 @@ def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
     """Asked for 30 rad/s, the DC motor turns the crank at an eighth of it: the voltage leaves no more torque."""
     text = "event = []\n[run]\ncrank_speed = 30\nstep = 0.002\nsettle_turns = 3\n"
     study = run_study(config.parse(text), tmp_path)
-    result, p = study.answers["steady"], study.drive.parameters
+    result, p = study.runs.answers["steady"], study.setup.drive.parameters
     assert result.speed_mean < 5.0 and result.torque_reserve == 0.0
     verdict = motor_verdict(study)
     assert verdict.holds == "false" and "least reserve of torque 0 %" in verdict.text
-    run = study.steady
+    run = study.runs.steady
     warm = p.armature.R * (1.0 + p.armature.alpha * (result.winding_temperature - T_RATED))
     left = p.armature.k * (p.limit.v - p.armature.k * run["motor.w"].values) / warm
     limit = np.minimum(left, p.armature.k * p.limit.i)
     driving = run["motor.air_gap_tau"].values * run["motor.w"].values > 0.0
-    limits = largest_torque(study.drive, run, result.winding_temperature)
+    limits = largest_torque(study.setup.drive, run, result.winding_temperature)
     assert limits[driving] == pytest.approx(limit[driving], rel=1e-6, abs=1e-6)
     assert np.min(limits) < 0.5 * p.armature.k * p.limit.i
 
@@ -1038,7 +1067,7 @@ rods = 4
 sweep_points = 0
 """
     study = run_study(config.parse(text), tmp_path)
-    jam, coasting = study.runs["jam_left"], study.runs["jam_left_coasting"]
+    jam, coasting = study.runs.series["jam_left"], study.runs.series["jam_left_coasting"]
     rods = [f"machine.{side}.{x}_{k}" for side in SIDES for x in ("theta", "omega") for k in range(1, 5)]
     for name in ("machine.rocker.psi", "machine.kinetic_energy", "machine.potential_energy", *rods):
         # at a communication point the shaft's speed was just corrected: the rods' speeds are closed to it
@@ -1051,12 +1080,15 @@ sweep_points = 0
     assert float(energy[0] - energy[-1]) == pytest.approx(losses, rel=0.02)
     for side in SIDES:
         assert float(np.max(coasting[f"machine.{side}.drift"])) < 1e-6
-        assert {f"A2 {side} web at rocker", f"B {side} hinge"} <= set(study.pins["jam_left"])
+        assert {f"A2 {side} web at rocker", f"B {side} hinge"} <= set(study.runs.pins["jam_left"])
 
 
 def largest(study, run, begin=0.0, end=None):
     """Largest torque of the motor in a run from `begin` to `end`, at the crank [N m]."""
-    return float(abs(study.runs[run]["motor.tau"].sel(time=slice(begin, end))).max()) * study.drive.ratio
+    return (
+        float(abs(study.runs.series[run]["motor.tau"].sel(time=slice(begin, end))).max())
+        * study.setup.drive.ratio
+    )
 
 
 @pytest.mark.second
@@ -1065,13 +1097,13 @@ def test_a_start_under_load_opens_a_given_coupling(tmp_path):
     starts = event_line("start_loaded_left", "start_loaded_right")
     run = "[run]\nturns = 1\nsettle_turns = 1\n"
     study = run_study(config.parse(starts + run + "[coupling]\ntrip_torque = 46\n"), tmp_path)
-    assert study.failure is None
-    opened = {n for n, a in study.answers.items() if a.coupling_trip_time is not None}
-    assert opened == {"start_loaded_right"} and largest(study, "start_up") < 46.0
-    (warning,) = [warning for warning in study.warnings if warning.code == "coupling-opens-in-start"]
+    assert study.findings.failure is None
+    opened = {n for n, a in study.runs.answers.items() if a.coupling_trip_time is not None}
+    assert opened == {"start_loaded_right"} and largest(study.runs, "start_up") < 46.0
+    (warning,) = [warning for warning in study.findings.warnings if warning.code == "coupling-opens-in-start"]
     assert "start with all feed on the right" in warning.text
     study = run_study(config.parse(starts + run + "[coupling]\ntrip_torque = 60\n"), tmp_path / "higher")
-    assert not [warning for warning in study.warnings if warning.code == "coupling-opens-in-start"]
+    assert not [warning for warning in study.findings.warnings if warning.code == "coupling-opens-in-start"]
 
 
 @pytest.mark.slow
@@ -1084,8 +1116,8 @@ def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, mon
     sized = run_study(
         config.parse(empty + "[sizing]\ncandidates = 1\n[run]\nturns = 2\n"), tmp_path / "sized"
     )
-    first = largest(sized, "start_up", end=sized.started.rig.fed_from)
-    fed = largest(sized, "start_up", sized.started.rig.fed_from, sized.steady_begin)
-    assert sized.failure is None and sizing_of(sized).setting.least_in_running < min(first, fed)
+    first = largest(sized.runs, "start_up", end=sized.runs.started.rig.fed_from)
+    fed = largest(sized.runs, "start_up", sized.runs.started.rig.fed_from, sized.runs.steady_begin)
+    assert sized.findings.failure is None and sizing_of(sized).setting.least_in_running < min(first, fed)
     assert fed <= sizing_of(sized).setting.start < first
     assert transient_of_starts(sized).transient == pytest.approx(first)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from records import like
 
 from chainunit.capabilities.static_inertia import CAPABILITY, StaticInertiaAnalysis, StaticInertiaFindings
 from chainunit.machines.api import ChainUnitMachine
@@ -26,7 +27,7 @@ MACHINES = {
 
 def findings_of(machine, feed, speed=SPEED):
     turn = cycle(machine, speed, feed)
-    study = SimpleNamespace(statics=SimpleNamespace(normal=turn))
+    study = like(statics=SimpleNamespace(normal=turn))
     return StaticInertiaAnalysis.find(study, None), turn
 
 
@@ -56,7 +57,7 @@ def test_a_machine_that_turns_slowly_has_the_same_torque(name):
 
 
 def said(findings):
-    study = SimpleNamespace(findings={"static_inertia": findings}, driver_noun="crank")
+    study = like(by_analysis={"static_inertia": findings}, driver_noun="crank")
     blocks = CAPABILITY.answer(study).end
     return [plain_line(block.line) for block in blocks]
 

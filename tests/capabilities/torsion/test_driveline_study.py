@@ -73,12 +73,14 @@ def study_of(text):
 
 def findings(text):
     study = study_of(SYSTEM + ("" if "[driveline]" in text else BARE) + text)
-    return TorsionAnalysis.find(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None))
+    return TorsionAnalysis.find(
+        study, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
+    )
 
 
 def line_of(text):
     study = study_of(SYSTEM + text)
-    return two_masses(study.drive, float(np.mean(study.statics.normal.outputs.J)))
+    return two_masses(study.setup.drive, float(np.mean(study.setup.statics.normal.outputs.J)))
 
 
 def line(damping=0.015, **given):
@@ -523,7 +525,7 @@ def test_lower_gains_are_no_advice_against_a_control_near_the_line():
     """Of the packaged driveline lower gains raise the peaks: the control damps the torsion."""
     study = study_of(parts.example("driveline"))
     shaft_runs.remark(study)
-    (warning,) = (each.text for each in study.warnings if each.code == "control-near-line")
+    (warning,) = (each.text for each in study.findings.warnings if each.code == "control-near-line")
     assert "lower the gains" not in warning and "the control also damps the torsion" in warning
 
 
@@ -549,12 +551,14 @@ damping_ratios = [0.05]
 def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
     study = study_of(SLOW_LINE)
-    found = TorsionAnalysis.find(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None))
-    J = study.statics.normal.outputs.J
+    found = TorsionAnalysis.find(
+        study, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
+    )
+    J = study.setup.statics.normal.outputs.J
     ratio = found.ratio
     low, high = (
         [
-            pick(frozen_frequency(numpy_(), two_masses(study.drive, float(x)), ratio))
+            pick(frozen_frequency(numpy_(), two_masses(study.setup.drive, float(x)), ratio))
             for pick in (np.min, np.max)
         ]
         for x in (np.max(J), np.min(J))
@@ -562,7 +566,7 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     assert found.crossings[2] == pytest.approx((low[0] / 2.0, high[1] / 2.0), rel=1e-6)
     band = found.natural_frequency
     assert high[1] - low[0] > 2.0 * (band.largest - band.least)
-    study.findings["torsion"] = found
+    study.findings.by_analysis["torsion"] = found
     shown = list(torsion_report.blocks(study))
     table = next(each for each in shown if isinstance(each, blocks.Table) and "ranges" in each.title)
     rows = {row.cells[0]: [cell.value for cell in row.cells[1:]] for row in table.rows if row.cells[2]}
@@ -649,10 +653,10 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
     for more in ("", "[torsion]\nspeeds = 2\n"):
         study = study_of(text + more)
         found = TorsionAnalysis.find(
-            study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None)
+            study, Work(Rig(study.setup.config.operation, study.setup.drive, {}), lambda *_: None)
         )
         assert (found is not None) == (made or bool(more))
-        assert [remark.code for remark in study.remarks] == [] if found else ["torsion-left-out"]
+        assert [remark.code for remark in study.findings.remarks] == [] if found else ["torsion-left-out"]
 
 
 @pytest.mark.slow
@@ -661,7 +665,7 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     found = findings(SMALL)
     study = study_of(f"{SYSTEM}{BARE}")
     w = found.rotation.speed
-    drive = study.drive
+    drive = study.setup.drive
     motor = Layout(type(drive.parameters)).from_names(
         {"speed_control.kp": 1e-6, "speed_control.ki": 0.0, "w_start": w}, drive.parameters
     )
@@ -670,7 +674,7 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     drive = dataclasses.replace(drive, parameters=motor, line=Line((part,)))
     files, _ = export_drive(drive, tmp_path)
     load = found.rotation.load
-    signals = {"motor.w_ref": w, "motor.tau_ff": 0.0, "machine.load": study.config.feed.load}
+    signals = {"motor.w_ref": w, "motor.tau_ff": 0.0, "machine.load": study.setup.config.feed.load}
     with CoSimulation(with_files(drive, files), signals | {"motor.tau_ff": load}) as simulation:
         run = simulation.run(2.5, 2.5e-4).sel(time=slice(2.2, None))
     assert float(run["motor.w"].mean()) == pytest.approx(w, rel=0.01)

@@ -70,23 +70,23 @@ def study(tmp_path_factory):
 
 @native
 def test_normal_running_has_no_alarm_and_the_estimates_are_the_loads(study):
-    steady, found = study.steady, study.findings["observer"]
+    steady, found = study.runs.steady, study.findings.by_analysis["observer"]
     for side in ("left", "right"):
         np.testing.assert_allclose(steady[f"observer.{side}.material_mass"], 30.0, atol=0.3)
-    assert np.all(np.abs(study.runs["start_up"]["observer.alarm"].values) < 0.5)
+    assert np.all(np.abs(study.runs.series["start_up"]["observer.alarm"].values) < 0.5)
     assert found.alarm_in_start is None and not found.alarms_in_steady
     assert abs(found.steady.imbalance) < 0.3 and 5.0 < found.steady.threshold < 15.0
-    assert not [remark for remark in study.remarks if "observer" in remark.code]
+    assert not [remark for remark in study.findings.remarks if "observer" in remark.code]
 
 
 @native
 def test_each_device_notices_when_its_variable_says_so(study):
     """Counted by hand from the rows of the runs."""
-    notices = study.findings["observer"].notices
+    notices = study.findings.by_analysis["observer"].notices
     assert list(notices) == ["feed_left", "jam_right", "blocked"]
-    normal = np.max(np.abs(study.steady["machine.rocker.tau"].values))
+    normal = np.max(np.abs(study.runs.steady["machine.rocker.tau"].values))
     for name, of in notices.items():
-        run, begin = study.runs[name], study.event[name]
+        run, begin = study.runs.series[name], study.runs.event_times[name]
         since = run["time"].values - begin
         is_noticed = {
             "torque_limiter": np.abs(run["motor.tau"].values) >= TRIP / 50.0,
@@ -108,7 +108,7 @@ def test_each_device_notices_when_its_variable_says_so(study):
 
 @native
 def test_the_side_is_the_loaded_one(study):
-    found = study.findings["observer"]
+    found = study.findings.by_analysis["observer"]
     assert found.named == {"feed_left": "left", "jam_right": "right", "blocked": ""}
     assert found.loaded == {"feed_left": "left", "jam_right": "right", "blocked": ""}
 
@@ -117,17 +117,23 @@ def test_the_side_is_the_loaded_one(study):
 def test_the_observer_changes_nothing_in_the_runs(study, tmp_path):
     """It only takes signals: without it the same rows come, to the last bit."""
     without = run_study(config.parse(f"{RUN}[[event]]\ntype = 'feed'\nside = 'left'\nturns = 1"), tmp_path)
-    assert "observer" not in without.findings and "observer.alarm" not in without.runs["start_up"]
+    assert (
+        "observer" not in without.findings.by_analysis
+        and "observer.alarm" not in without.runs.series["start_up"]
+    )
     for name in ("start_up", "feed_left"):
         for of in ("machine.tau", "machine.rocker.tau", "motor.w", "motor.armature.i"):
-            assert np.array_equal(without.runs[name][of], study.runs[name][of]), (name, of)
+            assert np.array_equal(without.runs.series[name][of], study.runs.series[name][of]), (name, of)
 
 
 @native
 def test_the_compiled_system_estimates_the_same(study):
     """One ODE of the whole system, with error control, in place of the exchange of values. In co-simulation the
     signals are held over a step: the difference falls with the step."""
-    drive, signals = study.drive, Rig(study.config.operation, study.drive, None).signals(ramp=True)
+    drive, signals = (
+        study.setup.drive,
+        Rig(study.setup.config.operation, study.setup.drive, None).signals(ramp=True),
+    )
     names = ("left.material_mass", "right.processing_force", "imbalance.feed", "rocker.tau")
     full = [f"observer.{name}" for name in names]
     files = {name: study.folder / f"{c.title}.fmu" for name, c in drive.graph.components.items()}
@@ -148,13 +154,13 @@ def test_the_compiled_system_estimates_the_same(study):
 @native
 def test_a_torque_that_no_load_explains_leaves_the_estimates_within_bounds(study):
     """A stop of the rocker, without a coupling: the motor stalls at its current limit."""
-    rig = Rig(replace(study.config, coupling=None).operation, study.drive, None)
+    rig = Rig(replace(study.setup.config, coupling=None).operation, study.setup.drive, None)
     with rig.from_rest() as simulation:
         simulation.run(4.0, rig.step)
         begin = simulation.save()
-        run = follow(rig, simulation, study.config.events["blocked"], begin + 0.5, begin + 3.5).run
+        run = follow(rig, simulation, study.setup.config.events["blocked"], begin + 0.5, begin + 3.5).run
     assert np.max(np.abs(run["motor.armature.i"].values)) > 0.99 * LIMIT
-    p = study.drive.observer.parameters
+    p = study.setup.drive.observer.parameters
     for load, of in (("material_mass", p.feed), ("processing_force", p.force)):
         for side in ("left", "right"):
             deviation = np.abs(run[f"observer.{side}.{load}"].values - of.expected)
@@ -304,8 +310,8 @@ def test_induction_motors(start, tmp_path):
     """By active power and current, on the line and on an inverter."""
     text = f'start = "{start}"\n[observer]\n[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n{EVENTS}'
     study = run_study(config.parse(text.replace("turns = 1", "")), tmp_path)
-    found = study.findings["observer"]
-    assert study.failure is None and not found.alarms_in_steady
+    found = study.findings.by_analysis["observer"]
+    assert study.findings.failure is None and not found.alarms_in_steady
     assert abs(found.steady.imbalance) < 2.0
     assert found.named == {"feed_left": "left", "jam_right": "right", "blocked": ""}
     assert found.notices["feed_left"]["observer"].time < 1.05
@@ -318,7 +324,7 @@ def test_chains_are_warned_of(tmp_path):
     """Bars in the observer, chains as the plant: at 3 rad/s within the limit that was measured."""
     text = f"organ = 'chain'\n[chain]\nrods = 4\nsweep_points = 0\n[observer]\n{RUN}{EVENTS}"
     study = run_study(config.parse(text), tmp_path)
-    (remark,) = (each for each in study.remarks if each.code == "observer-of-two-bars")
+    (remark,) = (each for each in study.findings.remarks if each.code == "observer-of-two-bars")
     assert remark.severity == "note" and 0.5 < remark.quantities["share"][0] < 0.72
-    assert study.findings["observer"].steady.error < 0.2 * 30.0
-    assert study.findings["observer"].named["feed_left"] == "left"
+    assert study.findings.by_analysis["observer"].steady.error < 0.2 * 30.0
+    assert study.findings.by_analysis["observer"].named["feed_left"] == "left"

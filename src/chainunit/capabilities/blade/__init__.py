@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from ...report.capability import Capability, Contents, Supplement
 from ...study.analysis import Analysis
-from ...study.record import StudyRecord
+from ...study.drive import Drive
 
 
 class BladeCapability(Capability):
@@ -27,11 +27,11 @@ class BladeCapability(Capability):
 
         return {"blade": Contents("The blade", page.blocks, (page.PICTURE,))}
 
-    def supplement(self, study: StudyRecord) -> Supplement | None:
+    def supplement(self, drive: Drive) -> Supplement | None:
         """The edge in motion."""
         from .motion import EdgeMotion
 
-        return EdgeMotion(study) if study.drive.machine.model.cuts else None
+        return EdgeMotion(drive) if drive.machine.model.cuts else None
 
 
 CAPABILITY = BladeCapability()

@@ -83,13 +83,13 @@ class BladeFindings(Findings):
         top, table = (float(x) for x in (self.stack.top, self.stack.table))
         low, high = _height(n.blade_bottom), _height(n.blade_top)
         if n.blade_bottom > top:
-            study.say(_NO_CUT, low=low, high=_height(top), blade_bottom=n.blade_bottom)
+            study.findings.say(_NO_CUT, low=low, high=_height(top), blade_bottom=n.blade_bottom)
         elif n.blade_bottom > table:
-            study.say(_TABLE_NOT_REACHED, low=low, high=_height(table), blade_bottom=n.blade_bottom)
+            study.findings.say(_TABLE_NOT_REACHED, low=low, high=_height(table), blade_bottom=n.blade_bottom)
         if n.blade_top < top:
-            study.say(_STACK_NOT_LEFT, high=high, low=_height(top), blade_top=n.blade_top)
+            study.findings.say(_STACK_NOT_LEFT, high=high, low=_height(top), blade_top=n.blade_top)
         if n.cut_path > 0.0:
-            study.say(_WORK_OF_A_CUT, cut_work=n.cut_work, cut_work_by_path=n.cut_work_by_path)
+            study.findings.say(_WORK_OF_A_CUT, cut_work=n.cut_work, cut_work_by_path=n.cut_work_by_path)
 
 
 _BOTTOM = ("m", "millimetres")
@@ -139,7 +139,7 @@ class BladeAnalysis(Analysis):
         InputError
             for a stack whose top is not above the table.
         """
-        config, machine = study.config, study.drive.machine
+        config, machine = study.setup.config, study.setup.drive.machine
         stack = machine.p.stack
         if not stack.top > stack.table:
             raise InputError(

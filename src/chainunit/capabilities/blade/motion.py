@@ -8,7 +8,7 @@ from typing import Any
 from ...core.planar import Link
 from ...mechanism.machine import MachineState
 from ...report.capability import Details, Supplement
-from ...study.record import StudyRecord
+from ...study.drive import Drive
 
 ENDS = ("first end of the edge", "last end of the edge")
 
@@ -23,9 +23,9 @@ def edge(p: Any, links: Mapping[str, Link]) -> dict[str, tuple[Any, Any]]:
 class EdgeMotion(Supplement):
     """Adds the cutting edge to the picture of a knife drive."""
 
-    def __init__(self, study: StudyRecord) -> None:
-        super().__init__(study, links={"edge": ENDS}, names=dict.fromkeys(ENDS, ""))
+    def __init__(self, drive: Drive) -> None:
+        super().__init__(drive, links={"edge": ENDS}, names=dict.fromkeys(ENDS, ""))
 
     def details(self, part: Any, state: MachineState) -> Details:
         """The places of the ends of the edge."""
-        return Details(edge(self.study.drive.machine.p, state.m.links))
+        return Details(edge(self.drive.machine.p, state.m.links))

@@ -17,7 +17,7 @@ from ...report.analyses import angle_axis
 from ...report.cited import cited, quantity_rows
 from ...report.motion import DrawnLink
 from ...study.arrays import stretches
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudySetup
 from .analysis import BladeFindings
 from .motion import ENDS, edge
 
@@ -27,10 +27,10 @@ _EDGE = DrawnLink("edge", ENDS, "heavy")
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the blade."""
-    findings = BladeFindings.of_study(study)
-    rows = quantity_rows(cited(findings, "findings.blade").numbers, study.driver_noun, digits=4)
+    findings = BladeFindings.of_study(study.findings)
+    rows = quantity_rows(cited(findings, "findings.blade").numbers, study.setup.driver_noun, digits=4)
     yield b.Table(rows, title="The blade over a turn at constant speed")
-    yield _figure(study, findings)
+    yield _figure(study.setup, findings)
 
 
 def _polyline(links: tuple[DrawnLink, ...], places: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
@@ -50,7 +50,7 @@ def _spans(findings: BladeFindings) -> list[fig.Shade]:
     return [fig.Shade(float(angle[a]), float(angle[b]), "in the stack") for a, b in stretches(inside)]
 
 
-def _figure(study: StudyRecord, findings: BladeFindings) -> fig.Figure:
+def _figure(setup: StudySetup, findings: BladeFindings) -> fig.Figure:
     angle = findings.turn.angle
     fall = (float(angle[np.argmin(findings.blade.y)]) - findings.top) % (2.0 * math.pi)
     metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))
@@ -61,7 +61,7 @@ def _figure(study: StudyRecord, findings: BladeFindings) -> fig.Figure:
     panels = (
         fig.Panel(
             *metre,
-            tuple(_positions(study.drive.machine, findings, fall)),
+            tuple(_positions(setup.drive.machine, findings, fall)),
             "The linkage in three positions",
             equal=True,
         ),
@@ -71,7 +71,7 @@ def _figure(study: StudyRecord, findings: BladeFindings) -> fig.Figure:
             "Path of the edge's middle; crank angles on its way down",
             equal=True,
         ),
-        fig.Panel(angle_axis(study), fig.Axis("tilt of the blade", "rad"), tilt, "Tilt of the blade"),
+        fig.Panel(angle_axis(setup), fig.Axis("tilt of the blade", "rad"), tilt, "Tilt of the blade"),
     )
     return fig.Figure(
         "blade-path",

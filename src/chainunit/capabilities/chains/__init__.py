@@ -45,7 +45,7 @@ class ChainsCapability(Capability):
         """The speeds to avoid."""
         from .page import speeds_to_avoid
 
-        return AnswerBlocks(warnings=speeds_to_avoid(study))
+        return AnswerBlocks(warnings=speeds_to_avoid(study.findings))
 
 
 CAPABILITY = ChainsCapability()

@@ -88,15 +88,15 @@ class ChainAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> ChainResult | None:
         """The numbers at the speed of the study and over the speeds. None without native code, as an FMU in Python
         would take hours."""
-        if study.fmus["machine"].backend != "native":
-            study.say(_LEFT_OUT)
+        if study.runs.fmus["machine"].backend != "native":
+            study.findings.say(_LEFT_OUT)
             return None
         assert work.rig.files is not None
-        config, file = study.config, work.rig.files["machine"]
+        config, file = study.setup.config, work.rig.files["machine"]
         result, failure = study_chain(
-            study.drive, config.table("chain"), config.feed, config.run.crank_speed, file, work.progress
+            study.setup.drive, config.table("chain"), config.feed, config.run.crank_speed, file, work.progress
         )
-        study.failure = study.failure or failure
+        study.findings.failure = study.findings.failure or failure
         return result
 
 

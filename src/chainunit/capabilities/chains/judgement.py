@@ -80,16 +80,16 @@ _NOT_FELT = warning(
 
 def verdict_on(study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]) -> Verdict:
     """The verdict on the chains of a study; arguments are those of `chains`."""
-    runs: dict[str, Answers | None] = {**study.answers, START: study.start, SETTLING: study.settling}
-    folds = {name: a.fold_largest for name, a in runs.items() if a is not None}
-    slack = {name: a.slack_time for name, a in runs.items() if a is not None}
+    runs = study.runs
+    answers: dict[str, Answers | None] = {**runs.answers, START: runs.start, SETTLING: runs.settling}
+    folds = {name: a.fold_largest for name, a in answers.items() if a is not None}
+    slack = {name: a.slack_time for name, a in answers.items() if a is not None}
     residuals, turns = dict(residuals), math.inf
-    findings = ChainResult.found_in(study)
-    if findings is not None:
+    if (findings := ChainResult.found_in(study.findings)) is not None:
         numbers = findings.own
         folds[CONSTANT], slack[CONSTANT] = numbers.fold_largest, numbers.slack_time
         residuals[CONSTANT], turns = numbers.energy_residual, numbers.independent_turns
-    limit, least_turns = study.config.table("chain").fold_limit, runs_needed(HIGH)
+    limit, least_turns = study.setup.config.table("chain").fold_limit, runs_needed(HIGH)
     return chains(speed, residuals, folds, limit, slack, turns, least_turns, actual=actual)
 
 
@@ -136,24 +136,26 @@ def chains(
 
 def remark_on(study: StudyRecord) -> None:
     """The remarks on chains."""
-    chain: ChainOrgans = study.config.table("chain")
-    result = ChainResult.found_in(study)
-    walls, webs = rods_of(study.drive)
-    study.say(_CHAINS, walls=f"{walls}", webs=f"{webs}", eta=f"{chain.eta:g}", ends=f"{chain.end_damping:g}")
+    chain: ChainOrgans = study.setup.config.table("chain")
+    result = ChainResult.found_in(study.findings)
+    walls, webs = rods_of(study.setup.drive)
+    study.findings.say(
+        _CHAINS, walls=f"{walls}", webs=f"{webs}", eta=f"{chain.eta:g}", ends=f"{chain.end_damping:g}"
+    )
     if walls + webs < 4:
-        study.say(_FEW_RODS, rods=f"{walls + webs}", frequencies=f"{walls + webs - 2}")
+        study.findings.say(_FEW_RODS, rods=f"{walls + webs}", frequencies=f"{walls + webs - 2}")
     _on_folding(study)
     if result is None:
         return
     speed = result.own.speed
     for band in result.avoid:
         if band.low <= speed <= band.high:
-            study.say(_SPEED_TO_AVOID, band=str(band), why=band.why, speed=speed)
+            study.findings.say(_SPEED_TO_AVOID, band=str(band), why=band.why, speed=speed)
     for missing, why in result.failures.items():
-        study.say(_SPEED_MISSING, why=str(why), speed=missing)
+        study.findings.say(_SPEED_MISSING, why=str(why), speed=missing)
     residual = max(n.energy_residual for n in result.speeds)
     if not residual < RESIDUAL:
-        study.say(_ENERGY, residual=residual)
+        study.findings.say(_ENERGY, residual=residual)
 
 
 FELT = 1.1
@@ -162,11 +164,11 @@ FELT = 1.1
 
 def _on_folding(study: StudyRecord) -> None:
     """Warn of lumps on the stroke on which the web folds: the drive feels a lump only on the other stroke."""
-    steady = study.answers.get(STEADY)
-    for run, event in study.config.events.items():
-        answers = study.answers.get(run)
+    steady = study.runs.answers.get(STEADY)
+    for run, event in study.setup.config.events.items():
+        answers = study.runs.answers.get(run)
         if not isinstance(event, Jam) or steady is None or answers is None:
             continue
         if answers.crank_torque_peak < FELT * steady.crank_torque_peak:
             angle = math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi))
-            study.say(_NOT_FELT, run, run=study.title_of(run), angle=f'"{angle:.4g} deg"')
+            study.findings.say(_NOT_FELT, run, run=study.runs.title_of(run), angle=f'"{angle:.4g} deg"')

@@ -17,7 +17,7 @@ from ...report.lines import Aside, Line, Number, filled, join, line
 from ...report.pictures import Pictures
 from ...report.style import WIDE
 from ...study.quantiles import HIGH
-from ...study.record import StudyRecord
+from ...study.record import StudyFindings, StudyRecord
 from .result import ChainResult, CriticalSpeed, SpeedNumbers
 
 PICTURES = Pictures()
@@ -46,7 +46,7 @@ _ORDERS = (
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """Text, tables and figure."""
-    chain = ChainResult.of_study(study)
+    chain = ChainResult.of_study(study.findings)
     x = cited(chain, "findings.chain")
     lead = (
         "The organs are chains of {} rods in the wall and {} in the web. The crank turns at constant speed. {} runs "
@@ -77,9 +77,9 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
     yield from PICTURES.figures(study)
 
 
-def speeds_to_avoid(study: StudyRecord) -> Iterator[b.Judgement]:
+def speeds_to_avoid(findings: StudyFindings) -> Iterator[b.Judgement]:
     """A warning for each range of speeds that the crank should avoid; none without chains."""
-    chain = ChainResult.found_in(study)
+    chain = ChainResult.found_in(findings)
     if chain is None:
         return
     for band, x in zip(chain.avoid, cited(chain, "findings.chain").avoid, strict=True):
@@ -172,10 +172,10 @@ def _critical(chain: ChainResult, x: ChainResult) -> Iterator[b.Block]:
         yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
 
 
-@PICTURES.declare(lambda study: len(ChainResult.of_study(study).speeds) > 1, "chain_sweep.png")
+@PICTURES.declare(lambda study: len(ChainResult.of_study(study.findings).speeds) > 1, "chain_sweep.png")
 def _over_speed(study: StudyRecord) -> fig.Figure:
     """Torques of chains and two bars, and the share of the time with a slack rod, over the crank speed."""
-    result = ChainResult.of_study(study)
+    result = ChainResult.of_study(study.findings)
     x, rows = cited(result, "findings.chain"), result.speeds
     speed = np.array([n.speed for n in rows])
     over = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))

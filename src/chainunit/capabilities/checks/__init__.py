@@ -61,7 +61,7 @@ class CheckCapability(Capability):
         """What was not checked, and why."""
         from .analysis import CheckFindings
 
-        findings = CheckFindings.found_in(study)
+        findings = CheckFindings.found_in(study.findings)
         if findings is None:
             yield "bearings, shaft sections, gear and couplings: the study ended before"
             return

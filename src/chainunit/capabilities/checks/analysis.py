@@ -51,10 +51,10 @@ class CheckFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of each check that does not hold, and where no flexible coupling of a catalogue fits."""
         if self.flexible_coupling is not None:
-            coupling.remark_on_coupling(study, self.flexible_coupling)
+            coupling.remark_on_coupling(study.findings, self.flexible_coupling)
         for row in self.rows:
             if not row.holds:
-                study.say(
+                study.findings.say(
                     _NEEDED if row.at_least else _PERMITTED,
                     of=row.of,
                     title=row.title,
@@ -84,13 +84,13 @@ class CheckAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> CheckFindings:
         """The checks over steady running, and of the largest loads of all runs."""
-        plan: CheckPlan = study.config.plans[CheckAnalysis.name]
+        plan: CheckPlan = study.setup.config.plans[CheckAnalysis.name]
         checks, turns, line = (
-            Checks(tables=study.config.values),
-            has_turn(study.drive, study.steady),
-            study.statics.rigid_line,
+            Checks(tables=study.setup.config.values),
+            has_turn(study.setup.drive, study.runs.steady),
+            study.setup.statics.rigid_line,
         )
-        rolling, plain = bearings.find(study, plan.bearings, checks) if turns else ({}, {})
+        rolling, plain = bearings.find(study.runs, plan.bearings, checks) if turns else ({}, {})
         if line is None:
             why = "the file gives no elastic line; add [driveline]"
             checks.lack("rigid model of the drive", why, "driveline")
@@ -103,12 +103,12 @@ class CheckAnalysis(Analysis):
         if turns:
             parts |= {
                 "gear": gear.find(study, plan, checks),
-                "motor_shaft": gear.motor_shaft(study, plan, checks),
-                "flexible_coupling": coupling.find(study, plan, checks),
-                "section": section.find(study, plan.sections, checks),
+                "motor_shaft": gear.motor_shaft(study.runs, plan, checks),
+                "flexible_coupling": coupling.find(study.runs, plan, checks),
+                "section": section.find(study.runs, plan.sections, checks),
             }
         else:
             what = "bearings, gear, shaft of the motor, coupling, shaft sections"
-            checks.lack(what, less_than_a_turn(study.drive, study.steady))
+            checks.lack(what, less_than_a_turn(study.setup.drive, study.runs.steady))
         rows, not_checked = tuple(checks.rows), tuple(checks.missing)
         return CheckFindings(rolling, plain, rows=rows, not_checked=not_checked, **parts)

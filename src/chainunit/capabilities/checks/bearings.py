@@ -23,7 +23,7 @@ from ...reading.results import part, result
 from ...reading.text import number
 from ...study.bearings import EXPONENT, largest_load, mean_load, pin_force
 from ...study.readings import machine_series, turns_made
-from ...study.record import StudyRecord
+from ...study.record import StudyRuns
 from .plan import BearingPlan, first_word, turning_pins
 from .row import CheckRule, Checks
 from .tables import PLAIN, BearingTable
@@ -203,10 +203,10 @@ def check_plain(checks: Checks, pin: str, bearing: PlainBearing, table: BearingT
 
 
 def find(
-    study: StudyRecord, plans: Mapping[str, BearingPlan], checks: Checks
+    runs: StudyRuns, plans: Mapping[str, BearingPlan], checks: Checks
 ) -> tuple[dict[str, RollingBearing], dict[str, PlainBearing]]:
     """The rolling and the plain bearings of a study by their pin, and their `checks`."""
-    drive, turns = study.drive, study.steady
+    drive, turns = runs.drive, runs.steady
     rolling: dict[str, RollingBearing] = {}
     plain: dict[str, PlainBearing] = {}
     if drive.foreign_machine:
@@ -219,9 +219,9 @@ def find(
         if name is None or name not in angles:
             checks.lack(f"{pin}, bearing", "its angle is not known with organs that are chains")
             continue
-        largest, run = largest_load(study.pins, pin)
+        largest, run = largest_load(runs.pins, pin)
         load = (pin_force(drive, turns, pin), angles[name], largest, run)
-        time, title = turns["time"].values, study.title_of(run)
+        time, title = turns["time"].values, runs.title_of(run)
         if kind == PLAIN:
             plain[pin] = plain_bearing(table, time, *load)
             check_plain(checks, pin, plain[pin], table, title)

@@ -22,7 +22,7 @@ from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.results import OWN, derived, part, result
 from ...reading.text import number
 from ...study.readings import load_inertia, torque_before_gear
-from ...study.record import StudyRecord
+from ...study.record import StudyFindings, StudyRuns
 from ...study.remark import note, warning
 from ...study.torques import gear_torque
 from ...study.window import mean
@@ -261,10 +261,10 @@ def inertias(drive: Drive, turns: xr.Dataset, is_on_crank: bool) -> tuple[float,
     return float(drive.fmu_parameters.rotor.J + before) * ratio**2, float(whole - before) * ratio**2
 
 
-def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> CouplingCheck | None:
+def find(runs: StudyRuns, plan: CheckPlan, checks: Checks) -> CouplingCheck | None:
     """The coupling of a study, and its `checks`. Of those of a catalogue it is the one that the file names, or the
     cheapest that carries the torque."""
-    drive, turns, table, starts = study.drive, study.steady, plan.coupling, plan.starts_per_hour
+    drive, turns, table, starts = runs.drive, runs.steady, plan.coupling, plan.starts_per_hour
     what, key = "flexible coupling", "flexible_coupling"
     if table is None:
         checks.lack(what, f"the file does not have one; add [{key}]", key)
@@ -281,20 +281,20 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> CouplingCheck |
         return gear_torque(drive, run) if is_on_crank else torque_before_gear(drive, run)
 
     before, behind = inertias(drive, turns, is_on_crank)
-    torque, (most, run) = torque_of(turns), largest(study, torque_of)
+    torque, (most, run) = torque_of(turns), largest(runs, torque_of)
     duty = CouplingDuty(
         mean=mean(turns, torque),
         rms=math.sqrt(mean(turns, torque**2)),
         largest=most,
         drive_inertia=before,
         load_inertia=behind,
-        speed=largest(study, lambda run: run[drive.motor_speed].values)[0] / ratio,
+        speed=largest(runs, lambda run: run[drive.motor_speed].values)[0] / ratio,
     )
 
     def check(table: FlexibleCouplingTable, checks: Checks) -> CouplingCheck:
         series = (turns["time"].values, torque)
         coupling = coupling_check(table, duty, *series, factor, plan.coupling_place, run)
-        check_coupling(checks, coupling, table, study.title_of(run))
+        check_coupling(checks, coupling, table, runs.title_of(run))
         return coupling
 
     def rows_of(table: FlexibleCouplingTable) -> Sequence[CheckRow]:
@@ -369,14 +369,14 @@ def _judged(candidate: CouplingCandidate, best: CouplingCandidate, name: str) ->
     return replace(candidate, verdict=verdict, reason=reason)
 
 
-def remark_on_coupling(study: StudyRecord, coupling: CouplingCheck) -> None:
+def remark_on_coupling(findings: StudyFindings, coupling: CouplingCheck) -> None:
     """Warn where no coupling of the catalogues keeps each limit, or the named one does not; note how it was
     checked."""
     if coupling.candidates:
         best = coupling.candidates[0]
         if best.verdict != CHOSEN:
-            study.say(_TOO_WEAK, name=best.designation, reason=best.reason)
-        study.say(_CHECKED)
+            findings.say(_TOO_WEAK, name=best.designation, reason=best.reason)
+        findings.say(_CHECKED)
 
 
 _TOO_WEAK = warning(

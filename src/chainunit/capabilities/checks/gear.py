@@ -22,7 +22,7 @@ from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
 from ...study.readings import crank_angle, gear_loss, gear_speed, shaft_power, torque_before_gear
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudyRuns
 from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_peaks, gear_torque, running_peak
 from ...study.verdict import START
@@ -176,7 +176,8 @@ def check_gear(
 
 def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | None:
     """The gear of a study, and its `checks`; none for a drive without a gear."""
-    drive, tables, table, sold = study.drive, study.config.drive, plan.gear, study.drive.gear_rating
+    runs, drive, tables, table = study.runs, study.setup.drive, study.setup.config.drive, plan.gear
+    sold = drive.gear_rating
     if drive.ratio == 1.0:
         return None
     limit = tables.gear.torque_limit if "gear.torque_limit" in tables.given else 0.0
@@ -187,10 +188,10 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | Non
     if drive.foreign is not None:
         checks.lack("gear", "the motor is an FMU, whose torque is not known")
         return None
-    turns = study.steady
+    turns = runs.steady
     torque = gear_torque(drive, turns)
-    most, run = max((torque, name) for name, torque in gear_peaks(study).items())
-    starts = StartFindings.found_in(study)
+    most, run = max((torque, name) for name, torque in gear_peaks(runs).items())
+    starts = StartFindings.found_in(study.findings)
     if starts is not None and starts.worst.quasi_static > most:
         most, run = starts.worst.quasi_static, START
     bearing = "" if plan.separate_bearing else driver_bearing(drive)
@@ -208,23 +209,23 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | Non
         largest=most,
         power=mean(turns, np.abs(power)),
         radial=peak(pin_force(drive, turns, bearing)) if bearing else None,
-        largest_radial=largest_load(study.pins, bearing)[0] if bearing else None,
-        speed=largest(study, partial(gear_speed, drive))[0],
+        largest_radial=largest_load(runs.pins, bearing)[0] if bearing else None,
+        speed=largest(runs, partial(gear_speed, drive))[0],
     )
     gear = gear_check(load, rating, peak_factor_of(table, sold, tables.gear), run, bearing)
     separate = "the crank has bearings of its own (sizing.separate_bearing)"
     unloaded = separate if plan.separate_bearing else _UNTURNED
-    check_gear(checks, gear, rating, table.peak_overhung_load, study.title_of(run), unloaded)
+    check_gear(checks, gear, rating, table.peak_overhung_load, runs.title_of(run), unloaded)
     return gear
 
 
-def motor_shaft(study: StudyRecord, plan: CheckPlan, checks: Checks) -> ShaftLoad | None:
+def motor_shaft(runs: StudyRuns, plan: CheckPlan, checks: Checks) -> ShaftLoad | None:
     """The radial force on the motor's shaft, and its `checks`."""
     what, table, drive, turns = (
         "overhung load of the motor's shaft",
         plan.motor_shaft,
-        study.drive,
-        study.steady,
+        runs.drive,
+        runs.steady,
     )
     direct = drive.ratio == 1.0
     if not table.overhung_load:

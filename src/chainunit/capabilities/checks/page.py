@@ -22,7 +22,7 @@ PATH = "findings.checks"
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables of the checks: with all that stands behind each, with a line each, and for a sheet with a line each
     and behind them each clause and formula once, by its number in the table."""
-    findings = CheckFindings.of_study(study)
+    findings = CheckFindings.of_study(study.findings)
     rows, coupling = findings.rows, findings.flexible_coupling
     if not rows:
         return
@@ -34,10 +34,10 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
         "of the limit that is used. A check passes at 100 % use at most. docs/checks.md has each formula "
         "with its simplifications and an example."
     )
-    if study.proposal is not None:
+    if study.setup.proposal is not None:
         lead += (
             " These values come from the simulated runs, the shares of limits in the answer from the duty of "
-            f"{study.proposal.name} (worst start, margins). They may differ."
+            f"{study.setup.proposal.name} (worst start, margins). They may differ."
         )
     yield b.Text(lead.format(place="under it"), "lead", "long")
     yield b.Text(lead.format(place="whose number stands behind it"), "lead", "sheet")
@@ -114,7 +114,7 @@ def _tried_couplings(candidates: Sequence[CouplingCandidate], x: Sequence[Coupli
 def missing(study: StudyRecord) -> Iterator[b.Block]:
     """What was not checked, and why."""
     return table(
-        cited(CheckFindings.of_study(study), PATH).not_checked,
+        cited(CheckFindings.of_study(study.findings), PATH).not_checked,
         ("not checked", lambda row: row.what),
         ("why", lambda row: row.why),
         numeric=False,
@@ -124,7 +124,7 @@ def missing(study: StudyRecord) -> Iterator[b.Block]:
 
 def relay(study: StudyRecord) -> Iterator[b.Block]:
     """The classes of the relay, beside the start and the stall of the motor; nothing where no relay is checked."""
-    relay = CheckFindings.of_study(study).relay
+    relay = CheckFindings.of_study(study.findings).relay
     if relay is None:
         return
     never = "trips in running" if relay.before >= TRIPS_AT * relay.setting else "never"

@@ -29,7 +29,6 @@ from ...study.relay import (
     start_seconds,
 )
 from ...study.starts import StartFindings
-from ...study.torques import from_event_on
 from ...study.verdict import STEADY
 from .plan import CheckPlan
 from .row import CheckRule, Checks
@@ -188,7 +187,7 @@ def check_relay(checks: Checks, relay: RelayFindings, titles: Mapping[str, str])
 
 def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings | None:
     """The relay of a study, and its `checks`."""
-    drive, table = study.drive, plan.relay
+    drive, table = study.setup.drive, plan.relay
     if drive.foreign is not None:
         checks.lack(_WHAT, "the motor is an FMU, whose current is not known")
         return None
@@ -196,10 +195,10 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings |
         why = "the motor is controlled; its converter limits and protects it"
         checks.lack(f"{_WHAT}, starts per hour", why)
         return None
-    if study.start is None or study.start.start_time is None:
+    if study.runs.start is None or study.runs.start.start_time is None:
         checks.lack(_WHAT, "the motor does not come to its speed")
         return None
-    plate = None if study.plate is None else study.plate.nameplate
+    plate = None if study.setup.plate is None else study.setup.plate.nameplate
     # a relay in the phases of a delta carries the current of a winding
     in_phases = drive.star_delta is not None and plan.relay_in_phases
     share = 1.0 / math.sqrt(3.0) if in_phases else 1.0
@@ -212,30 +211,30 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings |
     if missing := [name for name, value in settings.items() if not value]:
         checks.lack(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")
         return None
-    before = share * study.answers[STEADY].current_rms
+    before = share * study.runs.answers[STEADY].current_rms
 
     def current_of(run: xr.Dataset) -> Any:
         current = np.abs(run[f"motor.{drive.motor.current}"].values)
         return share * (drive.relay_current(run["time"].values, current) if in_phases else current)
 
-    rise = study.runs["start_up"].sel(time=slice(None, study.start_end))
+    rise = study.runs.series["start_up"].sel(time=slice(None, study.runs.start_end))
     seconds = start_seconds(rise["time"].values, current_of(rise), settings["setting"])
-    starts = StartFindings.found_in(study)
+    starts = StartFindings.found_in(study.findings)
     is_usual = in_phases == (drive.star_delta is not None)
     if starts is not None and drive.rated_current and not starts.stuck and is_usual:
         # the hardest of the starts from all crank angles, which are for a relay at the rated current
         times = share * drive.rated_current / settings["setting"]
         seconds = max(seconds, starts.relay_seconds * times**2)
     runs: dict[str, tuple[Any, Any, float, float | None]] = {}
-    for name in study.overloads:
-        event, answer = study.config.events[name], study.answers[name]
+    for name in study.runs.overloads:
+        event, answer = study.setup.config.events[name], study.runs.answers[name]
         # behind a coupling that opens no load is left that could trip the relay
         if answer.coupling_trip_time is None:
-            run = from_event_on(study, name)
+            run = study.runs.event_parts[name]
             after = before if event.passes and answer.stall_time is None else None
-            time = run["time"].values - study.event[name]
+            time = run["time"].values - study.runs.event_times[name]
             runs[name] = time, current_of(run), 0.0 if event.from_rest else before, after
     numbers = RelaySetting(before=before, start_seconds=seconds, **settings)
-    relay = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
-    check_relay(checks, relay, study.titles)
+    relay = relay_findings(plan.trip_class, numbers, runs, study.runs.relay_class)
+    check_relay(checks, relay, study.runs.titles)
     return relay

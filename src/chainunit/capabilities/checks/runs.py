@@ -6,15 +6,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ...study.arrays import peak
-from ...study.record import StudyRecord
-from ...study.torques import from_event_on
+from ...study.record import StudyRuns
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def largest(study: StudyRecord, quantity: Callable[[xr.Dataset], Any]) -> tuple[float, str]:
+def largest(runs: StudyRuns, quantity: Callable[[xr.Dataset], Any]) -> tuple[float, str]:
     """The largest size of a `quantity` in the start-up and in each other run from its event on, and that run."""
-    runs = {"start_up": study.runs["start_up"]}
-    runs |= {name: from_event_on(study, name) for name in study.event if name in study.runs}
-    return max((peak(quantity(run)), name) for name, run in runs.items())
+    series = {"start_up": runs.series["start_up"], **runs.event_parts}
+    return max((peak(quantity(run)), name) for name, run in series.items())

@@ -19,7 +19,7 @@ from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, pin_force
 from ...study.readings import crank_torque, machine_series
-from ...study.record import StudyRecord
+from ...study.record import StudyRuns
 from .plan import SectionPlan
 from .row import CheckRule, Checks
 from .runs import largest
@@ -346,17 +346,17 @@ def check_section(checks: Checks, name: str, section: ShaftSection, least: float
         checks.check(rule, f"section {name}", f"checks.section.{name}", section, least, run=run)
 
 
-def find(study: StudyRecord, plans: Mapping[str, SectionPlan], checks: Checks) -> dict[str, ShaftSection]:
+def find(runs: StudyRuns, plans: Mapping[str, SectionPlan], checks: Checks) -> dict[str, ShaftSection]:
     """The sections of a study by name, and their `checks`."""
     sections: dict[str, ShaftSection] = {}
     if not plans:
         checks.lack("shaft sections", "the file has none; add [section.NAME]", "section.NAME")
         return sections
-    drive, turns = study.drive, study.steady
+    drive, turns = runs.drive, runs.steady
     machine, bearing = drive.simulated_machine, driver_bearing(drive)
     turned = machine.pin_turns(machine_series(turns))
     torque = crank_torque(drive, turns)
-    largest_torque, _ = largest(study, lambda run: crank_torque(drive, run))
+    largest_torque, _ = largest(runs, lambda run: crank_torque(drive, run))
     for name, plan in plans.items():
         pin = plan.pin or bearing
         output = machine.model.pins.get(pin)
@@ -371,8 +371,8 @@ def find(study: StudyRecord, plans: Mapping[str, SectionPlan], checks: Checks) -
             angle = turned[machine.model.pins[bearing]] if plan.on == "crank" else 0.0
             fx, fy = (turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy"))
             amplitude, mean = fibres(fx, fy, angle)
-        most, run = largest_load(study.pins, pin)
+        most, run = largest_load(runs.pins, pin)
         args = (amplitude, mean, force, most, torque, largest_torque, pin, run)
         sections[name] = shaft_section(plan, *args)
-        check_section(checks, name, sections[name], plan.table.safety, study.title_of(run))
+        check_section(checks, name, sections[name], plan.table.safety, runs.title_of(run))
     return sections

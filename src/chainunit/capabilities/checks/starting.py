@@ -22,21 +22,22 @@ _STARTS = CheckRule(
 
 def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> PermittedStarts | None:
     """The starts of a study, and their `checks`."""
-    if study.drive.follows and study.drive.foreign is None:
+    setup, runs = study.setup, study.runs
+    if setup.drive.follows and setup.drive.foreign is None:
         # the line on the relay names the starts, too
         return None
     if why := _why_none(study, plan):
         checks.lack("starts per hour by the rule of makers of motors", why)
         return None
-    assert study.plate is not None
-    assert study.start is not None
-    plate = study.plate.nameplate
-    rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
-    current, bare = study.answers[STEADY].current_rms, plan.starting.permitted or plate.starts
+    assert setup.plate is not None
+    assert runs.start is not None
+    plate = setup.plate.nameplate
+    rise = runs.series["start_up"].sel(time=slice(None, runs.start.start_time))
+    current, bare = runs.answers[STEADY].current_rms, plan.starting.permitted or plate.starts
     asked = plan.starts_per_hour
-    data = starting_data(study.drive, plate, rise, study.steady, per_hour=asked, bare=bare, current=current)
-    starts = permitted_starts(data, study.proposal.permitted_starts if study.proposal else math.inf)
-    check_starts(checks, starts, is_chosen=study.proposal is not None)
+    data = starting_data(setup.drive, plate, rise, runs.steady, per_hour=asked, bare=bare, current=current)
+    starts = permitted_starts(data, setup.proposal.permitted_starts if setup.proposal else math.inf)
+    check_starts(checks, starts, is_chosen=setup.proposal is not None)
     return starts
 
 
@@ -50,16 +51,16 @@ def check_starts(checks: Checks, starts: PermittedStarts, is_chosen: bool = Fals
 
 def _why_none(study: StudyRecord, plan: CheckPlan) -> str:
     """The reason why the starts are not checked; empty where they are."""
-    if study.drive.foreign is not None:
+    if study.setup.drive.foreign is not None:
         return "the motor is an FMU, whose starts are not known"
-    if study.plate is None:
+    if study.setup.plate is None:
         return "the motor has no nameplate; take one of a catalogue (system.motor)"
     if not plan.starts_per_hour:
         return "the file does not say how many; add [starting] with per_hour"
-    if not plan.starting.permitted and not study.plate.nameplate.starts:
+    if not plan.starting.permitted and not study.setup.plate.nameplate.starts:
         why = "the catalogue gives no permitted starts of the bare rotor; add [starting] with permitted"
-        return why + _by_standard(study, study.plate.nameplate)
-    if study.start is None or study.start.start_time is None:
+        return why + _by_standard(study, study.setup.plate.nameplate)
+    if study.runs.start is None or study.runs.start.start_time is None:
         return "the motor does not come to its speed"
     return ""
 
@@ -67,7 +68,7 @@ def _why_none(study: StudyRecord, plan: CheckPlan) -> str:
 def _by_standard(study: StudyRecord, plate: Nameplate) -> str:
     """The inertia at the motor's shaft beside the one of the standard, in words, see `standard_inertia`; empty for
     another start or frequency."""
-    limit = standard_inertia(study.drive, plate, study.steady, study.config.drive.start)
+    limit = standard_inertia(study.setup.drive, plate, study.runs.steady, study.setup.config.drive.start)
     if limit is None:
         return ""
     inertia, most = limit

@@ -84,7 +84,7 @@ class EnergyCapability(Capability):
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The energy of a study without the table."""
-        if study.config.plans[self.name] is None:
+        if study.setup.config.plans[self.name] is None:
             yield "energy of a year: the study file has no table [usage]"
 
 

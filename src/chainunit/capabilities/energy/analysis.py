@@ -105,18 +105,18 @@ class EnergyFindings(Findings):
         mean = self.own.mean
         for motor in filter(None, (self.own, self.other)):
             if motor.too_hot:
-                study.say(_TOO_HOT, motor=motor.motor, limit=motor.temperature)
+                study.findings.say(_TOO_HOT, motor=motor.motor, limit=motor.temperature)
         if abs(mean.missing) > LARGEST_GAP * abs(mean.electric):
-            study.say(_BALANCE, STEADY, missing=mean.missing, electric=mean.electric)
-        study.say(_IRON)
+            study.findings.say(_BALANCE, STEADY, missing=mean.missing, electric=mean.electric)
+        study.findings.say(_IRON)
         if mean.gear and any(load.factor != 1.0 for load in self.loads.values()):
-            study.say(_GEAR, gear=study.drive.transmission)
+            study.findings.say(_GEAR, gear=study.setup.drive.transmission)
         if self.inverter:
-            study.say(_INVERTER, losses=self.inverter)
-        elif study.drive.follows:
-            study.say(_CONVERTER)
-        if study.drive.follows and self.given_back > _GIVEN_BACK * mean.electric:
-            study.say(_COMES_BACK, back=self.given_back)
+            study.findings.say(_INVERTER, losses=self.inverter)
+        elif study.setup.drive.follows:
+            study.findings.say(_CONVERTER)
+        if study.setup.drive.follows and self.given_back > _GIVEN_BACK * mean.electric:
+            study.findings.say(_COMES_BACK, back=self.given_back)
 
 
 _TOO_HOT = warning(
@@ -181,7 +181,7 @@ class EnergyAnalysis(Analysis):
         RunError
             where a run fails.
         """
-        return _Task(study, work, study.config.plans["energy"]).find()
+        return _Task(study, work, study.setup.config.plans["energy"]).find()
 
 
 @dataclass(frozen=True)
@@ -191,11 +191,11 @@ class _Task:
     plan: UsagePlan
 
     def find(self) -> EnergyFindings | None:
-        drive, motor = self.study.drive, self.study.plate
+        drive, motor = self.study.setup.drive, self.study.setup.plate
         inverter = self._inverter(drive, motor)
         duty = self._duty(drive, inverter, "")
         if duty.unsteady:
-            self.study.say(_NOT_KNOWN, loads=", ".join(duty.unsteady))
+            self.study.findings.say(_NOT_KNOWN, loads=", ".join(duty.unsteady))
             return None
         price = _price(self.plan.table.motor_price, motor)
         energy = self._energy(duty, motor.designation if motor else "the motor of the study", price)
@@ -215,16 +215,16 @@ class _Task:
         )
 
     def _duty(self, drive: Drive, inverter: InverterRating | None, suffix: str) -> LoadDuty:
-        steady = self.study.answers[STEADY].winding_temperature
+        steady = self.study.runs.answers[STEADY].winding_temperature
         usual = drive.parameters.ambient.T if steady is None else steady
         # a duty with the feed of the study is its steady running
         full = all(load.factor == 1.0 for load in self.plan.loads.values())
-        is_steady = full and steady is not None and drive is self.study.drive
+        is_steady = full and steady is not None and drive is self.study.setup.drive
 
         def progress(name: str) -> None:
             self.work.progress(f"energy: {name}{suffix}", 0.0, 1.0)
 
-        hottest = self.study.config.permitted_temperature[1]
+        hottest = self.study.setup.config.permitted_temperature[1]
         return duty_of(self.work.rig, drive, self.plan.loads, inverter, usual, hottest, progress, is_steady)
 
     def _inverter(self, drive: Drive, motor: CatalogueMotor | None) -> InverterRating | None:
@@ -251,13 +251,13 @@ class _Task:
         if motor is None:
             return None, "the motor has no nameplate"
         try:
-            other = other_motor(motor, self.plan.other, self.study.config.file.catalogues)
+            other = other_motor(motor, self.plan.other, self.study.setup.config.file.catalogues)
             if other is None:
                 return (
                     None,
                     "the motor has no efficiency class, or the highest one; usage.other names another motor",
                 )
-            with_it = with_motor(drive, self.study.config.drive, other)
+            with_it = with_motor(drive, self.study.setup.config.drive, other)
             duty = self._duty(with_it, self._inverter(with_it, other), f", {other.designation}")
         except (InputError, RunError) as error:
             return None, f"the other motor could not be run: {error}"
@@ -274,7 +274,7 @@ class _Task:
     def _energy(self, duty: LoadDuty, name: str, price: float | None) -> MotorEnergy:
         losses = duty.losses
         year = year_of(self.plan, float(losses.electric), price)
-        speed = duty.mean(self.study.drive.motor_speed)
+        speed = duty.mean(self.study.setup.drive.motor_speed)
         return MotorEnergy(name, year, losses, duty.temperature, duty.is_too_hot, speed, price)
 
 

@@ -26,9 +26,9 @@ class MotorClass(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of a motor that may not be sold any more, and tell where that is not known."""
         if self.no_class and self.required:
-            study.say(_NOT_CHECKED, why=self.no_class, asked=self.required)
+            study.findings.say(_NOT_CHECKED, why=self.no_class, asked=self.required)
         if self.falls_short:
-            study.say(
+            study.findings.say(
                 _TOO_LOW,
                 motor=self.designation,
                 own=self.efficiency_class,
@@ -61,8 +61,8 @@ class MotorClassAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> MotorClass | None:
         """The class of the motor that the file names, or that was chosen."""
-        motor = study.plate
-        if motor is None or study.drive.foreign is not None:
+        motor = study.setup.plate
+        if motor is None or study.setup.drive.foreign is not None:
             return None
         plate = motor.nameplate
         motor_class = MotorClass(
@@ -74,7 +74,7 @@ class MotorClassAnalysis(Analysis):
             no_class(plate),
         )
         is_asked = motor_class.falls_short or (motor_class.no_class and motor_class.required)
-        return motor_class if is_asked or study.config.plans["energy"] is not None else None
+        return motor_class if is_asked or study.setup.config.plans["energy"] is not None else None
 
 
 def words_of(motor_class: MotorClass) -> str:

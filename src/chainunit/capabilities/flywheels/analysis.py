@@ -21,7 +21,7 @@ from ...study.drive import Drive
 from ...study.limits import given_motor
 from ...study.line.shaft import driveline_of, remedies
 from ...study.measures import Answers, read_answers
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudySetup
 from ...study.remark import RemarkCode, fault, note, warning
 from ...study.rig import Rig, worst_residual
 from ...study.start_up import start_up
@@ -108,8 +108,8 @@ class FlywheelFindings(Findings):
         """Add the troubles with their remedies, and a note on the least flywheel."""
         _on_wheels(self, study)
         _on_fluctuation(self, study)
-        if not study.drive.follows:
-            study.say(_COLD)
+        if not study.setup.drive.follows:
+            study.findings.say(_COLD)
 
 
 class FlywheelAnalysis(Analysis):
@@ -132,9 +132,9 @@ class FlywheelAnalysis(Analysis):
         RunError
             where a run fails; the earlier results are in the study.
         """
-        config, drive, table = study.config, study.drive, study.config.drive.flywheel
+        config, drive, table = study.setup.config, study.setup.drive, study.setup.config.drive.flywheel
         assert table is not None
-        turn = TurnFindings.of_study(study).numbers
+        turn = TurnFindings.of_study(study.findings).numbers
         findings = FlywheelFindings(
             own=table.J,
             permitted_fluctuation=table.fluctuation,
@@ -146,13 +146,13 @@ class FlywheelAnalysis(Analysis):
             mean_torque=turn.torque_mean / drive.ratio,
             ratio=drive.flywheel_ratio,
         )
-        study.findings[FlywheelAnalysis.name] = findings
+        study.findings.by_analysis[FlywheelAnalysis.name] = findings
         sizes = sorted({table.J, *config.plans["flywheels"]})
 
         def run(flywheel: float) -> Wheel:
             finished = float(len(findings.wheels))
             work.progress(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
-            return _run(study, work.rig, findings, flywheel)
+            return _run(study.setup, work.rig, findings, flywheel)
 
         for size in sizes:
             findings.wheels.append(_own(study, findings) if size == table.J else run(size))
@@ -169,28 +169,29 @@ class FlywheelAnalysis(Analysis):
 
 def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
     """The flywheel of the study, from the run that the study has."""
-    assert study.start is not None
-    residual = worst_residual(study.certificate["start_up"])
-    return _wheel(study, findings, findings.own, study.answers[STEADY], study.start, study.steady, residual)
+    setup, runs = study.setup, study.runs
+    assert runs.start is not None
+    residual = worst_residual(runs.certificate["start_up"])
+    return _wheel(setup, findings, findings.own, runs.answers[STEADY], runs.start, runs.steady, residual)
 
 
-def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
+def _run(setup: StudySetup, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its torque limiter."""
-    tables = study.config.drive
-    turned = with_inertia(tables, replace(study.drive, observer=None), flywheel)
-    assert study.config.motor is not None
-    drive, _ = study.config.motor.completed(turned, tables, study.statics.normal)
+    tables = setup.config.drive
+    turned = with_inertia(tables, replace(setup.drive, observer=None), flywheel)
+    assert setup.config.motor is not None
+    drive, _ = setup.config.motor.completed(turned, tables, setup.statics.normal)
     findings.is_retuned = findings.is_retuned or drive.parameters != turned.parameters
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:
         started = start_up(rig, simulation, lambda time: None, {})
     residual = worst_residual(rig.residuals(started.run))
     steady, start = started.windows
-    return _wheel(study, findings, flywheel, read_answers(steady), read_answers(start), steady.run, residual)
+    return _wheel(setup, findings, flywheel, read_answers(steady), read_answers(start), steady.run, residual)
 
 
 def _wheel(
-    study: StudyRecord,
+    setup: StudySetup,
     findings: FlywheelFindings,
     flywheel: float,
     steady: Answers,
@@ -199,8 +200,8 @@ def _wheel(
     residual: float,
 ) -> Wheel:
     """A flywheel with its answers; a machine that stands or creeps has no answers of steady running."""
-    turning = steady.speed_mean > CREEPS * study.config.run.crank_speed
-    drive, motor_ripple = study.drive, None
+    turning = steady.speed_mean > CREEPS * setup.config.run.crank_speed
+    drive, motor_ripple = setup.drive, None
     if drive.line and turning:
         motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
     numbers = {
@@ -217,8 +218,8 @@ def _wheel(
     answers = FlywheelAnswers(**values)
     checks = given_motor(
         drive,
-        study.config.plate,
-        study.config.permitted_temperature[1],
+        setup.config.plate,
+        setup.config.permitted_temperature[1],
         answers.winding_temperature,
         answers.current_rms,
         answers.start_time,
@@ -404,11 +405,11 @@ _LEAST = note(
 def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study itself warns for its own
     flywheel."""
-    plate = study.config.plate
+    plate = study.setup.config.plate
     too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
     if plate is not None and too_small:
-        study.say(_TOO_SMALL, mean=findings.mean_torque, rated=plate.nameplate.torque)
+        study.findings.say(_TOO_SMALL, mean=findings.mean_torque, rated=plate.nameplate.torque)
     for trouble in _TROUBLES:
         wheels = [wheel for wheel in findings.wheels if trouble.has(wheel)]
         if trouble.limit and all(wheel.flywheel == findings.own for wheel in wheels):
@@ -420,14 +421,14 @@ def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
                 if trouble.number
             }
             where = ", ".join(map(trouble.words, wheels))
-            limit = _limit(wheels[0], trouble.limit, study)
-            study.say(trouble.code, where=where, motor=remedy, limit=limit, **amounts)
+            limit = _limit(wheels[0], trouble.limit, study.setup)
+            study.findings.say(trouble.code, where=where, motor=remedy, limit=limit, **amounts)
 
 
-def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
+def _limit(wheel: Wheel, name: str, setup: StudySetup) -> str:
     """A limit of the motor, in words; the limit of the winding is a temperature, not a rise."""
     if name == "temperature":
-        return number(study.config.permitted_temperature[1], "K", full=False)
+        return number(setup.config.permitted_temperature[1], "K", full=False)
     check = wheel.checks.get(name)
     return "" if check is None else number(check.limit, check.unit, check.kind, full=False)
 
@@ -441,7 +442,7 @@ def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
         and study_wheel.answers.speed_ripple is not None
         and study_wheel.answers.speed_ripple > findings.permitted_fluctuation
     ):
-        study.say(
+        study.findings.say(
             _FLUCTUATION,
             STEADY,
             speed_ripple=study_wheel.answers.speed_ripple,
@@ -452,7 +453,7 @@ def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
     if findings.is_searched and not any(
         wheel.keeps(findings.permitted_fluctuation) for wheel in findings.wheels
     ):
-        study.say(_NONE_KEEPS, limit=limit, larger="" if findings.least is None else None)
+        study.findings.say(_NONE_KEEPS, limit=limit, larger="" if findings.least is None else None)
         _on_line(findings, study)
     _on_heavier(findings, study)
     if findings.least is not None:
@@ -466,12 +467,12 @@ def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
     even = [
         wheel for wheel, ripple in ripples if ripple is not None and ripple <= findings.permitted_fluctuation
     ]
-    if not even or not study.drive.line.is_elastic:
+    if not even or not study.setup.drive.line.is_elastic:
         return
     best = min(even, key=lambda wheel: float(wheel.answers.speed_ripple))
-    causes = remedies(driveline_of(study.drive))
+    causes = remedies(driveline_of(study.setup.drive))
     way = ", and ".join([*causes, "stiffen the shafts"] if causes else ["take stiffer shafts"])
-    study.say(
+    study.findings.say(
         _BEHIND,
         flywheel=best.flywheel,
         motor_ripple=best.answers.motor_ripple,
@@ -490,10 +491,9 @@ def _on_heavier(findings: FlywheelFindings, study: StudyRecord) -> None:
         > max(findings.permitted_fluctuation, _WORSE * lighter.answers.speed_ripple)
     ]
     if worse:
-        where = ", ".join(
-            f"{number(size, 'kg.m2')} ({number(ripple, '1', 'percent')})" for size, ripple in worse
-        )
-        study.say(_HEAVIER_WORSE, where=where, **{f"{size:g}.speed_ripple": ripple for size, ripple in worse})
+        sizes = (f"{number(size, 'kg.m2')} ({number(ripple, '1', 'percent')})" for size, ripple in worse)
+        ripples = {f"{size:g}.speed_ripple": ripple for size, ripple in worse}
+        study.findings.say(_HEAVIER_WORSE, where=", ".join(sizes), **ripples)
 
 
 def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
@@ -505,11 +505,11 @@ def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> N
         left_out = ", as it leaves out that the motor's torque rises where the speed falls"
     elif a.motor_ripple is not None and by_hand < least.flywheel:
         left_out = ", as it leaves out the shaft line"
-    plate = study.config.plate
+    plate = study.setup.config.plate
     too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
     excesses = [*least.excesses, *(["mean torque"] if too_small else [])]
     fit = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)
-    study.say(
+    study.findings.say(
         _LEAST,
         permitted=findings.permitted_fluctuation,
         flywheel=least.flywheel,

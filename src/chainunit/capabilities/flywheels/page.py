@@ -16,7 +16,7 @@ from ...report.given_numbers import motor_title, rating, ratio
 from ...report.lines import capital, filled, join, line
 from ...report.style import LINES
 from ...study.readings import crank_motion
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudySetup
 from .analysis import FlywheelFindings
 from .wheel import FlywheelAnswers, Wheel
 
@@ -38,14 +38,14 @@ _HEADS = {
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the flywheels."""
-    findings = FlywheelFindings.of_study(study)
-    if study.config.plate is not None:
-        x = rating(study.config.plate)
+    findings = FlywheelFindings.of_study(study.findings)
+    if study.setup.config.plate is not None:
+        x = rating(study.setup.config.plate)
         sizes = map(number, (x.rated_power, x.rated_speed, x.rated_torque, x.rated_current))
-        motor = motor_title(study), join(sizes), number(ratio(study), 4)
+        motor = motor_title(study.setup), join(sizes), number(ratio(study.setup), 4)
         yield b.Text(filled("Motor: {}, rated {}; ratio {}.", *motor))
     if findings.wheels:
-        yield _table(study, findings)
+        yield _table(study.setup, findings)
         if findings.is_retuned:
             yield b.Text(
                 "The gains of the speed control are tuned to the inertia with each flywheel, except gains that the "
@@ -54,10 +54,10 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
             )
     running = [wheel for _, wheel, _ in findings.rows if wheel.answers.speed_ripple is not None]
     if running:
-        yield _figure(study, findings, running)
+        yield _figure(study.setup, findings, running)
 
 
-def _table(study: StudyRecord, findings: FlywheelFindings) -> b.Table:
+def _table(setup: StudySetup, findings: FlywheelFindings) -> b.Table:
     x = cited(findings, PATH)
     rows = [(remark, cited(wheel.answers, path)) for remark, wheel, path in findings.rows]
     columns = [
@@ -66,7 +66,7 @@ def _table(study: StudyRecord, findings: FlywheelFindings) -> b.Table:
         if v.name in _HEADS
         and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in findings.rows)
     ]
-    heads = (b.Column(v.described(study.driver_noun), _HEADS[v.name]) for v in columns)
+    heads = (b.Column(v.described(setup.driver_noun), _HEADS[v.name]) for v in columns)
     return b.Table(
         tuple(
             b.TableRow(
@@ -79,18 +79,18 @@ def _table(study: StudyRecord, findings: FlywheelFindings) -> b.Table:
         ),
         (b.Column("flywheel"), *heads),
         title=line(
-            f"Flywheels on the {study.drive.flywheel_shaft.words(study.driver_noun)}; permitted ripple of the speed ",
+            f"Flywheels on the {setup.drive.flywheel_shaft.words(setup.driver_noun)}; permitted ripple of the speed ",
             exact(x.permitted_fluctuation),
         ),
     )
 
 
-def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
-    drive, plate = study.drive, study.config.plate
+def _figure(setup: StudySetup, findings: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
+    drive, plate = setup.drive, setup.config.plate
     # at most as many flywheels as there are distinct looks of a line, from the least to the largest
     some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]
     speed, torque, current = (
-        fig.Axis(f"{study.driver_noun} speed", "rad/s", "speed"),
+        fig.Axis(f"{setup.driver_noun} speed", "rad/s", "speed"),
         fig.Axis("motor torque, air gap", "N.m"),
         fig.Axis("motor current", "A"),
     )
@@ -108,11 +108,11 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
         }
         for axis, y in series.items():
             items[axis].append(fig.Curve(number_words(wheel.flywheel, "kg.m2"), *last_turn(angle, y), look))
-    panels = [fig.Panel(angle_axis(study), axis, tuple(curves)) for axis, curves in items.items()]
+    panels = [fig.Panel(angle_axis(setup), axis, tuple(curves)) for axis, curves in items.items()]
     return fig.Figure(
         "flywheel",
         "A turn with each flywheel, and the ripple of the speed over the inertia",
-        f"{capital(study.driver_noun)} speed, motor torque and current over a turn with each flywheel; ripple of the "
+        f"{capital(setup.driver_noun)} speed, motor torque and current over a turn with each flywheel; ripple of the "
         "speed over inertia.",
         ((panels[0], panels[1]), (panels[2], _ripple(findings, running))),
         file=PICTURE,

@@ -40,7 +40,7 @@ class RandomOverloads(Capability):
                 )
             },
             title="Overloads at random",
-            is_used=lambda study: study.config.plans["random_overloads"].runs > 0,
+            is_used=lambda study: study.setup.config.plans["random_overloads"].runs > 0,
             apart=True,
             random_events=("event",),
         )
@@ -83,7 +83,7 @@ class RandomOverloads(Capability):
 
     def answer(self, study: StudyRecord) -> AnswerBlocks:
         """The largest quantile of the crank torque, and how often a run ends badly."""
-        if "monte_carlo" not in study.findings:
+        if "monte_carlo" not in study.findings.by_analysis:
             return AnswerBlocks()
         from . import page
 

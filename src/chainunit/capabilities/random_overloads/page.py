@@ -20,17 +20,17 @@ _LARGEST = "crank_torque_peak"
 
 def summary(study: StudyRecord) -> Line:
     """The sentence on random overloads: the largest quantile of the crank torque, and how often a run ends badly."""
-    x = cited(MonteCarloResult.of_study(study), PATH)
+    x = cited(MonteCarloResult.of_study(study.findings), PATH)
     quantiles = x.quantiles
-    ends = OUTCOMES if study.config.coupling else {"stalls": OUTCOMES["stalls"]}
+    ends = OUTCOMES if study.setup.config.coupling else {"stalls": OUTCOMES["stalls"]}
     parts = [
-        filled("{} in {}", of_driver(outcome, study.driver_noun), estimate(quantiles[name]["share"]))
+        filled("{} in {}", of_driver(outcome, study.setup.driver_noun), estimate(quantiles[name]["share"]))
         for name, outcome in ends.items()
         if name in quantiles
     ]
     if sizes := list(quantiles.get(_LARGEST, {}).items()):
         name, largest = sizes[-1]
-        stay = f"{name[1:]} % stay below a {study.driver_noun} torque of {{}}"
+        stay = f"{name[1:]} % stay below a {study.setup.driver_noun} torque of {{}}"
         parts.insert(0, filled(stay, estimate(largest)))
     return filled("Of {} overloads at random: {}.", exact(x.runs), join(parts, "; "))
 
@@ -45,7 +45,7 @@ _METHODS: dict[str, str] = {
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table of the quantiles of random overloads, and how they were run."""
-    findings = MonteCarloResult.of_study(study)
+    findings = MonteCarloResult.of_study(study.findings)
     x = cited(findings, PATH)
     quantiles = {name: sizes for name, sizes in x.quantiles.items() if sizes}
     descriptions = {v.name: v.template for v in Layout(Sample).variables} | ENDS
@@ -53,7 +53,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
     rows = tuple(
         b.TableRow(
             (
-                of_driver(descriptions[name], study.driver_noun),
+                of_driver(descriptions[name], study.setup.driver_noun),
                 *(estimate(sizes[column]) if column in sizes else "" for column in columns),
             )
         )

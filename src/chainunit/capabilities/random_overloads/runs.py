@@ -346,14 +346,14 @@ class MonteCarloResult(Findings):
         shares = self.quantiles
         for name, code in _OUTCOMES.items():
             if name in shares and shares[name]["share"].value > 0.0:
-                study.say(code, share=shares[name]["share"].value)
+                study.findings.say(code, share=shares[name]["share"].value)
         if self.shortage:
-            study.say(_TOO_FEW, text=self.shortage)
+            study.findings.say(_TOO_FEW, text=self.shortage)
         currents = (estimate.value for estimate in shares.get("current_peak", {}).values())
-        if (limit := limit_reached(study.drive, currents)) is not None:
-            study.say(_AT_LIMIT, limit=limit)
+        if (limit := limit_reached(study.setup.drive, currents)) is not None:
+            study.findings.say(_AT_LIMIT, limit=limit)
         if self.damaged_batches:
-            study.say(_MADE_ANEW, text=made_anew(self.damaged_batches, "runs", self.file_name))
+            study.findings.say(_MADE_ANEW, text=made_anew(self.damaged_batches, "runs", self.file_name))
 
     @property
     def shortage(self) -> str:
@@ -435,6 +435,6 @@ class RandomAnalysis(Analysis):
             where a batch fails; earlier ones are in the store.
         """
         assert work.folder is not None
-        rig = replace(work.rig, drive=replace(study.drive, observer=None))
-        task = RandomTask(study.config.plans["random_overloads"], rig, work.steady)
+        rig = replace(work.rig, drive=replace(study.setup.drive, observer=None))
+        task = RandomTask(study.setup.config.plans["random_overloads"], rig, work.steady)
         return run(task, work.folder, work.progress, scheduler=work.scheduler)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from ...report.capability import AnswerBlocks, Capability, Contents, Supplement
 from ...study.analysis import Analysis
+from ...study.drive import Drive
 from ...study.record import StudyRecord
 
 
@@ -32,13 +33,13 @@ class SidesCapability(Capability):
         """The crank speed up to which two bars stand for chains."""
         from . import page
 
-        return AnswerBlocks(validity=page.up_to_speed(study))
+        return AnswerBlocks(validity=page.up_to_speed(study.findings))
 
-    def supplement(self, study: StudyRecord) -> Supplement | None:
+    def supplement(self, drive: Drive) -> Supplement | None:
         """The organs in motion."""
         from .motion import organ_motion
 
-        return organ_motion(study) if study.drive.machine.model.sides else None
+        return organ_motion(drive) if drive.machine.model.sides else None
 
 
 CAPABILITY = SidesCapability()

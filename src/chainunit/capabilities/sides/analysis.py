@@ -151,9 +151,10 @@ class OrganAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> OrganFindings:
         """The findings for two bars, also where the organs are chains."""
-        machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
+        setup = study.setup
+        machine, feed, speed = setup.drive.chain_unit, setup.config.feed, setup.config.run.crank_speed
         (right, _), (left, _) = machine.rocker_extremes()
-        empties = any(study.config.events[name].empties for name in study.overloads)
+        empties = any(setup.config.events[name].empties for name in study.runs.overloads)
         mode, limits = two_bar_limits(machine, feed, empties=empties)
         good = {limit.topic: limit.speed for limit in limits}
         return OrganFindings(
@@ -167,6 +168,6 @@ class OrganAnalysis(Analysis):
                 rocker_torque_speed=good["rocker torque"],
                 rocker_extreme_right=right,
                 rocker_extreme_left=left,
-                margin=float(np.min(study.statics.normal.outputs.margin)),
+                margin=float(np.min(setup.statics.normal.outputs.margin)),
             ),
         )

@@ -13,7 +13,7 @@ from ...machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
 from ...mechanism.machine import MachineState
 from ...report.capability import Details, Supplement
 from ...report.motion import Arrow
-from ...study.record import StudyRecord
+from ...study.drive import Drive
 
 _CAPTION = (
     "Blue, full: left side; red, dashed: right side; black: crank bearing O1 and rocker pivot C. An arrow is the "
@@ -23,9 +23,9 @@ _CAPTION = (
 )
 
 
-def organ_motion(study: StudyRecord) -> Supplement:
+def organ_motion(drive: Drive) -> Supplement:
     """The supplement with the organs of both sides, each side in its colour."""
-    walls, _ = rods = _rods(study)
+    walls, _ = rods = _rods(drive)
     joints = {side: _joints(names, rods) for side, names in NAMES.items()}
     links = {
         link: tuple(joints[side][span])
@@ -33,7 +33,7 @@ def organ_motion(study: StudyRecord) -> Supplement:
         for link, span in ((names.wall, slice(walls + 1)), (names.web, slice(walls, None)))
     }
     return OrganMotion(
-        study,
+        drive,
         _CAPTION,
         links,
         looks=dict.fromkeys(links, "chain"),
@@ -50,9 +50,9 @@ def organ_motion(study: StudyRecord) -> Supplement:
     )
 
 
-def _rods(study: StudyRecord) -> tuple[int, int]:
+def _rods(drive: Drive) -> tuple[int, int]:
     """Numbers of rods in wall and web of an organ."""
-    machine = study.drive.simulated_machine
+    machine = drive.simulated_machine
     return machine.rods if isinstance(machine, ChainedUnit) else (1, 1)
 
 
@@ -69,15 +69,15 @@ class OrganMotion(Supplement):
 
     def details(self, part: Any, state: MachineState) -> Details:
         """The inner joints of chains, the processing forces, and the material on each link."""
-        share = self.study.drive.machine.p.web_share
+        share = self.drive.machine.p.web_share
         joints: dict[str, tuple[Any, Any]] = {}
         loads: dict[str, Any] = {}
         arrows = []
         for side, names in NAMES.items():
             force = state.effects[names.processing].wrenches[0].force
-            if self.study.drive.machine.in_place:
+            if self.drive.machine.in_place:
                 inner, force = self._chain(part, state, side)
-                between = _joints(names, _rods(self.study))[1:-1]
+                between = _joints(names, _rods(self.drive))[1:-1]
                 joints |= {pin: (place.x, place.y) for pin, place in zip(between, inner, strict=True)}
             arrows.append(Arrow(f"processing force {side}", names.b, force.x, force.y, "P", side, load=True))
             material = part[f"machine.{side}.material_mass"].values
@@ -86,8 +86,8 @@ class OrganMotion(Supplement):
 
     def _chain(self, part: Any, state: MachineState, side: SideName) -> tuple[list[Vec2], Vec2]:
         """The places of the inner joints of a chain [m], and its processing force [N]."""
-        drive, names = self.study.drive, NAMES[side]
-        p, (walls, webs) = drive.machine.p, _rods(self.study)
+        drive, names = self.drive, NAMES[side]
+        p, (walls, webs) = drive.machine.p, _rods(drive)
         theta, omega = (
             [part[f"machine.{side}.{x}_{k}"].values for k in range(1, walls + webs + 1)]
             for x in ("theta", "omega")

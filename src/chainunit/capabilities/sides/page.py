@@ -13,7 +13,7 @@ from ...report.given_numbers import asked_speed
 from ...report.lines import Line, capital, filled, join, line
 from ...report.pictures import Pictures
 from ...study.organ_limits import CRANK_GOOD, ROCKER_GOOD_EMPTY
-from ...study.record import StudyRecord
+from ...study.record import StudyFindings, StudyRecord, StudySetup
 from .analysis import OrganFindings, Sides
 from .factors import OverloadFactors
 
@@ -22,16 +22,16 @@ PICTURES = Pictures()
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """Factors, limits and figure."""
-    x = cited(OrganFindings.of_study(study), "findings.organs")
-    yield _factors(study, x)
-    yield from _limits(study, x)
+    x = cited(OrganFindings.of_study(study.findings), "findings.organs")
+    yield _factors(study.setup, x)
+    yield from _limits(study.setup, x)
     yield from PICTURES.figures(study)
 
 
-def _factors(study: StudyRecord, x: OrganFindings) -> b.Table:
+def _factors(setup: StudySetup, x: OrganFindings) -> b.Table:
     sides = x.overload_factors
-    by = f", of {organs}" if (organs := study.drive.machine.in_place) else ""
-    title = line("Overload factor, one side against both, at ", asked_speed(study), by)
+    by = f", of {organs}" if (organs := setup.drive.machine.in_place) else ""
+    title = line("Overload factor, one side against both, at ", asked_speed(setup), by)
     first = next(iter(sides.values()))
     rows = (
         b.TableRow(
@@ -42,11 +42,11 @@ def _factors(study: StudyRecord, x: OrganFindings) -> b.Table:
     return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
 
-def _limits(study: StudyRecord, x: OrganFindings) -> Iterator[b.Block]:
+def _limits(setup: StudySetup, x: OrganFindings) -> Iterator[b.Block]:
     limits = x.limits
     swing = number(limits.rocker_extreme_left), number(limits.rocker_extreme_right), number(limits.margin)
     yield b.Text(filled("Rocker swings from {} to {}; margin {}.", *swing), form="short")
-    web = "with two bars a web" if study.drive.machine.in_place else "a web"
+    web = "with two bars a web" if setup.drive.machine.in_place else "a web"
     cases, speeds = [], []
     for case, speed in (
         ("with this feed", number(limits.slack_speed)),
@@ -68,10 +68,10 @@ def _limits(study: StudyRecord, x: OrganFindings) -> Iterator[b.Block]:
     yield b.Table(rows, title="Limits of the model", form="long")
 
 
-def up_to_speed(study: StudyRecord) -> Iterator[b.Block]:
+def up_to_speed(findings: StudyFindings) -> Iterator[b.Block]:
     """The crank speeds up to which two bars stand for chains; nothing where no run has two bars."""
-    findings, verdict = OrganFindings.found_in(study), study.verdict
-    if findings is None or verdict is None:
+    organs, verdict = OrganFindings.found_in(findings), findings.verdict
+    if organs is None or verdict is None:
         return
     if verdict.model != "two bars":
         sentence = (
@@ -79,7 +79,7 @@ def up_to_speed(study: StudyRecord) -> Iterator[b.Block]:
         )
         yield b.Text(sentence, "note", "long")
         return
-    limits = cited(findings, "findings.organs").limits
+    limits = cited(organs, "findings.organs").limits
     parts = [
         filled(template, speed)
         for template, speed in (
@@ -104,7 +104,7 @@ _SHADED = (
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
 def _sides(study: StudyRecord) -> fig.Figure:
-    sides = OrganFindings.of_study(study).sides
+    sides = OrganFindings.of_study(study.findings).sides
     titles = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 
     def items(torque: str) -> Iterator[fig.Item]:
@@ -115,13 +115,13 @@ def _sides(study: StudyRecord) -> fig.Figure:
             for speeds in sides.crossings[torque].values()
             for crossing in speeds
         )
-        yield fig.Mark(study.config.run.crank_speed, "normal running")
+        yield fig.Mark(study.setup.config.run.crank_speed, "normal running")
         if mode is not None and _GOOD[torque] * mode < sides.speed[-1]:
             yield fig.Shade(
                 _GOOD[torque] * mode, float(sides.speed[-1]), "two bars may be off by more than 10 %"
             )
 
-    mode = finite(OrganFindings.of_study(study).limits.chain_resonance)
+    mode = finite(OrganFindings.of_study(study.findings).limits.chain_resonance)
     x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
     axes = {torque: fig.Axis(f"{torque} torque, peak", "N.m", low=0.0) for torque in ("crank", "rocker")}
     caption = (

@@ -123,11 +123,11 @@ class SizingCapability(Capability):
         """The drive with the share that it takes of its limits, and the alarm if no motor fits."""
         from . import page
 
-        return AnswerBlocks(head=page.answer(study), judgements=page.judgements(study))
+        return AnswerBlocks(head=page.answer(study), judgements=page.judgements(study.findings))
 
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """The choice of a drive, with order numbers, of a study whose file gives its motor."""
-        if study.config.plans[self.name] is None:
+        if study.setup.config.plans[self.name] is None:
             yield (
                 "whether another motor or gear serves better, and order numbers: the motor is that of the study "
                 "file, which has no table [sizing]"

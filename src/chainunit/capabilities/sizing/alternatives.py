@@ -25,13 +25,13 @@ from ...study.limits import starting
 from ...study.measures import STARTED
 from ...study.operation import DriveTables
 from ...study.readings import crank_motion
-from ...study.record import StudyRecord
+from ...study.record import StudyFindings, StudyRecord, StudyRuns, StudySetup
 from ...study.relay import HEAVIEST
 from ...study.rig import Rig, join
 from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
 from ...study.start_up import start_up
-from ...study.starts import StartAnalysis, StartFindings
-from ...study.torques import PeakOf, all_feed_on, duty_peak, from_event_on, on_coupling
+from ...study.starts import StartFindings
+from ...study.torques import PeakOf, all_feed_on, duty_peak, on_coupling
 from ...study.transients import follow, follow_each
 from ...study.verdict import STEADY
 from ...system import ModelComponent, monolithic
@@ -95,9 +95,9 @@ def _for_starts(
 ) -> tuple[Alternative, ...]:
     """The ways for a sized drive that starts direct on line, if the start decides its setting and an overload would
     open a coupling that running alone allows. A way whose run fails is left out."""
-    if study.config.drive.start != "direct" or not setting.start_decides:
+    if study.setup.config.drive.start != "direct" or not setting.start_decides:
         return ()
-    if not setting.opened_by(setting.least_in_running) or StartAnalysis.name not in study.findings:
+    if not setting.opened_by(setting.least_in_running) or StartFindings.found_in(study.findings) is None:
         return ()
     makers: tuple[Callable[[StudyRecord, Rig, Setting], Alternative | None], ...] = (
         partial(_soft_starter, chosen=chosen),
@@ -118,17 +118,14 @@ def _for_starts(
     return tuple(way for way in ways if way is not None)
 
 
-def _worst(study: StudyRecord) -> StartNumbers:
+def _worst(findings: StudyFindings) -> StartNumbers:
     """The start from the angle at which the direct start puts most on the coupling."""
-    worst: StartNumbers = max(StartFindings.of_study(study).starts, key=lambda start: start.coupling_torque)
-    return worst
+    return max(StartFindings.of_study(findings).starts, key=lambda start: start.coupling_torque)
 
 
-def _loaded_starts(study: StudyRecord) -> list[Event]:
+def _loaded_starts(runs: StudyRuns) -> list[Event]:
     """The starts under load that the study has run."""
-    return [
-        event for event in study.config.events.values() if event.from_rest and event.name in study.answers
-    ]
+    return [event for event in runs.events.values() if event.from_rest and event.name in runs.answers]
 
 
 _Trial = tuple[Rig, float, dict[str, float], DriveTables]
@@ -144,10 +141,10 @@ class ChosenMotor:
     candidate: Candidate
 
     def permits(
-        self, study: StudyRecord, rig: Rig, tables: DriveTables, starts: Sequence[StartNumbers]
+        self, setup: StudySetup, rig: Rig, tables: DriveTables, starts: Sequence[StartNumbers]
     ) -> bool:
         """Whether a relay and the motor, by each limit of its choice with the margin, permit these `starts`."""
-        config = study.config
+        config = setup.config
         task = SizingTask(self.plan, tables, config.machine, rig.operation, config.events)
         trial = try_motor(task, self.candidate.motor, rig.drive, self.duty, rig.files)
         tried = dataclasses.replace(trial, starts=starts).result()
@@ -160,8 +157,8 @@ def _gentlest(
 ) -> tuple[Rig, list[StartNumbers], dict[str, float]] | None:
     """The first of the `trials` whose starts take at most the time `limit` [s], are permitted, and put at most `goal`
     [N m] on the coupling, or else the one with the gentlest starts. None if none is permitted."""
-    events = _loaded_starts(study)
-    angle, full = _worst(study).angle, []
+    events = _loaded_starts(study.runs)
+    angle, full = _worst(study.findings).angle, []
     probes: list[tuple[float, _Trial]] = []
     for trial in trials:
         probe = start_from(trial[0], angle, trial[1])
@@ -171,7 +168,7 @@ def _gentlest(
             probes.append((probe.coupling_torque, trial))
             continue
         starts = starts_from_all(trial[0], trial[1], events)
-        if chosen.permits(study, trial[0], trial[3], starts):
+        if chosen.permits(study.setup, trial[0], trial[3], starts):
             full.append((trial[0], starts, trial[2]))
             if hardest(starts) <= goal:
                 return full[-1]
@@ -179,7 +176,7 @@ def _gentlest(
             angle = max(starts, key=lambda start: start.coupling_torque).angle
     for _, trial in sorted(probes, key=lambda probe: probe[0]):
         starts = starts_from_all(trial[0], trial[1], events)
-        if chosen.permits(study, trial[0], trial[3], starts):
+        if chosen.permits(study.setup, trial[0], trial[3], starts):
             full.append((trial[0], starts, trial[2]))
             break
     return min(full, key=lambda trial: hardest(trial[1]), default=None)
@@ -200,10 +197,10 @@ def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **
 
 def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMotor) -> Alternative:
     """The same motor with a soft starter; at its full voltage the drive is that of the study."""
-    tables = study.config.drive
-    assert study.plate is not None and study.start is not None
-    plate = study.plate.nameplate
-    usual = longest_start(rig.operation.ramp_end, study.start.start_time)
+    tables = study.setup.config.drive
+    assert study.setup.plate is not None and study.runs.start is not None
+    plate = study.setup.plate.nameplate
+    usual = longest_start(rig.operation.ramp_end, study.runs.start.start_time)
 
     def rigs() -> Iterator[_Trial]:
         for voltage, time in SOFT_STARTERS:
@@ -249,9 +246,9 @@ def _opened(overloads: Mapping[str, float], numbers: WayNumbers) -> dict[str, fl
 def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMotor) -> Alternative:
     """The same motor and gear with an inverter, which keeps the speed better: its running and its overloads are those
     of runs of its own."""
-    tables = study.config.drive
-    assert study.plate is not None
-    plate = study.plate.nameplate
+    tables = study.setup.config.drive
+    assert study.setup.plate is not None
+    plate = study.setup.plate.nameplate
 
     inverter_tables = dataclasses.replace(tables, start="inverter")
     fed = with_starter(inverter_tables, rig.drive.parameters, plate)
@@ -275,13 +272,13 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
         return Alternative(Way.INVERTER, WayNumbers.of(), {})
     quiet, starts, numbers = best
     quiet = dataclasses.replace(quiet, fed_from=None)
-    running, shocks = _runs(study, quiet, on_coupling)
+    running, shocks = _runs(study.runs, quiet, on_coupling)
     result = _as_numbers(setting, running, starts, **numbers)
     overloads = {name: on_coupling(quiet.drive, run) for name, run in shocks.items()}
     return _tried(study, Way.INVERTER, result, overloads, shocks)
 
 
-def _runs(study: StudyRecord, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[str, xr.Dataset]]:
+def _runs(runs: StudyRuns, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[str, xr.Dataset]]:
     """The largest torque of normal duty of another drive by `peak_of`, at the crank [N m], and its runs with the
     overloads from their begin on, by name."""
     operation = rig.operation
@@ -294,9 +291,7 @@ def _runs(study: StudyRecord, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[st
         begin = simulation.save()
         angle, speed = crank_motion(rig.drive, steady)
         events = [
-            event
-            for name, event in study.config.events.items()
-            if name in study.answers and not event.from_rest
+            event for name, event in runs.events.items() if name in runs.answers and not event.from_rest
         ]
         for event, run in follow_each(rig, simulation, events, float(angle[-1]), float(np.mean(speed))):
             if event.role is Role.DUTY:
@@ -304,7 +299,7 @@ def _runs(study: StudyRecord, rig: Rig, peak_of: PeakOf) -> tuple[float, dict[st
             elif event.role is Role.SHOCK:
                 shocks[event.name] = run
         for side in (side for side in SIDES if side in rig.drive.machine.model.sides):
-            event = one_sided_event(study.config.events, side)
+            event = one_sided_event(runs.events, side)
             run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * operation.turn).run
             duty.append((all_feed_on(side), run))
     return duty_peak(rig.drive, [(STEADY, steady), *duty], peak_of).torque, shocks
@@ -354,7 +349,7 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenM
     capacity = setting.least_in_running
     if rig.drive.foreign_titles or capacity >= setting.gear:
         return None
-    slowest = max(StartFindings.of_study(study).starts, key=lambda start: start.start_time or 0.0)
+    slowest = max(StartFindings.of_study(study.findings).starts, key=lambda start: start.start_time or 0.0)
     left_out = Alternative(Way.SLIP_CLUTCH, WayNumbers.of(running=setting.running), {})
     run = slip_run(rig, slowest, capacity)
     if run is None:
@@ -362,7 +357,7 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenM
     time = run["time"].values
     heat, end = float(np.trapezoid(run["motor.heat"].values, time)), float(time[-1])
     slipping = dataclasses.replace(slowest, start_time=end, heat=heat, followed=end)
-    if not chosen.permits(study, rig, study.config.drive, [slipping]):
+    if not chosen.permits(study.setup, rig, study.setup.config.drive, [slipping]):
         return left_out
     numbers = WayNumbers.of(
         setting=capacity,
@@ -370,7 +365,7 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenM
         start=float(rig.drive.at_crank(peak(run["clutch.tau"].values))),
         slip_time=run.attrs["slip_time"],
         slip_energy=float(np.trapezoid(run["clutch.dissipated_power"].values, run["time"].values)),
-        slip_power=rig.drive.at_port(capacity) * rig.drive.ratio * study.config.run.crank_speed,
+        slip_power=rig.drive.at_port(capacity) * rig.drive.ratio * study.setup.config.run.crank_speed,
     )
     return Alternative(Way.SLIP_CLUTCH, numbers, setting.opened_by(capacity))
 
@@ -381,20 +376,19 @@ def _higher(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
         setting=setting.least if setting.least < setting.gear else None,
         running=setting.running,
         start=setting.start,
-        rocker=_rocker_until(study, setting),
+        rocker=_rocker_until(study.runs, setting),
     )
     return _tried(study, Way.HIGHER, numbers, setting.overloads)
 
 
-def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
+def _rocker_until(runs: StudyRuns, setting: Setting) -> float | None:
     """The largest torque of the rocker in the overloads [N m], each up to the instant at which the coupling carries
     its least setting; None for a machine without a rocker."""
-    peaks = []
-    for name in setting.overloads:
-        run = from_event_on(study, name)
+    peaks, parts = [], runs.event_parts
+    for run in (parts[name] for name in setting.overloads):
         if "machine.rocker.tau" not in run:
             return None
-        torque = study.drive.at_crank(np.abs(run[study.drive.motor_torque].values))
+        torque = runs.drive.at_crank(np.abs(run[runs.drive.motor_torque].values))
         passed = np.flatnonzero(torque > setting.least)
         end = int(passed[0]) + 1 if passed.size else None
         peaks.append(peak(run["machine.rocker.tau"].values[:end]))
@@ -412,15 +406,15 @@ def on_motor_side(drive: Drive, run: xr.Dataset) -> float:
 
 def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
     """The coupling between motor and the flywheel on its shaft; None for a drive without one."""
-    if not rig.drive.inertia_on_rotor or study.start is None:
+    if not rig.drive.inertia_on_rotor or study.runs.start is None:
         return None
-    events = _loaded_starts(study)
-    longest = longest_start(rig.operation.ramp_end, study.start.start_time)
+    events = _loaded_starts(study.runs)
+    longest = longest_start(rig.operation.ramp_end, study.runs.start.start_time)
     before = rig.drive.inertia_on_rotor + rig.drive.gear_at_rotor.J
     starts = starts_from_all(rig, longest, events, on_motor_side, before)
     if any(start.start_time is None for start in starts):
         return None
-    running, shocks = _runs(study, dataclasses.replace(rig, fed_from=None), on_motor_side)
+    running, shocks = _runs(study.runs, dataclasses.replace(rig, fed_from=None), on_motor_side)
     numbers = _as_numbers(setting, running, starts)
     peaks = {name: on_motor_side(rig.drive, run) for name, run in shocks.items()}
     return Alternative(Way.BEFORE_FLYWHEEL, numbers, _opened(peaks, numbers))

@@ -10,12 +10,12 @@ import numpy as np
 
 from ...drives.catalogue_couplings import CatalogueCoupling
 from ...study.arrays import peak
-from ...study.coupling import at_motor_shaft, hardest_start, pull_out
+from ...study.coupling import hardest_start, pull_out
 from ...study.event import Role
 from ...study.judgement import wrong_runs
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudyRuns
 from ...study.sections import Coupling
-from ...study.torques import at_gear, from_event_on, gear_torque, peaks_in_events, running_peak
+from ...study.torques import at_gear, gear_torque, peaks_in_events, running_peak
 from ...study.verdict import STEADY
 from .parts import coupling_for
 from .protection import CouplingEffect, Setting, goal
@@ -29,35 +29,35 @@ def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCouplin
     where the file gives a coupling, as that one cuts off the peaks from which the setting follows, or where the study
     ended before steady running. One of the `couplings` of a catalogue that can be set so is tried with its own
     release time."""
-    if study.insufficient or study.config.coupling or STEADY not in study.answers:
+    setup, runs = study.setup, study.runs
+    if setup.insufficient or setup.config.coupling or STEADY not in runs.answers:
         return None
-    events, wrong = study.config.events, wrong_runs(study)
+    events, wrong = setup.config.events, wrong_runs(runs)
     normal = [n for n in wrong if n not in events or events[n].from_rest or events[n].role is Role.DUTY]
-    shocks = peaks_in_events(study, Role.SHOCK)
+    shocks = peaks_in_events(runs, Role.SHOCK)
     setting = Setting(
         running=running_peak(study).torque,
         start=hardest_start(study).torque,
-        motor=pull_out(study),
-        gear=study.config.drive.gear.torque_limit,
-        line=study.drive.at_crank(study.drive.line.stall_torque),
+        motor=pull_out(runs),
+        gear=setup.config.drive.gear.torque_limit,
+        line=setup.drive.at_crank(setup.drive.line.stall_torque),
         overloads={} if normal else {n: peak for n, peak in shocks.items() if n not in wrong},
-        disturbances={n: x for n, x in peaks_in_events(study, Role.DISTURBANCE).items() if n not in wrong},
+        disturbances={n: x for n, x in peaks_in_events(runs, Role.DISTURBANCE).items() if n not in wrong},
         wrong=normal or [n for n in wrong if n in shocks],
     )
     if setting.obstacle is not None:
         return setting
-    sold = coupling_of(study, setting, couplings)
+    sold = coupling_of(runs, setting, couplings)
     tried = effects(study, setting.least, release=None if sold is None else float(sold.data.release_time))
     return replace(setting, effects={n: tried[n] for n in setting.opens})
 
 
 def coupling_of(
-    study: StudyRecord, setting: Setting, couplings: Sequence[CatalogueCoupling]
+    runs: StudyRuns, setting: Setting, couplings: Sequence[CatalogueCoupling]
 ) -> CatalogueCoupling | None:
     """The torque limiter of the catalogues for that setting, see `coupling_for`; it turns with the motor's shaft."""
-    drive = study.drive
-    fastest = peak(study.steady[drive.motor_speed].values)
-    return coupling_for(couplings, at_motor_shaft(study, setting.least), fastest)
+    fastest = peak(runs.steady[runs.drive.motor_speed].values)
+    return coupling_for(couplings, runs.drive.at_motor_shaft(setting.least), fastest)
 
 
 def effects(
@@ -69,10 +69,10 @@ def effects(
     """The effect of a coupling with this setting [N m at the crank] in each shock that opens it, by name; it passes
     torque for the `release` time [s], by default the declared one. `runs` are other runs of the shocks without a
     coupling, from their begin on; by default the runs of the study."""
-    drive, release = study.drive, Coupling().release_time if release is None else release
+    drive, release = study.setup.drive, Coupling().release_time if release is None else release
     if runs is None:
-        names = peaks_in_events(study, Role.SHOCK)
-        runs = {name: from_event_on(study, name) for name in names}
+        names = peaks_in_events(study.runs, Role.SHOCK)
+        runs = {name: run for name, run in study.runs.event_parts.items() if name in names}
     by_shock = {}
     for name, run in runs.items():
         time, torque = run["time"].values, drive.at_crank(np.abs(run[drive.motor_torque].values))
@@ -88,7 +88,7 @@ def effects(
         rows = until.sizes["time"]
         last = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
         without = at_gear(drive, run)
-        wanted = goal(without, study.config.drive.gear.torque_limit)
+        wanted = goal(without, study.setup.config.drive.gear.torque_limit)
         above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
         in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
         with_coupling = max(at_gear(drive, until), at_gear(drive, last))

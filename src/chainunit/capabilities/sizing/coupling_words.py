@@ -10,11 +10,11 @@ from ...reading.text import aside, number
 from ...study.coupling import (
     LESS_TORQUE,
     TRIPS_IN_TRANSIENT,
-    at_motor_shaft,
     hardest_start,
     transient_of_starts,
 )
-from ...study.record import StudyRecord
+from ...study.drive import Drive
+from ...study.record import StudyRecord, StudyRuns
 from ...study.sections import Coupling
 from ...study.starts import transient_words
 from ...study.torques import running_peak, running_words
@@ -25,15 +25,15 @@ def _torque(value: float) -> str:
     return number(value, "N.m")
 
 
-def _at_both(study: StudyRecord, value: float) -> str:
+def _at_both(drive: Drive, value: float) -> str:
     """A torque at the crank, and at the motor's shaft, on which the coupling sits."""
-    at_motor = _torque(at_motor_shaft(study, value))
-    return f"{_torque(value)} at the {study.driver_noun}, {at_motor} at the motor's shaft"
+    at_motor = _torque(drive.at_motor_shaft(value))
+    return f"{_torque(value)} at the {drive.driver_noun}, {at_motor} at the motor's shaft"
 
 
-def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
+def _list_of(runs: StudyRuns, peaks: Mapping[str, float]) -> str:
     """A list of runs with their peaks on the coupling [N m], in words."""
-    return ", ".join(f"{study.title_of(name)} ({_torque(peak)})" for name, peak in peaks.items())
+    return ", ".join(f"{runs.title_of(name)} ({_torque(peak)})" for name, peak in peaks.items())
 
 
 _OBSTACLES = {
@@ -74,44 +74,45 @@ def why_none(setting: Setting) -> str:
 def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative] = ()) -> str:
     """A sentence on the recommended torque limiter of a sized drive and its effect in the overloads, or on
     the reason why no coupling protects the drive."""
-    caveat = aside(study.verdict.caveat if study.verdict else None)
+    caveat = aside(study.findings.verdict.caveat if study.findings.verdict else None)
     hardest, running = hardest_start(study), running_peak(study)
-    start = hardest.named(study)
+    start = hardest.named(study.runs)
     by = " by load and acceleration" if setting.is_of_start else ""
-    cause = f"that {start}" if setting.is_of_start else f"that {running_words(study, running.run)}"
+    cause = f"that {start}" if setting.is_of_start else f"that {running_words(study.runs, running.run)}"
     above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {cause} puts on it{by}"
+    torque = _at_both(study.setup.drive, setting.least)
     if setting.obstacle is not None:
-        return of_driver(_OBSTACLES[setting.obstacle], study.driver_noun).format(
+        return of_driver(_OBSTACLES[setting.obstacle], study.setup.driver_noun).format(
             start=start,
-            setting=_at_both(study, setting.least),
+            setting=torque,
             release=number(Coupling().release_time, "s"),
-            effects=_effects(study, setting.effects),
-            wrong=", ".join(map(study.title_of, setting.wrong)),
+            effects=_effects(study.runs, setting.effects),
+            wrong=", ".join(map(study.runs.title_of, setting.wrong)),
             start_torque=_torque(hardest.torque),
             least=_torque(setting.least),
             least_in_running=_torque(setting.least_in_running),
             above=above,
             motor=_torque(setting.motor),
             gear=_torque(setting.gear),
-            bound=_bound(study, setting),
+            bound=_bound(study.runs, setting),
         )
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     less = number(LESS_TORQUE, "1", "percent", full=False)
     text = (
-        f"Recommended torque limiter{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
+        f"Recommended torque limiter{caveat}: {torque}; this is {MARGIN:g} times the "
         f"{_torque(setting.normal)} {cause} puts on it{by}; the warm motor gives {_torque(setting.motor)} at the "
-        f"{study.driver_noun}, and may give {less} less by IEC 60034-1. It opens where "
-        f"{_effects(study, setting.effects)}"
+        f"{study.setup.driver_noun}, and may give {less} less by IEC 60034-1. It opens where "
+        f"{_effects(study.runs, setting.effects)}"
     )
-    text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
-    text += _transient(study, setting) + _too_late(study, setting, alternatives)
+    text += f"; it stays shut where {_list_of(study.runs, shut)}." if shut else "."
+    text += _transient(study, setting) + _too_late(study.runs, setting, alternatives)
     if setting.wrong:
-        names = ", ".join(map(study.title_of, setting.wrong))
+        names = ", ".join(map(study.runs.title_of, setting.wrong))
         text += f" Left out, as the energy balance is not kept: {names}."
     if setting.stalls:
         text += " A load that rises slowly may stall the motor and not open it: the relay has to trip there."
     if setting.nuisances:
-        nuisances = _list_of(study, setting.nuisances)
+        nuisances = _list_of(study.runs, setting.nuisances)
         text += f" A nuisance trip, which protects nothing: it opens, too, where {nuisances}."
     if setting.start_decides:
         text += f" For running alone {_torque(setting.least_in_running)} would do."
@@ -121,36 +122,36 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
 def _transient(study: StudyRecord, setting: Setting) -> str:
     """A sentence on the electromagnetic transient of a start, if it puts more on the coupling than its setting."""
     most = transient_of_starts(study).transient
-    if study.drive.follows or most <= setting.least:
+    if study.setup.drive.follows or most <= setting.least:
         return ""
-    return f" The {transient_words(study)}: {_torque(most)}. {TRIPS_IN_TRANSIENT}."
+    return f" The {transient_words(study.setup)}: {_torque(most)}. {TRIPS_IN_TRANSIENT}."
 
 
-def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
+def _effects(runs: StudyRuns, effects: Mapping[str, CouplingEffect]) -> str:
     """A list of overloads with the effects of a coupling in them, in words."""
     return ", ".join(
-        f"{study.title_of(name)} ({_torque(effect.with_coupling)} at the output of the gear in place of "
+        f"{runs.title_of(name)} ({_torque(effect.with_coupling)} at the output of the gear in place of "
         f"{_torque(effect.without)})"
         for name, effect in effects.items()
     )
 
 
-def _bound(study: StudyRecord, setting: Setting) -> str:
+def _bound(runs: StudyRuns, setting: Setting) -> str:
     """The reason why a coupling of the least setting protects nothing, in words."""
     if setting.obstacle is Obstacle.START and setting.least >= setting.gear:
         return f"the gear may carry {_torque(setting.gear)} in running"
     if not setting.overloads:
         return "this study has no overload that could open it"
-    return f"the overloads of this study give less: {_list_of(study, setting.overloads)}"
+    return f"the overloads of this study give less: {_list_of(runs, setting.overloads)}"
 
 
-def _too_late(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative]) -> str:
+def _too_late(runs: StudyRuns, setting: Setting, alternatives: Sequence[Alternative]) -> str:
     """A sentence on the overloads in which the gear carries more than it may, though the coupling opens, and on the
     cures; empty where there are none."""
     if not setting.passed:
         return ""
     over = ", ".join(
-        f"{study.title_of(name)} (by {_torque(effect.with_coupling - setting.gear)}, "
+        f"{runs.title_of(name)} (by {_torque(effect.with_coupling - setting.gear)}, "
         f"{number(effect.with_coupling / setting.gear - 1.0, '1', 'percent')})"
         for name, effect in setting.passed.items()
     )
@@ -201,33 +202,33 @@ _FAILURES = {
 def way_words(study: StudyRecord, alternative: Alternative, setting: Setting) -> str:
     """The sentence on a way to a torque limiter that a start does not open, beside the one of that `setting`."""
     if alternative.numbers.start is None:
-        return of_driver(_FAILURES[alternative.way], study.driver_noun)
+        return of_driver(_FAILURES[alternative.way], study.setup.driver_noun)
     numbers = {
         v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp", "boost"))
         for v in variables(WayNumbers)
         if (value := getattr(alternative.numbers, v.name)) is not None
     }
     if alternative.numbers.setting is not None:
-        numbers["setting"] = _at_both(study, alternative.numbers.setting)
+        numbers["setting"] = _at_both(study.setup.drive, alternative.numbers.setting)
     return _WAYS[alternative.way].format(
-        **numbers, opens=_list_of(study, alternative.opens), set=_set(study, alternative, setting)
+        **numbers, opens=_list_of(study.runs, alternative.opens), set=_set(study, alternative, setting)
     )
 
 
 def _set(study: StudyRecord, alternative: Alternative, setting: Setting) -> str:
     """The setting of a way and what it protects, in words."""
-    gear = study.config.drive.gear.torque_limit
+    gear = study.setup.config.drive.gear.torque_limit
     if alternative.numbers.setting is None:
         return f"no setting is left below the {_torque(gear)} that the gear may carry"
-    text = f"set to {_at_both(study, alternative.numbers.setting)}, it opens "
+    text = f"set to {_at_both(study.setup.drive, alternative.numbers.setting)}, it opens "
     if not alternative.opens:
         return text + "in no overload of this study and protects nothing"
     effects, opens = alternative.effects, alternative.opens
-    text += f"where {_effects(study, effects) if effects else _list_of(study, opens)}"
+    text += f"where {_effects(study.runs, effects) if effects else _list_of(study.runs, opens)}"
     if effects and not spares(effects, gear):
         text += ", too late to save anything"
     if shut := [name for name in setting.overloads if name not in opens]:
-        text += f", but stays shut where {', '.join(map(study.title_of, shut))}"
+        text += f", but stays shut where {', '.join(map(study.runs.title_of, shut))}"
     if alternative.numbers.rocker is not None:
         text += f"; the rocker sees up to {_torque(alternative.numbers.rocker)}"
     return text

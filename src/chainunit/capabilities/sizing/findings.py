@@ -14,7 +14,7 @@ from ...reading.results import GIVEN, as_data, derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import as_used
-from ...study.coupling import at_motor_shaft, remark_on_rams
+from ...study.coupling import remark_on_rams
 from ...study.drive import Drive
 from ...study.operation import DriveTables
 from ...study.proposal import DriveProposal
@@ -147,8 +147,8 @@ class SizingFindings(Findings):
             as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
             self.answer,
-            lambda study: SizingFindings.of_study(study).sized(study).sentence,
-            _currents_until_trip,
+            lambda study: SizingFindings.of_study(study.findings).sized(study).sentence,
+            lambda study: SizingFindings.of_study(study.findings).currents_until_trip(study),
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,
@@ -165,14 +165,14 @@ class SizingFindings(Findings):
         """The parts to order, with a coupling of that `setting`; None where no motor fits, and for a packaged motor
         alone, which nobody sells."""
         best = self.best
-        if study.insufficient or (best.sold is None and best.motor.is_packaged):
+        if study.setup.insufficient or (best.sold is None and best.motor.is_packaged):
             return None
         items, wanted = best.parts, ""
         if setting is not None and setting.torque is not None:
-            if sold := coupling_of(study, setting, self.couplings):
+            if sold := coupling_of(study.runs, setting, self.couplings):
                 items = [*items, OrderedPart.of("torque limiter", sold)]
             else:
-                torque = number(at_motor_shaft(study, setting.torque), "N.m")
+                torque = number(study.setup.drive.at_motor_shaft(setting.torque), "N.m")
                 wanted = f"a torque limiter that opens at {torque} on the motor's shaft"
         unknown = [] if best.sold is None else unknown_limits(best.sold)
         flywheel = f"a flywheel of {best.flywheel_words}" if best.disc else ""
@@ -195,17 +195,17 @@ class SizingFindings(Findings):
 
     def data_with(self, drive: SizedDrive, study: StudyRecord) -> dict[str, Any]:
         """The same with the sized `drive`, see `sized`."""
-        return super().data(study) | as_data(drive, driver=study.driver_noun)
+        return super().data(study) | as_data(drive, driver=study.setup.driver_noun)
 
     def sized(self, study: StudyRecord) -> SizedDrive:
         """The drive with its protection by the runs of the study."""
         setting, trial = self.coupling(study), self.best.trial
         return SizedDrive(
             self.best,
-            bool(study.insufficient),
-            study.driver_noun,
-            study.verdict.caveat if study.verdict else None,
-            weak_in_star(study) and not study.config.empty_start,
+            bool(study.setup.insufficient),
+            study.setup.driver_noun,
+            study.findings.verdict.caveat if study.findings.verdict else None,
+            weak_in_star(study.findings) and not study.setup.config.empty_start,
             gear=ordered_gear(study, setting, self.plan, trial.inertia_factor),
             protection=drive_protection(
                 study, setting, self.alternatives, self.best.motor.nameplate.rated_current
@@ -225,13 +225,13 @@ class SizingFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Add the notes on the choice, and one on each ram of a linkage at the recommended coupling."""
         for text in self.notes:
-            study.say(_CHOICE, text=text)
-        if study.insufficient:
-            study.say(_INSUFFICIENT, answer=self.answer)
+            study.findings.say(_CHOICE, text=text)
+        if study.setup.insufficient:
+            study.findings.say(_INSUFFICIENT, answer=self.answer)
         setting = self.coupling(study)
         self._remark_on_gear(study, setting)
-        if study.statics.modes is not None:
-            study.say(_WITHOUT_LINE)
+        if study.setup.statics.modes is not None:
+            study.findings.say(_WITHOUT_LINE)
         if setting is not None and setting.obstacle in (None, Obstacle.RELEASE):
             # this is the setting that the answer names, recommended or not
             remark_on_rams(study, setting.least)
@@ -259,7 +259,7 @@ class SizingFindings(Findings):
         if sold is None or needed is None:
             return
         order, remedy = needed
-        study.say(
+        study.findings.say(
             _GEAR_TOO_WEAK,
             gear=sold.designation,
             limit=sold.transmission.torque_limit,
@@ -299,14 +299,8 @@ class ProtectionAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> None:
         """Judge the coupling by the runs of the study, and try each way."""
-        sizing = SizingFindings.of_study(study)
+        sizing = SizingFindings.of_study(study.findings)
         sizing.setting = recommended_setting(study, sizing.couplings)
         if sizing.setting is not None:
             chosen = ChosenMotor(sizing.plan, sizing.duty, sizing.best)
             sizing.alternatives = alternatives(study, sizing.setting, work.rig, chosen, work.progress)
-
-
-def _currents_until_trip(study: StudyRecord) -> Mapping[str, float]:
-    """See `SizingFindings.currents_until_trip`; empty for a study without them."""
-    findings = SizingFindings.found_in(study)
-    return {} if findings is None else findings.currents_until_trip(study)

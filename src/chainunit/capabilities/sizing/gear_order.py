@@ -9,7 +9,7 @@ from ...drives.gearing import ordered_torque
 from ...reading.text import number
 from ...study.event import Role
 from ...study.judgement import wrong_runs
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudySetup
 from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_peaks, running_peak, running_words
 from ...study.verdict import STEADY
@@ -60,50 +60,50 @@ def gear_order(
     Running and overloads leave the `margin` free. The rated torque of the motor counts times the `service` factor. A
     start counts by load and acceleration, times the service factor; a start and an overload may put
     `gear.start_factor` times the rated torque on the gear."""
-    if study.insufficient or STEADY not in study.answers:
+    if study.setup.insufficient or STEADY not in study.runs.answers:
         return None
-    gear, wrong, peaks = study.config.drive.gear, wrong_runs(study), gear_peaks(study)
+    gear, wrong, peaks = study.setup.config.drive.gear, wrong_runs(study.runs), gear_peaks(study.runs)
     running, factor, kept = running_peak(study, at_gear), gear.start_factor, 1.0 - margin
     free = f", {number(margin, '1', 'percent', full=False)} of the rated torque left free" if margin else ""
-    loads = {"running": GearLoad(running.torque, running_words(study, running.run), kept, free)}
+    loads = {"running": GearLoad(running.torque, running_words(study.runs, running.run), kept, free)}
     times = f" times the service factor {service:g}"
-    if study.plate is not None:
-        rated = study.plate.nameplate.torque * study.drive.ratio * gear.efficiency
+    if study.setup.plate is not None:
+        rated = study.setup.plate.nameplate.torque * study.setup.drive.ratio * gear.efficiency
         loads["service"] = GearLoad(rated, "the motor at its rating", 1.0 / service, times)
-    findings = StartFindings.found_in(study)
-    starts, overloads = _starts(study, findings, peaks), _overloads(study, setting, peaks)
+    findings = StartFindings.found_in(study.findings)
+    starts, overloads = _starts(study.setup, findings, peaks), _overloads(study.setup, setting, peaks)
     left_out = tuple(name for name in wrong if name in overloads)
     if starts := {name: torque for name, torque in starts.items() if name not in wrong}:
         name = max(starts, key=lambda name: starts[name])
-        title = f"a start ({study.title_of(name)})" if name else "a start"
+        title = f"a start ({study.runs.title_of(name)})" if name else "a start"
         rule = f", permitted {factor:g} x rated,{times}"
         loads["start"] = GearLoad(starts[name], title, factor / service, rule)
     if overloads := {name: torque for name, torque in overloads.items() if name not in wrong}:
         name = max(overloads, key=lambda name: overloads[name])
         with_coupling = setting is not None and setting.torque and name in setting.effects
-        title = f"an overload ({study.title_of(name)}{', with the limiter' if with_coupling else ''})"
+        title = f"an overload ({study.runs.title_of(name)}{', with the limiter' if with_coupling else ''})"
         rule = f", permitted {factor:g} x rated{free}"
         loads["overload"] = GearLoad(overloads[name], title, factor * kept, rule)
-    least, bare = max(load.rated for load in loads.values()), _overloads(study, None, peaks)
+    least, bare = max(load.rated for load in loads.values()), _overloads(study.setup, None, peaks)
     without = max([least, *(bare[name] / (factor * kept) for name in overloads)])
     transient = None if findings is None else findings.transient
     return GearOrder(ordered_torque(least), loads, left_out, ordered_torque(without), transient)
 
 
 def _starts(
-    study: StudyRecord, findings: StartFindings | None, peaks: Mapping[str, float]
+    setup: StudySetup, findings: StartFindings | None, peaks: Mapping[str, float]
 ) -> dict[str, float]:
     """Peak torque of starts at the output of the gear by load and acceleration [N m], of the `peaks` by the name of
     their event; that of the starts from all angles has no name."""
-    events = study.config.events
+    events = setup.config.events
     starts = {name: peak for name, peak in peaks.items() if name in events and events[name].from_rest}
     return starts if findings is None else {"": findings.worst.quasi_static} | starts
 
 
-def _overloads(study: StudyRecord, setting: Setting | None, peaks: Mapping[str, float]) -> dict[str, float]:
+def _overloads(setup: StudySetup, setting: Setting | None, peaks: Mapping[str, float]) -> dict[str, float]:
     """Peak torque at the output of the gear in each shock and disturbance [N m], of the `peaks` by name: that which
     passes the coupling where one is recommended."""
-    events, roles = study.config.events, (Role.SHOCK, Role.DISTURBANCE)
+    events, roles = setup.config.events, (Role.SHOCK, Role.DISTURBANCE)
     overloads = {name: peak for name, peak in peaks.items() if name in events and events[name].role in roles}
     if setting is not None and setting.torque is not None:
         overloads |= {name: effect.with_coupling for name, effect in setting.effects.items()}

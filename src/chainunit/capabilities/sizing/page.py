@@ -13,7 +13,7 @@ from ...report.cited import cited, exact, number, table
 from ...report.given_numbers import rating, run_settings
 from ...report.lines import Aside, Line, Number, Strong, Words, capital, filled, join, line, spoken
 from ...study.limits import Check
-from ...study.record import StudyRecord
+from ...study.record import StudyFindings, StudyRecord, StudyRuns, StudySetup
 from .candidate import Candidate, DriveNumbers, Standing
 from .findings import SizingFindings
 from .result import DriveProtection, MotorProtection, OrderedBelt, SizedDrive
@@ -35,20 +35,20 @@ _EMPTY_START = (
 def answer(study: StudyRecord) -> Iterator[b.Block]:
     """Cards with the motor of all runs, its gear, flywheel and protection, and a table of the share that this drive
     takes of each limit."""
-    findings = SizingFindings.found_in(study)
+    findings = SizingFindings.found_in(study.findings)
     if findings is None:
         return
     drive, x = findings.sized(study), cited(findings, "findings.sizing")
     sized, best = cited(drive, "findings.sizing"), x.candidates[0]
     gear = (_gear(findings.best, best), *_belt(sized.belt), *_gear_torque(sized))
-    ratio, shaft = exact(best.ratio, 4), findings.best.drive.flywheel_shaft.words(study.driver_noun)
+    ratio, shaft = exact(best.ratio, 4), findings.best.drive.flywheel_shaft.words(study.setup.driver_noun)
     cards = [
         b.Card(
             "Motor",
             ((best.designation, str(findings.best.verdict)),),
-            (*_data(study), *_starter(study, drive, sized, best.numbers)),
+            (*_data(study.setup), *_starter(study.setup, drive, sized, best.numbers)),
         ),
-        b.Card("Gear ratio", ((ratio, f"motor turns per {study.driver_noun} turn"),), gear),
+        b.Card("Gear ratio", ((ratio, f"motor turns per {study.setup.driver_noun} turn"),), gear),
         b.Card(
             "Flywheel",
             ((number(x.flywheel.J) if findings.best.disc else "none", f"flywheel on the {shaft}"),),
@@ -61,7 +61,7 @@ def answer(study: StudyRecord) -> Iterator[b.Block]:
         cards.append(b.Card("Protection", (setting,)))
     elif isinstance(drive.protection, DriveProtection):
         torque: Line = number(protection.trip_torque) if drive.protection.trip_torque else "none"
-        limiter = torque, of_driver(_TRIP_TORQUE, study.driver_noun)
+        limiter = torque, of_driver(_TRIP_TORQUE, study.setup.driver_noun)
         cards.append(b.Card("Protection", (limiter,), tuple(_protection(drive.protection, protection))))
     yield b.Cards(tuple(cards))
     yield from _parts(drive, sized)
@@ -126,11 +126,11 @@ def _how_to_order(drive: SizedDrive, x: SizedDrive, k: int) -> Iterator[Line]:
             yield line(", price ", exact(x.parts.items[k].price))
 
 
-def judgements(study: StudyRecord) -> Iterator[b.Block]:
+def judgements(findings: StudyFindings) -> Iterator[b.Block]:
     """The alarm where no motor fits."""
-    findings = SizingFindings.found_in(study)
-    if findings is not None and findings.nearest is not None:
-        best = cited(findings, "findings.sizing").candidates[0]
+    sizing = SizingFindings.found_in(findings)
+    if sizing is not None and sizing.nearest is not None:
+        best = cited(sizing, "findings.sizing").candidates[0]
         rest = line(" All runs are with ", best.designation, ", which is insufficient: ", best.reason, ".")
         yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), rest), form="long")
 
@@ -147,10 +147,10 @@ def _disc(candidate: Candidate, x: Candidate) -> Iterator[Line]:
         yield line("steel disc ", number(wheel.mass), ", ", number(wheel.diameter), " in diameter")
 
 
-def _data(study: StudyRecord) -> Iterator[Line]:
+def _data(setup: StudySetup) -> Iterator[Line]:
     """The data of the motor of all runs."""
-    if study.plate is not None:
-        x = rating(study.plate)
+    if setup.plate is not None:
+        x = rating(setup.plate)
         plate = "{}, {} poles, {}, {}, {}, {}, {}"
         sizes = map(exact, (x.rated_power, x.poles, x.rated_voltage, x.rated_frequency))
         yield filled(plate, *sizes, *map(number, (x.rated_speed, x.rated_torque, x.rated_current)))
@@ -174,28 +174,28 @@ def _belt(x: OrderedBelt | None) -> Iterator[Line]:
         )
 
 
-def _starter(study: StudyRecord, drive: SizedDrive, x: SizedDrive, numbers: DriveNumbers) -> Iterator[Line]:
+def _starter(setup: StudySetup, drive: SizedDrive, x: SizedDrive, numbers: DriveNumbers) -> Iterator[Line]:
     """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
-    start, starter = study.config.drive.start, cited(study.config.drive.starter, "given.starter")
+    start, starter = setup.config.drive.start, cited(setup.config.drive.starter, "given.starter")
     if start == "soft":
         soft = starter.soft_start
         yield filled("soft starter, {} voltage, {}", exact(soft.voltage), exact(soft.time))
     elif start == "star-delta":
         empty = _EMPTY_START if drive.needs_empty_start else ""
         yield line("star-delta starter, ", exact(starter.star_delta.time), f" in star{empty}")
-        yield _winding(study)
+        yield _winding(setup)
     elif start == "inverter":
         starts = number(numbers.inverter_current).value is not None
         current = line(" of at least ", number(x.inverter.rated_current)) if x.inverter and starts else ()
-        ramp = exact(run_settings(study).ramp)
+        ramp = exact(run_settings(setup).ramp)
         yield filled("inverter{}, boost {}, ramp {}", current, exact(starter.inverter.boost), ramp)
         if starts:
             yield line("in running ", number(numbers.frequency), ", ", number(numbers.speed))
 
 
-def _winding(study: StudyRecord) -> str:
+def _winding(setup: StudySetup) -> str:
     """The winding that a start in star and delta needs: one for the voltage of the supply in delta."""
-    supply = 0.0 if study.plate is None else study.plate.nameplate.voltage
+    supply = 0.0 if setup.plate is None else setup.plate.nameplate.voltage
     in_star, other = (
         10.0 * round(supply * factor / 10.0) for factor in (math.sqrt(3.0), 1.0 / math.sqrt(3.0))
     )
@@ -224,7 +224,7 @@ def _relay(relay: MotorProtection, x: MotorProtection) -> Line:
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The choice, the candidates with the share that each takes of the limits, and the demands on the drive."""
-    findings = SizingFindings.of_study(study)
+    findings = SizingFindings.of_study(study.findings)
     drive, x = findings.sized(study), cited(findings, "findings.sizing")
     sized = cited(drive, "findings.sizing")
     if findings.chosen is None:
@@ -234,12 +234,12 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
         )
         heading = Strong("No candidate fits. The reasons:")
         yield b.Judgement("alarm", heading, items=tuple(reasons), form="long")
-    yield from _best(study, drive, sized, x.candidates[0])
+    yield from _best(study.setup, drive, sized, x.candidates[0])
     if isinstance(drive.protection, DriveProtection):
         protection: Any = sized.protection
         yield b.Text(protection.coupling)
         yield from (b.Text(way.words) for way in protection.alternatives)
-        yield from _ways(study, drive.protection, protection)
+        yield from _ways(study.runs, drive.protection, protection)
     weak = line("; too weak by the nameplate: ", exact(x.weak)) if findings.weak else ()
     tried, motors = map(exact, (x.tried, x.motors))
     yield b.Text(line("Tried: ", tried, " of ", motors, " motors of the catalogue", weak, "."))
@@ -259,7 +259,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 def _numbers(study: StudyRecord, findings: SizingFindings, drive: SizedDrive) -> Iterator[b.Table]:
     """A table of the numbers of each part of the result."""
     # a machine without sides has no one-sided feed
-    left_out = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
+    left_out = () if study.setup.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
     if all(candidate.sold is None for candidate in findings.candidates):
         # it is a demand on gears of a catalogue
         left_out = (*left_out, "gear_torque")
@@ -276,19 +276,19 @@ def _numbers(study: StudyRecord, findings: SizingFindings, drive: SizedDrive) ->
             yield b.Table(rows, title=capital(spoken(name)))
 
 
-def _best(study: StudyRecord, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Iterator[b.Block]:
+def _best(setup: StudySetup, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Iterator[b.Block]:
     """The sentences on what is ordered, and on the reason for the choice."""
     doubt = line(" (", cited(drive.caveat, "verdict.model.caveat"), ")") if drive.caveat else ()
     # a motor that does not suffice is not ordered
     parts = () if drive.parts is None else drive.parts.items
-    motor = [line("motor ", best.designation, " of ", source) for source in _data(study)]
+    motor = [line("motor ", best.designation, " of ", source) for source in _data(setup)]
     order: list[Line] = [line(title, *_how_to_order(drive, x, 0)) for title in motor]
     if not any(part.kind == "gear" for part in parts):
         order += (*_belt(x.belt), *_gear_torque(x))
     for k, item in enumerate(x.parts.items if x.parts is not None else ()):
         if k:
             order.append(line(f"{parts[k].kind} ", item.designation, *_how_to_order(drive, x, k)))
-    order += _starter(study, drive, x, best.numbers)
+    order += _starter(setup, drive, x, best.numbers)
     if order and not drive.insufficient:
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
     begin = "Insufficient: " if drive.insufficient else "Chosen: "
@@ -382,7 +382,7 @@ def _gears(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Table]:
         )
 
 
-def _ways(study: StudyRecord, protection: DriveProtection, x: DriveProtection) -> Iterator[b.Table]:
+def _ways(runs: StudyRuns, protection: DriveProtection, x: DriveProtection) -> Iterator[b.Table]:
     """A row for each way to a coupling that a start does not open."""
     return table(
         zip(protection.alternatives, x.alternatives, strict=True),
@@ -391,9 +391,9 @@ def _ways(study: StudyRecord, protection: DriveProtection, x: DriveProtection) -
         ("running", lambda row: number(row[1].numbers.running)),
         ("a start", lambda row: number(row[1].numbers.start)),
         ("start-up", lambda row: number(row[1].numbers.start_time)),
-        ("opens or slips where", lambda row: "; ".join(map(study.title_of, row[0].opens)) or "nothing"),
+        ("opens or slips where", lambda row: "; ".join(map(runs.title_of, row[0].opens)) or "nothing"),
         title="Ways to a torque limiter: its setting, and the torques of running and of a start, at the "
-        f"{study.driver_noun}",
+        f"{runs.drive.driver_noun}",
         numeric=False,
         form="long",
     )

@@ -11,9 +11,8 @@ from ...drives.belt import belt_drive
 from ...drives.gear_ratios import belt_before_gear
 from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import aside, number
-from ...study.coupling import at_motor_shaft
 from ...study.inverter import inverter_need
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudyRuns
 from ...study.relay import HEAVIEST, MORE_CURRENT, class_words, locked_rotor, protects, tolerant_class
 from ...study.starts import StartFindings, transient_words, weak_in_star
 from ...study.verdict import STEADY
@@ -48,18 +47,18 @@ def ordered_gear(
     """The gear to order by this `plan`, and the load that decides; None where there is no drive to order. For
     `inertia_factor` see `chainunit.drives.service_factor`."""
     margin, service = float(plan.demands.margin), plan.gear_factor(inertia_factor)
-    if "gear.torque_limit" in study.config.drive.given and study.drive.gear_rating is None:
+    if "gear.torque_limit" in study.setup.config.drive.given and study.setup.drive.gear_rating is None:
         # a limit that the user gives is checked without the factor of a catalogue
         service = 1.0
     order = gear_order(study, setting, margin, service)
-    if order is None or not study.drive.is_geared:
+    if order is None or not study.setup.drive.is_geared:
         return None
     decides = order.decides
     reason = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}, rounded up"
     if order.without > order.rated:
         reason += f"; without the torque limiter {number(order.without, 'N.m')}"
     if order.left_out:
-        names = ", ".join(map(study.title_of, order.left_out))
+        names = ", ".join(map(study.runs.title_of, order.left_out))
         reason += (
             f"; a lower bound, as the energy balance is not kept ({names}): shorten run.step before you order"
         )
@@ -69,7 +68,7 @@ def ordered_gear(
     )
     transient = None
     if order.transient is not None:
-        transient = _torque(order.transient, transient_words(study))
+        transient = _torque(order.transient, transient_words(study.setup))
     return OrderedGear(
         InUnit(order.rated, "N.m", title=title),
         {
@@ -98,7 +97,7 @@ class OrderedInverter:
 
 def ordered_inverter(study: StudyRecord) -> OrderedInverter | None:
     """The inverter to order; None on the line, and for an insufficient motor."""
-    need = None if study.insufficient else inverter_need(study)
+    need = None if study.setup.insufficient else inverter_need(study)
     if need is None:
         return None
     title = f"inverter, rated current at least, decided by {need.case}"
@@ -120,12 +119,12 @@ class OrderedBelt:
 
 def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> OrderedBelt | None:
     """The belt to order by this `plan`, with the results of the chosen motor's `trial`; None where there is none."""
-    if study.insufficient or "belt" not in study.drive.transmission or study.plate is None:
+    if study.setup.insufficient or "belt" not in study.setup.drive.transmission or study.setup.plate is None:
         return None
-    plate, ratio = study.plate.nameplate, study.drive.ratio
-    if study.drive.is_geared and (split := belt_before_gear(ratio)) is not None:
+    plate, ratio = study.setup.plate.nameplate, study.setup.drive.ratio
+    if study.setup.drive.is_geared and (split := belt_before_gear(ratio)) is not None:
         ratio = split[0]
-    is_on_line = study.config.drive.start == "direct" or weak_in_star(study)
+    is_on_line = study.setup.config.drive.start == "direct" or weak_in_star(study.findings)
     factor = plan.belt_factor(trial.inertia_factor, is_on_line)
     belt = belt_drive(plate.power, trial.speed or plate.speed, ratio, factor)
     power = number(plate.power, "W")
@@ -277,7 +276,7 @@ def drive_protection(
 ) -> DriveProtection | MotorProtection | None:
     """Settings of the protection of the drive, whose motor has the `rated` current [A]; without a `setting` those of
     the motor alone, and None where the motor is insufficient."""
-    if study.insufficient:
+    if study.setup.insufficient:
         return None
     relay = _relay(study, rated)
     if setting is None:
@@ -285,7 +284,7 @@ def drive_protection(
     judged = setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
     return DriveProtection(
         trip_torque=setting.torque,
-        trip_torque_at_motor=setting.torque and at_motor_shaft(study, setting.torque),
+        trip_torque_at_motor=setting.torque and study.setup.drive.at_motor_shaft(setting.torque),
         relay=relay,
         coupling=coupling_sentence(study, setting, alternatives),
         obstacle=setting.obstacle,
@@ -294,16 +293,16 @@ def drive_protection(
         running_torque=setting.running,
         start_torque=setting.start,
         breakdown_torque=setting.motor,
-        effects=_effects(study, setting.effects),
-        overloads=_peaks(study, setting.overloads, "opens it", setting.opens),
-        disturbances=_peaks(study, setting.disturbances, "a nuisance trip", setting.nuisances),
+        effects=_effects(study.runs, setting.effects),
+        overloads=_peaks(study.runs, setting.overloads, "opens it", setting.opens),
+        disturbances=_peaks(study.runs, setting.disturbances, "a nuisance trip", setting.nuisances),
         alternatives=[
             TriedWay(
                 alternative.way,
                 way_words(study, alternative, setting),
                 alternative.numbers,
                 alternative.opens,
-                _effects(study, alternative.effects),
+                _effects(study.runs, alternative.effects),
             )
             for alternative in alternatives
         ],
@@ -311,22 +310,22 @@ def drive_protection(
 
 
 def _peaks(
-    study: StudyRecord, peaks: Mapping[str, float], phrase: str, opening: Mapping[str, float]
+    runs: StudyRuns, peaks: Mapping[str, float], phrase: str, opening: Mapping[str, float]
 ) -> dict[str, InUnit]:
     """The peaks on the coupling, by run, with the `phrase` on each run that is among those `opening` it."""
     return {
-        name: _torque(peak, f"{study.title_of(name)}: {phrase if name in opening else 'leaves it shut'}")
+        name: _torque(peak, f"{runs.title_of(name)}: {phrase if name in opening else 'leaves it shut'}")
         for name, peak in peaks.items()
     }
 
 
-def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[str, dict[str, InUnit]]:
+def _effects(runs: StudyRuns, effects: Mapping[str, CouplingEffect]) -> dict[str, dict[str, InUnit]]:
     """The effects of a torque limiter as it was tried, by overload."""
     titles = {"without": "without a coupling", "with_coupling": "with it"}
     return {
         name: {
             key: _torque(
-                getattr(effect, key), f"{study.title_of(name)}: peak at the output of the gear, {phrase}"
+                getattr(effect, key), f"{runs.title_of(name)}: peak at the output of the gear, {phrase}"
             )
             for key, phrase in titles.items()
         }
@@ -335,12 +334,12 @@ def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[
 
 
 def _relay(study: StudyRecord, rated: float) -> MotorProtection:
-    if study.drive.follows:
+    if study.setup.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    title, caveat = class_words(study.relay_class), _too_slow(study) or _tolerance(study)
+    title, caveat = class_words(study.runs.relay_class), _too_slow(study) or _tolerance(study)
     trip_class = {"value": title, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
-    if study.drive.star_delta is None:
+    if study.setup.drive.star_delta is None:
         return MotorProtection(
             InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
         )
@@ -358,10 +357,10 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
 
 def _too_slow(study: StudyRecord) -> str | None:
     """The means beside a relay that trips too late with the rotor locked, in words; None beside another one."""
-    before = study.answers[STEADY].current_rms if STEADY in study.answers else None
-    if study.plate is None or before is None or study.relay_class > HEAVIEST:
+    before = study.runs.answers[STEADY].current_rms if STEADY in study.runs.answers else None
+    if study.setup.plate is None or before is None or study.runs.relay_class > HEAVIEST:
         return None
-    if protects(study.relay_class, *locked_rotor(study.plate.nameplate, before)):
+    if protects(study.runs.relay_class, *locked_rotor(study.setup.plate.nameplate, before)):
         return None
     return "trips too late with the rotor locked: order the motor with PTC thermistors, too"
 
@@ -369,13 +368,13 @@ def _too_slow(study: StudyRecord) -> str | None:
 def _tolerance(study: StudyRecord) -> str | None:
     """The class whose relay holds in each start of a motor at the tolerance of its current, with the reason why it is
     not ordered (`chainunit.study.relay.protecting_class`), in words; None if it is."""
-    starts = StartFindings.found_in(study)
-    if starts is None or starts.stuck or study.relay_class > HEAVIEST:
+    starts = StartFindings.found_in(study.findings)
+    if starts is None or starts.stuck or study.runs.relay_class > HEAVIEST:
         return None
-    holding = tolerant_class(starts.relay_seconds, study.relay_class)
+    holding = tolerant_class(starts.relay_seconds, study.runs.relay_class)
     phrase, late = f"one {class_words(holding)} holds", ""
     if holding <= HEAVIEST:
         phrase, late = f"one of {class_words(holding)} holds", ", but trips too late with the rotor locked"
     more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
     said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; {phrase}{late}"
-    return None if holding == study.relay_class else said
+    return None if holding == study.runs.relay_class else said

@@ -49,7 +49,7 @@ class StaticInertiaAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> StaticInertiaFindings:
         """The torque of the turn with and without the term J'(phi) w^2/2 of the inertia: at constant speed one number
         J has no part in the torque."""
-        turn = study.statics.normal
+        turn = study.setup.statics.normal
         speed = turn.crank_speed * turn.ratio
         inertial = 0.5 * turn.outputs.dJ_dphi * speed * speed * turn.ratio
         return StaticInertiaFindings(_rms(turn.crank_torque), _rms(turn.crank_torque - inertial))
@@ -75,12 +75,12 @@ class StaticInertiaCapability(Capability):
 
     def answer(self, study: StudyRecord) -> AnswerBlocks:
         """A line if they differ."""
-        findings = StaticInertiaFindings.found_in(study)
+        findings = StaticInertiaFindings.found_in(study.findings)
         if findings is None or abs(findings.static - findings.machine) <= _ALIKE * findings.machine:
             return AnswerBlocks()
         x = cited(findings, "findings.static_inertia")
         sentence = (
-            f"A constant-inertia calculation takes RMS {{}} instead of {{}} at the {study.driver_noun}."
+            f"A constant-inertia calculation takes RMS {{}} instead of {{}} at the {study.setup.driver_noun}."
         )
         return AnswerBlocks(end=[Text(filled(sentence, number(x.static), number(x.machine)))])
 

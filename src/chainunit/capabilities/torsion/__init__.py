@@ -36,7 +36,7 @@ class TorsionCapability(Capability):
                 ),
             },
             title="Torsion of the driveline",
-            is_used=lambda study: "torsion" in study.findings,
+            is_used=lambda study: "torsion" in study.findings.by_analysis,
             order=(("slowest", ">", "fastest"), ("bend_low", ">", "bend_high")),
         )
     }

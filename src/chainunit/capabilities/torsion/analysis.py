@@ -92,13 +92,13 @@ class TorsionAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> TorsionFindings | None:
         """The torsion of the line in rotation; None of a slow line without the table [torsion]."""
-        config, drive, modes = study.config, study.drive, study.statics.modes
+        config, drive, modes = study.setup.config, study.setup.drive, study.setup.statics.modes
         plan: TorsionPlan = config.plans["torsion"]
         assert modes is not None
-        turn, ratio = study.statics.normal, drive.ratio / drive.line.ratio
+        turn, ratio = study.setup.statics.normal, drive.ratio / drive.line.ratio
         speed = float(config.run.crank_speed * ratio)
         if not config.file.gives("torsion") and speed < SLOW * modes.k_least:
-            study.say(_LEFT_OUT, speed=speed, k_least=modes.k_least)
+            study.findings.say(_LEFT_OUT, speed=speed, k_least=modes.k_least)
             return None
         inertia = turn.inertia_at(drive.ratio)
         bands = [frequency_band(two_masses(drive, float(end(inertia)))) for end in (np.min, np.max)]

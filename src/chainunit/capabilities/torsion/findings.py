@@ -265,11 +265,11 @@ class TorsionFindings(Findings):
 
     def remark(self, study: StudyRecord) -> None:
         """Add the remarks and notes on the torsion to the study."""
-        study.remarks += self.remarks()
-        steady = shaft_findings(study).answers.get(STEADY)
+        study.findings.remarks += self.remarks()
+        steady = shaft_findings(study.findings).answers.get(STEADY)
         peak = float(self.operating.motion.peak2[0])
         if steady is not None and not 1.0 / APART < steady.tau2_peak / peak < APART:
-            study.say(_OTHER_MOTOR, STEADY, run=steady.tau2_peak, peak=peak)
+            study.findings.say(_OTHER_MOTOR, STEADY, run=steady.tau2_peak, peak=peak)
 
     def remarks(self) -> Iterator[Remark]:
         """The remarks that follow from the analysis alone."""

@@ -24,7 +24,7 @@ turn of the machine."""
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """A text on the line, the tables of its numbers, and the figures."""
-    analysis = TorsionFindings.of_study(study)
+    analysis = TorsionFindings.of_study(study.findings)
     lead = (
         "This section is on the line alone, between the rotor J1 and the machine J4. Shaft 2 belongs to the motor, "
         "shaft 3 to the machine, and a cardan shaft with two joints connects them. Shaft 3 turns i23 times as fast "

@@ -66,7 +66,7 @@ class WatchCapability(Capability):
             ObserverTable,
             optional=True,
             title="Load observer",
-            is_used=lambda study: "observer" in study.findings,
+            is_used=lambda study: "observer" in study.findings.by_analysis,
             apart=True,
         ),
     }

@@ -15,9 +15,8 @@ from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.drive import Drive
 from ...study.organ_limits import slack_and_mode
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudyRuns
 from ...study.remark import note, warning
-from ...study.torques import from_event_on
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,14 +81,14 @@ class ObserverFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of false alarms and of wrong sides, and of chains in place of the bars that the observer knows."""
         if self.alarms_in_steady:
-            study.say(_ALARMS, imbalance=self.steady.imbalance, threshold=self.steady.threshold)
+            study.findings.say(_ALARMS, imbalance=self.steady.imbalance, threshold=self.steady.threshold)
         elif self.alarm_in_start is not None:
-            study.say(_IN_START, time=self.alarm_in_start)
+            study.findings.say(_IN_START, time=self.alarm_in_start)
         wrong = [run for run, side in self.named.items() if side and self.loaded[run] not in ("", side)]
         if wrong:
-            study.say(_WRONG_SIDE, *wrong, where="; ".join(map(study.title_of, wrong)))
+            study.findings.say(_WRONG_SIDE, *wrong, where="; ".join(map(study.runs.title_of, wrong)))
         if self.resonance is not None:
-            study.say(
+            study.findings.say(
                 _NEAR_RESONANCE if self.resonance > CHAINS_GOOD else _TWO_BARS,
                 error=self.steady.error,
                 share=self.resonance,
@@ -138,22 +137,17 @@ class ObserverAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> ObserverFindings | None:
         """The notices, from the runs that the study has made; None without steady running. A start under load is left
         out: the observer learns the loads in it."""
-        if "steady" not in study.answers:
+        if "steady" not in study.runs.answers:
             return None
-        steady, events = study.steady, study.config.events
+        steady, events = study.runs.steady, study.setup.config.events
         normal = peak(steady["machine.rocker.tau"].values)
-        after = {
-            name: from_event_on(study, name)
-            for name in study.event
-            if name in study.answers and not events[name].from_rest
-        }
-        start = study.runs["start_up"].sel(time=slice(None, study.steady_begin))
-        resonance = None
-        if study.drive.machine.in_place:
-            _, mode = slack_and_mode(study.drive.chain_unit, study.config.feed)
-            resonance = study.config.run.crank_speed / mode
+        after = {name: run for name, run in study.runs.event_parts.items() if not events[name].from_rest}
+        start, resonance = study.runs.rise, None
+        if study.setup.drive.machine.in_place:
+            _, mode = slack_and_mode(study.setup.drive.chain_unit, study.setup.config.feed)
+            resonance = study.setup.config.run.crank_speed / mode
         return ObserverFindings(
-            notices={name: dict(_notices(study, name, run, normal)) for name, run in after.items()},
+            notices={name: dict(_notices(study.runs, name, run, normal)) for name, run in after.items()},
             named={name: _side(run) for name, run in after.items()},
             loaded={name: events[name].loaded_side for name in after},
             steady=_observed(steady, normal),
@@ -191,14 +185,14 @@ def _side(run: xr.Dataset) -> str:
     return "" if not first.size else "left" if first[0] > 0.0 else "right"
 
 
-def _notices(study: StudyRecord, name: str, run: xr.Dataset, normal: float) -> Iterator[tuple[str, Notice]]:
+def _notices(runs: StudyRuns, name: str, run: xr.Dataset, normal: float) -> Iterator[tuple[str, Notice]]:
     """The notice of each device that the drive has, by its name. `run` is that of the event from its begin on."""
-    drive, motor, answers = study.drive, study.drive.motor, study.answers[name]
-    time, torque = run["time"].values - study.event[name], np.abs(run["machine.rocker.tau"].values)
+    drive, motor, answers = runs.drive, runs.drive.motor, runs.answers[name]
+    time, torque = run["time"].values - runs.event_times[name], np.abs(run["machine.rocker.tau"].values)
     times: dict[str, float | None] = {}
     if drive.rated_current is not None:
         times["thermal_relay"] = answers.thermal_trip_time
-    if study.config.coupling is not None:
+    if runs.operation.coupling is not None:
         times["torque_limiter"] = answers.coupling_trip_time
     limit = motor.current_limit(drive.parameters)
     if limit is not None:
@@ -207,5 +201,5 @@ def _notices(study: StudyRecord, name: str, run: xr.Dataset, normal: float) -> I
     times["observer"] = _first(time, _is_alarm(run))
     for device, noticed in times.items():
         # a row that is nearer than a millionth of a step is that of the notice
-        until = time[-1] if noticed is None else noticed + 1e-6 * study.config.run.step
+        until = time[-1] if noticed is None else noticed + 1e-6 * runs.operation.run.step
         yield device, Notice(time=noticed, carried=float(np.max(torque[time <= until])) / normal)

@@ -14,7 +14,7 @@ from ...report.cited import cited, number, quantity_rows
 from ...report.lines import filled
 from ...report.pictures import Pictures
 from ...report.runs import by_side, over_runs
-from ...study.record import StudyRecord
+from ...study.record import StudyRecord, StudyRuns
 from .notices import DEVICES, ObserverFindings
 
 PICTURES = Pictures()
@@ -22,33 +22,33 @@ PICTURES = Pictures()
 
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The table of the notices, the estimates in normal running, and a figure of each event."""
-    x = cited(ObserverFindings.of_study(study), "findings.observer")
+    x = cited(ObserverFindings.of_study(study.findings), "findings.observer")
     if x.notices:
         lead = (
             "Times count from the event. Rocker torque: the largest from the event to the notice, in parts of the {} "
             "of normal running; where a device does not notice the event, the largest in the time followed."
         )
         yield b.Text(filled(lead, number(x.steady.rocker_torque)), "lead")
-        yield _who_notices(study, x)
-    steady = quantity_rows(x.steady, study.driver_noun)
+        yield _who_notices(study.runs, x)
+    steady = quantity_rows(x.steady, study.setup.driver_noun)
     yield b.Table(steady, title="The load observer in normal running", form="long")
     yield from PICTURES.figures(study)
 
 
-def _who_notices(study: StudyRecord, x: ObserverFindings) -> b.Table:
-    runs = by_side(study, x.notices)
+def _who_notices(runs: StudyRuns, x: ObserverFindings) -> b.Table:
+    names = by_side(runs, x.notices)
 
     def rows() -> Iterator[b.TableRow]:
         for device, title in DEVICES.items():
-            if device in x.notices[runs[0]]:
-                notices = [x.notices[run][device] for run in runs]
+            if device in x.notices[names[0]]:
+                notices = [x.notices[run][device] for run in names]
                 times = (number(notice.time, none="not") for notice in notices)
                 yield b.TableRow((f"{title}, after", *times))
                 yield b.TableRow(("rocker torque by then", *(number(notice.carried) for notice in notices)))
-        sides = (_named(x.named[run], x.loaded[run]) for run in runs)
+        sides = (_named(x.named[run], x.loaded[run]) for run in names)
         yield b.TableRow(("side that the observer names", *sides))
 
-    return over_runs(study, runs, rows(), "Who notices")
+    return over_runs(runs, names, rows(), "Who notices")
 
 
 def _named(named: str, loaded: str) -> str:
@@ -61,10 +61,10 @@ _FORCE = fig.Axis("processing force", "N")
 _SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
 
 
-@PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices, "observer.png")
+@PICTURES.declare(lambda study: ObserverFindings.of_study(study.findings).notices, "observer.png")
 def _print(study: StudyRecord) -> fig.Figure:
     """All events beside each other, for print."""
-    events = [_event(study, name) for name in ObserverFindings.of_study(study).notices]
+    events = [_event(study, name) for name in ObserverFindings.of_study(study.findings).notices]
     rows = zip(*(figure.panels for figure in events), strict=True)
     panels = (
         tuple(
@@ -77,16 +77,16 @@ def _print(study: StudyRecord) -> fig.Figure:
     return fig.Figure("observers", title, f"{title}: loads and imbalances.", tuple(panels), on_page=False)
 
 
-@PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices)
+@PICTURES.declare(lambda study: ObserverFindings.of_study(study.findings).notices)
 def _events(study: StudyRecord) -> Iterator[fig.Figure]:
-    return (_event(study, name) for name in ObserverFindings.of_study(study).notices)
+    return (_event(study, name) for name in ObserverFindings.of_study(study.findings).notices)
 
 
 def _event(study: StudyRecord, name: str) -> fig.Figure:
     """The estimates of an event over time."""
-    run, notice = study.runs[name], ObserverFindings.of_study(study).notices[name]["observer"]
-    time = run["time"].values - study.event[name]
-    low = max(float(time[0]), -0.5 * math.pi / study.config.run.crank_speed)
+    run, notice = study.runs.series[name], ObserverFindings.of_study(study.findings).notices[name]["observer"]
+    time = run["time"].values - study.runs.event_times[name]
+    low = max(float(time[0]), -0.5 * math.pi / study.setup.config.run.crank_speed)
 
     def loads(load: str) -> Iterator[fig.Item]:
         for look, side in enumerate(SIDES):
@@ -101,7 +101,7 @@ def _event(study: StudyRecord, name: str) -> fig.Figure:
     begin = fig.Mark(0.0, "event", look="thin")
     marks = [begin] if notice.time is None else [begin, fig.Mark(notice.time, "alarm")]
     panels = {_MASS: loads("material_mass"), _FORCE: loads("processing_force"), _SHARE: shares()}
-    title = run_names.title(study, name)
+    title = run_names.title(study.runs, name)
     return fig.Figure(
         f"observer-{name.replace('_', '-')}",
         title[:1].upper() + title[1:],

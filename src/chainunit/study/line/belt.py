@@ -144,12 +144,12 @@ class BeltFindings(Findings):
         """The runs in which the belt slips through."""
         for name, answers in self.answers.items():
             if answers.slipping_time:
-                event = study.config.events.get(name)
+                event = study.setup.config.events.get(name)
                 code = _PROTECTS if event is not None and event.role is Role.SHOCK else _SLIPS
-                study.say(
+                study.findings.say(
                     code,
                     name,
-                    title=study.title_of(name),
+                    title=study.runs.title_of(name),
                     time=answers.slipping_time,
                     torque=self.slip_torque,
                     heat=answers.heat,
@@ -195,10 +195,10 @@ class BeltAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> BeltFindings:
         """The load in each run."""
-        placed = study.drive.line.part(BeltPlan.name)
+        placed = study.setup.drive.line.part(BeltPlan.name)
         assert placed is not None
         table, answers = placed.table, {}
-        for name, run in parts_of_runs(study, placed):
+        for name, run in parts_of_runs(study.runs, placed):
             x = run.variables
             slipping = np.abs(run.speed - run.driven) > SLIPS * table.rated_slip * table.rated_speed
             answers[name] = BeltAnswers(

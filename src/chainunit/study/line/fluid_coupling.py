@@ -91,14 +91,15 @@ class CouplingFindings(Findings):
 
     def remark(self, study: StudyRecord) -> None:
         """The load beside the rated one, the motor in a stall, and the plug."""
-        steady = self.answers[STEADY]
+        steady, findings = self.answers[STEADY], study.findings
         if steady.slip_mean > _MUCH * self.rated_slip:
-            study.say(_TOO_SMALL, STEADY, slip=steady.slip_mean, rated=self.rated_torque)
+            findings.say(_TOO_SMALL, STEADY, slip=steady.slip_mean, rated=self.rated_torque)
         if self.motor_torque is not None and self.stall_torque > self.motor_torque:
-            study.say(_MOTOR_STALLS, stall=self.stall_torque, motor=self.motor_torque)
+            findings.say(_MOTOR_STALLS, stall=self.stall_torque, motor=self.motor_torque)
         for name, answers in self.answers.items():
             if answers.plug_time is not None:
-                study.say(_PLUG, name, title=study.title_of(name), time=answers.plug_time, heat=answers.heat)
+                title = study.runs.title_of(name)
+                findings.say(_PLUG, name, title=title, time=answers.plug_time, heat=answers.heat)
 
 
 _TOO_SMALL = warning(
@@ -153,12 +154,12 @@ class CouplingAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> CouplingFindings:
         """The load in each run."""
-        drive = study.drive
+        drive = study.setup.drive
         placed = drive.line.part(FluidCouplingPlan.name)
         assert placed is not None
         table = placed.table
         rated, answers = table.rated_power / table.rated_speed, {}
-        for name, run in parts_of_runs(study, placed):
+        for name, run in parts_of_runs(study.runs, placed):
             torque = peak(run.variables["tau"])
             answers[name] = CouplingAnswers(
                 torque_peak=torque,
@@ -167,11 +168,11 @@ class CouplingAnalysis(Analysis):
                 slip_largest=float(np.max(run.slip)),
                 loss_mean=run.mean(run.heat),
                 heat=run.sum(run.heat),
-                plug_time=melting(run, table) if name in study.event else None,
+                plug_time=melting(run, table) if name in study.runs.event_times else None,
             )
         motor = None
         if drive.foreign is None:
-            steady = study.window(Phase.STEADY, study.steady)
+            steady = study.runs.window(Phase.STEADY, study.runs.steady)
             motor = motor_pull_out(drive, steady.run, steady.warm)
         return CouplingFindings(rated, table.rated_slip, table.stall_torque, motor, answers)
 

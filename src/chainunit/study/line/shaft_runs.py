@@ -17,7 +17,7 @@ from ...study.transients import follow
 from ...system import rigid
 from ..analysis import Analysis, Findings, Work, is_examined
 from ..drive import Drive
-from ..record import StudyRecord
+from ..record import StudyFindings, StudyRecord, StudyRuns
 from ..remark import note, warning
 from .rigid_line import HOLDS_FROM, RigidLine
 from .shaft import AMPLIFIED, UNEVEN, Cycles, ShaftAnswers, driveline_of, remedies, shaft_answers, with_rigid
@@ -37,10 +37,9 @@ class ShaftFindings(Findings):
         """None: the driveline has its remarks, see `remark`, before the remarks of the findings."""
 
 
-def shaft_findings(study: StudyRecord) -> ShaftFindings:
+def shaft_findings(findings: StudyFindings) -> ShaftFindings:
     """The load of the driveline; empty where the study has none, or failed before."""
-    findings = ShaftFindings.found_in(study) or ShaftFindings({}, {})
-    return findings
+    return ShaftFindings.found_in(findings) or ShaftFindings({}, {})
 
 
 class ShaftAnalysis(Analysis):
@@ -59,49 +58,49 @@ class ShaftAnalysis(Analysis):
         """The load in each run; the torque in the rigid shaft is added to the runs."""
         work.progress("the same with a rigid shaft", 1.0, 1.0)
         try:
-            twins = _rigid_runs(study, work)
+            twins = _rigid_runs(study.runs, work)
         except RunError as error:
             # the error has the values of the rigid drive, not of this one
             error.partial = None
             raise
         for name, twin in twins.items():
-            study.runs[name] = with_rigid(study.drive, study.runs[name], twin)
+            study.runs.series[name] = with_rigid(study.setup.drive, study.runs.series[name], twin)
         return _findings(study, twins)
 
 
-def _rigid_runs(study: StudyRecord, work: Work) -> dict[str, xr.Dataset]:
+def _rigid_runs(runs: StudyRuns, work: Work) -> dict[str, xr.Dataset]:
     """The runs of the rigid drive, at the same times and with the same coupling."""
     rig = replace(work.rig, twin=partial(rigid, line="driveline"))
-    events = {name: study.config.events[name] for name in study.event}
-    runs = {}
+    events = {name: runs.events[name] for name in runs.event_times}
+    twins = {}
     with rig.from_rest() as simulation:
-        runs["start_up"] = simulation.run(work.steady, rig.step)
+        twins["start_up"] = simulation.run(work.steady, rig.step)
         simulation.save()
         for name, event in events.items():
             if not event.from_rest:
-                begin = study.event[name]
-                stop = begin + event.time_followed(study.config.operation.turn)
-                runs[name] = follow(rig, simulation, event, begin, stop, guards=rig.guards).run
+                begin = runs.event_times[name]
+                stop = begin + event.time_followed(runs.operation.turn)
+                twins[name] = follow(rig, simulation, event, begin, stop, guards=rig.guards).run
     for name, event in events.items():
         if event.from_rest:
             with rig.from_rest(event) as simulation:
-                runs[name] = simulation.run(work.steady, rig.step, guards=rig.guards)
-    return runs
+                twins[name] = simulation.run(work.steady, rig.step, guards=rig.guards)
+    return twins
 
 
 def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindings:
-    steady = study.steady
+    setup, runs, steady = study.setup, study.runs, study.runs.steady
     until = slice(None, steady["time"].values[0])
     # the damage of steady running comes first, as that of the other runs is relative to it
-    parts = [("steady", steady, twins["start_up"].sel(time=slice(study.steady_begin, None)))]
-    parts.append(("start_up", study.runs["start_up"].sel(time=until), twins["start_up"].sel(time=until)))
-    for name, begin in study.event.items():
+    parts = [("steady", steady, twins["start_up"].sel(time=slice(runs.steady_begin, None)))]
+    parts.append(("start_up", runs.series["start_up"].sel(time=until), twins["start_up"].sel(time=until)))
+    for name, begin in runs.event_times.items():
         since = slice(begin, None)
-        parts.append((name, study.runs[name].sel(time=since), twins[name].sel(time=since)))
+        parts.append((name, runs.series[name].sel(time=since), twins[name].sel(time=since)))
     answers, cycles, per_turn = {}, {}, None
     for name, run, twin in parts:
         answers[name], cycles[name], damage = shaft_answers(
-            study.drive, run, twin, study.config.values["driveline"].exponent, per_turn
+            setup.drive, run, twin, setup.config.values["driveline"].exponent, per_turn
         )
         per_turn = damage if per_turn is None else per_turn
     return ShaftFindings(answers, cycles)
@@ -109,36 +108,36 @@ def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindi
 
 def remark(study: StudyRecord) -> None:
     """Add to a study with a driveline the remarks on it."""
-    modes = study.statics.modes
+    setup, findings, modes = study.setup, study.findings, study.setup.statics.modes
     if modes is None:
         return
-    line = driveline_of(study.drive)
+    line = driveline_of(setup.drive)
     if line.d2 == 0.0 and line.d3 == 0.0:
-        study.say(_UNDAMPED)
-    fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
+        findings.say(_UNDAMPED)
+    fastest = max((loop.crossover for loop in setup.statics.loops.values()), default=0.0)
     if fastest > modes.antiresonance / 3.0:
-        study.say(
+        findings.say(
             _CONTROL,
             crossover=fastest,
             antiresonance=modes.antiresonance,
             k_least=modes.k_least,
             k_largest=modes.k_largest,
         )
-    if study.statics.rigid_line is not None:
-        _on_rigid_line(study, study.statics.rigid_line)
+    if setup.statics.rigid_line is not None:
+        _on_rigid_line(study, setup.statics.rigid_line)
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
     if unevenness > UNEVEN:
-        study.say(
-            _UNEVEN if is_examined("driveline", study.findings) else _UNEVEN_ALONE,
+        findings.say(
+            _UNEVEN if is_examined("driveline", findings.by_analysis) else _UNEVEN_ALONE,
             least=float(np.min(i)),
             largest=float(np.max(i)),
             unevenness=unevenness,
             way=", and ".join(remedies(line)),
         )
-    for name, shaft in shaft_findings(study).answers.items():
+    for name, shaft in shaft_findings(findings).answers.items():
         if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
-            study.say(_AMPLIFIED, name, title=study.title_of(name), amplification=shaft.amplification)
+            findings.say(_AMPLIFIED, name, title=study.runs.title_of(name), amplification=shaft.amplification)
 
 
 _UNDAMPED = note(
@@ -189,9 +188,9 @@ def _on_rigid_line(study: StudyRecord, rigid_line: RigidLine) -> None:
     if rigid_line.holds:
         return
     taken = ["the turn at constant speed"]
-    taken += ["the speed loop"] if study.statics.loops else []
-    taken += ["the choice of the drive"] if study.proposal is not None else []
-    study.say(
+    taken += ["the speed loop"] if study.setup.statics.loops else []
+    taken += ["the choice of the drive"] if study.setup.proposal is not None else []
+    study.findings.say(
         _NOT_RIGID,
         natural_frequency=rigid_line.natural_frequency,
         driver_frequency=rigid_line.driver_frequency,

@@ -12,7 +12,6 @@ from ...core.quantities import Layout
 from ..analysis import Analysis
 from ..conditions import given
 from ..rules import Rule
-from ..torques import from_event_on
 from ..verdict import START, STEADY
 from .part import PartOfLine
 from .placed import PlacedPart
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..config import FileReading
-    from ..record import StudyRecord
+    from ..record import StudyRuns
 
 _RIGID = ("driveline", "observer", "watch", "identify")
 """Tables whose models have no slip between them and the motor."""
@@ -96,9 +95,7 @@ class SlipRun:
         return float(np.trapezoid(x, self.time))
 
 
-def parts_of_runs(study: StudyRecord, placed: PlacedPart) -> Iterator[tuple[str, SlipRun]]:
+def parts_of_runs(runs: StudyRuns, placed: PlacedPart) -> Iterator[tuple[str, SlipRun]]:
     """Steady running, the start-up, and each event from its begin on, with their names."""
-    pieces = {STEADY: study.steady, START: study.runs[START].sel(time=slice(None, study.steady_begin))}
-    pieces |= {name: from_event_on(study, name) for name in study.event if name in study.runs}
-    for name, run in pieces.items():
+    for name, run in {STEADY: runs.steady, START: runs.rise, **runs.event_parts}.items():
         yield name, SlipRun.read(placed, run)
