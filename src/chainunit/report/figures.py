@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -320,7 +320,7 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         # a quarter turn before the event shows enough of steady running
         before = 0.5 * math.pi / study.config.run.crank_speed
         low = max(low, -before if coasting is None else -min(before, 0.5 * high))
-    marks, title = _marks(study, name, event), run_names.title(study, name)
+    title = run_names.title(study, name)
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
         title,
@@ -328,7 +328,7 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         + ("" if event is None else " The event is marked by a dashed line; the loads change in the shade."),
         fig.stacked(
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
-            ((axis, (*curves, *marks(axis is of_torque))) for axis, curves in items.items()),
+            ((axis, (*curves, *_marks(study, name, axis is of_torque))) for axis, curves in items.items()),
         ),
         _after(study, name) if event is not None else (),
         half=True,
@@ -355,29 +355,25 @@ def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]
     return {_CURRENT: items}
 
 
-def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
-    """The function that gives the marks in a panel of a run; its argument says whether the marks have words."""
-    run = study.runs[name]
-
-    def marks(labelled: bool) -> list[fig.Item]:
-        if event is not None:
-            loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
-            changing = _load_change(
-                run, [*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"]
-            )
-            shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
-            return [*shade, fig.Mark(0.0, words="event" if labelled else "")]
-        if name == "start_up" and study.answers:
-            return [fig.Mark(study.steady_begin, words="steady from here" if labelled else "")]
-        return []
-
-    return marks
+def _marks(study: StudyRecord, name: str, labelled: bool) -> list[fig.Item]:
+    """The marks in a panel of a run, with words if `labelled`: its event, with a shade while loads or supply change,
+    or the begin of steady running in the start-up."""
+    event = run_names.event_time(study, name)
+    if event is not None:
+        changing = _load_change(study, study.runs[name])
+        shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
+        return [*shade, fig.Mark(0.0, words="event" if labelled else "")]
+    if name == "start_up" and study.answers:
+        return [fig.Mark(study.steady_begin, words="steady from here" if labelled else "")]
+    return []
 
 
-def _load_change(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
-    """The first and the last instant at which a load changes [s]; None where none does."""
+def _load_change(study: StudyRecord, run: xr.Dataset) -> tuple[float, float] | None:
+    """The first and the last instant at which a load of the machine or the supply of the motor changes [s]; None if
+    neither does."""
+    loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
     changes = np.zeros(len(run["time"]) - 1, bool)
-    for name in loads:
+    for name in (*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"):
         if name in run:
             changes |= np.diff(run[name].values) != 0.0
     places = np.flatnonzero(changes)

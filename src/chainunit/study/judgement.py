@@ -20,18 +20,17 @@ from .window import Phase
 
 
 def model_verdict(study: StudyRecord) -> Verdict:
-    """The verdict on the model of the machine, from the numbers of the runs."""
-    config, answers = study.config, study.answers
-    steady = answers.get(STEADY)
-    mean = steady.speed_mean if steady else config.run.crank_speed
-    speed, residuals = max(config.run.crank_speed, mean), _residuals(study.certificate)
-    if study.drive.machine.model.sides and not study.drive.foreign_machine:
-        verdict: Verdict = config.organs.verdict(study, speed, mean, residuals)
-        return verdict
-    faults = balance_faults(residuals)
+    """The verdict on the model of the machine, from the numbers of the runs: at the crank speed asked for, or at that
+    of steady running if it is higher."""
+    asked, steady = study.config.run.crank_speed, study.answers.get(STEADY)
+    actual = steady.speed_mean if steady else asked
+    speed, residuals = max(asked, actual), _residuals(study.certificate)
     if study.drive.foreign_machine:
-        return Verdict("energy balance", None, speed, faults, mean)
-    return Verdict("machine", "rigid links", speed, faults, mean, study.driver_noun)
+        return Verdict("energy balance", None, speed, balance_faults(residuals), actual)
+    if study.drive.machine.model.sides:
+        verdict: Verdict = study.config.organs.verdict(study, speed, actual, residuals)
+        return verdict
+    return Verdict("machine", "rigid links", speed, balance_faults(residuals), actual, study.driver_noun)
 
 
 def wrong_runs(study: StudyRecord) -> list[str]:

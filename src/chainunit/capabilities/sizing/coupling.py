@@ -25,30 +25,34 @@ if TYPE_CHECKING:
 
 
 def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCoupling] = ()) -> Setting | None:
-    """The recommended torque limiter of a sized drive, judged by the events of the study. None where no motor fits,
-    where the file gives a coupling, as that one cuts off the peaks from which the setting follows, or where the study
-    ended before steady running. One of the `couplings` of a catalogue that can be set so is tried with its own
-    release time."""
+    """The recommended torque limiter of a sized drive, judged by the events of the study, with its effects in the
+    overloads that open it. None if no motor fits, if the file gives a coupling, which cuts off the peaks from which
+    the setting follows, or if the study ended before steady running.
+
+    Runs whose energy balance is not kept are left out; with one of normal duty among them there are no overloads. A
+    product among the `couplings` of a catalogue that can be set so is tried with its own release time.
+    """
     if study.insufficient or study.config.coupling or STEADY not in study.answers:
         return None
     events, wrong = study.config.events, wrong_runs(study)
-    normal = [n for n in wrong if n not in events or events[n].from_rest or events[n].role is Role.DUTY]
-    shocks = peaks_in_events(study, Role.SHOCK)
+    wrong_duty = [n for n in wrong if n not in events or events[n].from_rest or events[n].role is Role.DUTY]
+    shocks, disturbances = (peaks_in_events(study, role) for role in (Role.SHOCK, Role.DISTURBANCE))
     setting = Setting(
         running=running_peak(study).torque,
         start=hardest_start(study).torque,
         motor=pull_out(study),
         gear=study.config.drive.gear.torque_limit,
         line=study.drive.at_crank(study.drive.line.stall_torque),
-        overloads={} if normal else {n: peak for n, peak in shocks.items() if n not in wrong},
-        disturbances={n: x for n, x in peaks_in_events(study, Role.DISTURBANCE).items() if n not in wrong},
-        wrong=normal or [n for n in wrong if n in shocks],
+        overloads={} if wrong_duty else {n: peak for n, peak in shocks.items() if n not in wrong},
+        disturbances={n: peak for n, peak in disturbances.items() if n not in wrong},
+        wrong=wrong_duty or [n for n in wrong if n in shocks],
     )
     if setting.obstacle is not None:
         return setting
-    sold = coupling_of(study, setting, couplings)
-    tried = effects(study, setting.least, release=None if sold is None else float(sold.data.release_time))
-    return replace(setting, effects={n: tried[n] for n in setting.opens})
+    product = coupling_of(study, setting, couplings)
+    release = None if product is None else float(product.data.release_time)
+    by_shock = effects(study, setting.least, release=release)
+    return replace(setting, effects={n: by_shock[n] for n in setting.opens})
 
 
 def coupling_of(
