@@ -86,24 +86,32 @@ class StartFindings(Findings):
         return float(self.worst.quasi_static / self.running)
 
     def remark(self, study: StudyRecord) -> None:
-        """Warn of a start that the gear does not carry, or that puts much more on it than running does, and of angles
-        from which the motor does not start."""
-        worst, start = self.worst, _STARTERS[study.config.drive.start]
+        """Warn of a start that is hard on the gear, of a motor that hunts, and of angles from which it does not
+        start."""
+        self._on_gear(study)
+        self._on_hunting(study)
+        if self.stuck:
+            angles = " and ".join(number(start.angle, "rad") for start in self.stuck)
+            is_soft = study.config.drive.start == "soft"
+            ramp = ", or a higher voltage of the soft starter" if is_soft else ""
+            study.say(_NO_START, START, where=angles, ramp=ramp)
+
+    def _on_gear(self, study: StudyRecord) -> None:
+        """Warn of a start that the gear does not carry, or, if its limit is not known, that puts much more on it than
+        running does."""
+        worst, starter = self.worst, study.config.drive.start
         numbers: dict[str, Any] = {
-            "start": start,
+            "start": _STARTERS[starter],
             "torque": worst.quasi_static,
             "angle": worst.angle,
             "transient": transient_words(study),
             "most": self.transient,
-            "softer": SOFTER[study.config.drive.start],
+            "softer": SOFTER[starter],
         }
+        large = START_FACTOR * self.running
         if worst.quasi_static > self.limit:
             study.say(_OVER_LIMIT, START, limit=self.limit, **numbers)
-        elif (
-            study.drive.is_geared
-            and math.isinf(self.limit)
-            and worst.quasi_static > START_FACTOR * self.running
-        ):
+        elif study.drive.is_geared and math.isinf(self.limit) and worst.quasi_static > large:
             study.say(
                 _OVER_RUNNING,
                 START,
@@ -113,23 +121,17 @@ class StartFindings(Findings):
                 running_in=running_words(study, self.running_in),
                 **numbers,
             )
-        hunting = max(self.starts, key=lambda start: start.backwards)
-        if study.drive.follows and study.plate is not None and hunting.backwards > BACKWARDS:
+
+    def _on_hunting(self, study: StudyRecord) -> None:
+        """Warn of a motor on an inverter that turns backwards in a start."""
+        worst = max(self.starts, key=lambda start: start.backwards)
+        if study.drive.follows and study.plate is not None and worst.backwards > BACKWARDS:
             p = study.drive.fmu_parameters
             usual, boost = usual_boost(p, study.plate.nameplate), float(p.inverter.boost)
             least = f"to {number(usual, '1', 'percent')} for this motor"
             if boost <= usual:
                 least = f"below {number(boost, '1', 'percent')}"
-            study.say(_HUNTS, START, backwards=hunting.backwards, angle=hunting.angle, least=least)
-        if self.stuck:
-            study.say(
-                _NO_START,
-                START,
-                where=" and ".join(number(stuck_start.angle, "rad") for stuck_start in self.stuck),
-                ramp=", or a higher voltage of the soft starter"
-                if study.config.drive.start == "soft"
-                else "",
-            )
+            study.say(_HUNTS, START, backwards=worst.backwards, angle=worst.angle, least=least)
 
 
 _PUTS = "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and acceleration"
