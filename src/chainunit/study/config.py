@@ -375,16 +375,12 @@ _OF_DRIVE = ("gear", "starter", "flywheel")
 
 
 def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: FileContents) -> Config:
-    """The study of a file each of whose values is allowed."""
+    """The study of a file each of whose values is allowed: first its parts, whose faults are refused together, then
+    the whole, in which parts may not fit each other. An optional table that the file leaves out is None."""
     sections, faults = parts.sections, Faults()
     data, source = contents.tables, contents.source
     tables, values = _read_sections(sections, checked, faults)
     faults.add(check_order(values))
-    of_study: dict[str, Any] = {
-        name: values[name] if name in data or not section.optional else None
-        for name, section in sections.items()
-        if name not in _OF_PARTS
-    }
     catalogues: tuple[Path, ...] = ()
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
         catalogues = catalogues_of(checked.catalogue, source)
@@ -403,11 +399,14 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
         with faults.collected():
             plans[capability.name] = capability.plan(reading)
     faults.refuse()
-    for name, table in of_study.items():
-        of_study[name] = None if table is None else sections[name].completed(table, reading)
+    completed: dict[str, Any] = {
+        name: section.completed(values[name], reading) if name in data or not section.optional else None
+        for name, section in sections.items()
+        if name not in _OF_PARTS
+    }
     config = Config(
         title=checked.title,
-        machine=organ_models()[checked.organ].machine(machine, of_study),
+        machine=organ_models()[checked.organ].machine(machine, completed),
         motor=_motor(data, parts, checked, values["motor"], plate, source),
         drive=DriveTables(
             feed_forward=checked.feed_forward,
@@ -415,19 +414,18 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
             given=contents.given,
             flywheel_shaft=FlywheelShaft(checked.flywheel.place, float(values["flywheel"].turns)),
             line=tuple(plan for plan in plans.values() if isinstance(plan, SlipPlan)),
-            **{name: of_study[name] for name in _OF_DRIVE},
+            **{name: completed[name] for name in _OF_DRIVE},
         ),
         events=events,
         empty_start=checked.empty_start,
         simulation=checked.simulation,
         file=dataclasses.replace(contents, catalogues=catalogues),
         units=chosen_units(checked.report.units),
-        values={name: x for name, x in of_study.items() if name not in (*_OWN_TABLES, *_OF_DRIVE)},
+        values={name: table for name, table in completed.items() if name not in (*_OWN_TABLES, *_OF_DRIVE)},
         plans=plans,
-        **{name: of_study[name] for name in _OWN_TABLES},
+        **{name: completed[name] for name in _OWN_TABLES},
     )
-    known_motor = not parts.file
-    faults.add(loads_beyond(machine.model, config.feed, events, plans, known_motor=known_motor))
+    faults.add(loads_beyond(machine.model, config.feed, events, plans, known_motor=not parts.file))
     for capability in registered():
         faults.add(capability.faults(config))
     faults.add(endless(config.operation, events, plans))

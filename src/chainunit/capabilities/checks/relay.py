@@ -113,18 +113,26 @@ def stall_heat(
     stall_current: float,
     after: float | None = None,
 ) -> StallHeat | None:
-    """An event: the trip of the slowest relay of a class, and the heat of the motor until then. `time` [s] since the
-    event and `current` [A] are of shape (n,); the current flows on as `lasting_current` says. None if the relay never
-    trips."""
+    """The trip of the slowest relay of a class in an event, and the heat of the motor until then; None if the relay
+    never trips.
+
+    Parameters
+    ----------
+    time, current : of the run since the event [s, A], shape (n,)
+    setting : of the relay [A]
+    before : RMS current before the event [A]
+    stall_current : current with the rotor locked [A]; the heat is the time for which it would make the same heat
+    after : current after the run [A], see `lasting_current`
+    """
     if before >= TRIPS_AT * setting:
         return None
-    lasts = lasting_current(current, after)
-    trip = relay_trip(time, current, setting, before, lasts, relay_class.longest)
+    lasting = lasting_current(current, after)
+    trip = relay_trip(time, current, setting, before, lasting, relay_class.longest)
     if trip is None:
         return None
     until = time <= trip
     heat = float(np.trapezoid((current[until] / stall_current) ** 2, time[until]))
-    heat += max(0.0, trip - float(time[-1])) * (lasts / stall_current) ** 2
+    heat += max(0.0, trip - float(time[-1])) * (lasting / stall_current) ** 2
     return StallHeat(trip_time=trip, seconds=heat)
 
 
