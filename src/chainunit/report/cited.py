@@ -123,6 +123,7 @@ def quantity_rows(
 
 
 def _numbers(cited_result: object) -> Iterator[tuple[ResultPart, Number]]:
+    """The numbers of a cited result with their declarations, without optional ones that are None."""
     assert isinstance(cited_result, _Cited), cited_result
     for name, declared in cited_result._parts.items():
         if declared.unit:

@@ -98,8 +98,25 @@ _GIVEN_DRIVE = (
 
 
 def _question(study: StudyRecord) -> Iterator[b.Block]:
+    """What the study is about: the question in words, the given values in short, and the drawing of the machine."""
     # a linkage has its title in place of a noun
     noun = f"this {study.noun}" if study.noun[:1].islower() else f'the machine "{study.noun}"'
+    yield b.Text(_question_text(study, noun), form="long")
+    is_chosen, driver = study.proposal is not None, study.driver_noun
+    rows: list[b.TableRow] = [] if is_chosen else [b.TableRow(("motor", motor_title(study)))]
+    rows += quantity_rows(run_settings(study), driver, only="crank_speed", as_given=True)
+    machine = cited(study.drive.machine.p, "given.machine")
+    rows += () if is_chosen else quantity_rows(machine, driver, only="ratio", as_given=True)
+    rows += quantity_rows(cited(study.config.feed, "given.feed"), driver, as_given=True)
+    yield b.Table(tuple(rows), title="In short", form="long")
+    if not study.drive.foreign_machine:
+        alt, model = f"{capital(noun)}: its pins, links and dimensions", study.drive.machine.model
+        caption = filled(of_driver(_DRAWING_CAPTION, driver), model.angle_counts)
+        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, caption)
+
+
+def _question_text(study: StudyRecord, noun: str) -> Line:
+    """The question in words, with the runs by which it is answered; `noun` stands for the machine."""
     if study.proposal is None:
         question = filled(
             of_driver(_GIVEN_DRIVE, study.driver_noun),
@@ -126,20 +143,7 @@ def _question(study: StudyRecord) -> Iterator[b.Block]:
             sentence = " Then come {} overloads at random, each by itself: {}."
             counted = exact(cited(InUnit(plan.runs, "1"), f"findings.{plan.table}.runs"))
             question += filled(sentence, counted, plan.event.title)
-    yield b.Text(question, form="long")
-    is_chosen, feed = study.proposal is not None, study.config.feed
-    rows: list[b.TableRow] = []
-    if not is_chosen:
-        rows.append(b.TableRow(("motor", motor_title(study))))
-    driver, machine = study.driver_noun, cited(study.drive.machine.p, "given.machine")
-    rows += quantity_rows(run, driver, only="crank_speed", as_given=True)
-    rows += () if is_chosen else quantity_rows(machine, driver, only="ratio", as_given=True)
-    rows += quantity_rows(cited(feed, "given.feed"), driver, as_given=True)
-    yield b.Table(tuple(rows), title="In short", form="long")
-    if not study.drive.foreign_machine:
-        alt, model = f"{capital(noun)}: its pins, links and dimensions", study.drive.machine.model
-        caption = filled(of_driver(_DRAWING_CAPTION, study.driver_noun), model.angle_counts)
-        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, caption)
+    return question
 
 
 def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -247,6 +251,7 @@ def software(study: StudyRecord) -> b.Table:
 
 
 def _certificate(study: StudyRecord) -> Iterator[b.Block]:
+    """The energy certificate: a table by run, and for each of its shares the largest one."""
     shares = {
         run: {
             name: Number(finite(share), "1", path=f"runs.certificate.{run}.{name}")

@@ -79,6 +79,8 @@ def machine_state(study: StudyRecord, part: Any) -> MachineState:
 
 
 def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement) -> Clip:
+    """The clip of a run at equal `interval`s [s]; `supplement` has what the model of the machine adds to its
+    picture."""
     run, drive = study.runs[name], study.drive
     model = drive.machine.model
     time = run["time"].values

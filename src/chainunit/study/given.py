@@ -105,6 +105,8 @@ def _system(choices: Mapping[str, Any], *, is_chosen: bool) -> dict[str, Any]:
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
+    """The declared tables that the study uses, with their values, and their random overloads as sections of their
+    own."""
     config = study.config
     randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():

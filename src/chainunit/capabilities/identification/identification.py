@@ -302,6 +302,7 @@ def _same_rows(first: Recording, second: Recording) -> bool:
 def _problem(
     loads: Any, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
 ) -> Problem:
+    """The problem of the recordings: the plant with the columns that they measure, their runs, and the sensors."""
     sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
     measured = dict.fromkeys(
         name for recording in recordings.values() for name in recording.columns if name != "mark"
@@ -340,6 +341,8 @@ def _run(
 def _sensors(
     plan: IdentificationPlan, measured: Mapping[str, Any], recordings: Mapping[str, Recording]
 ) -> dict[str, Sensor]:
+    """By analog column, what is known of its sensor; an offset that the file does not give is the usual one of the
+    size of the column."""
     sensors = {}
     for name in measured:
         if not MEASURANDS[name].analog:

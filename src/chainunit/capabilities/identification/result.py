@@ -213,6 +213,7 @@ def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
 
 
 def _number(machine: IdentifiedMachine, estimate: FittedNumber) -> IdentifiedNumber:
+    """A sought number: as fitted, as known before, and as sharp as was expected at the start values."""
     variable = machine.plan.variables[estimate.unknown.name]
     name, start = system_name(estimate.unknown.name), machine.information_at_start
     before = next(one for one in start.determinations if one.name == name)
@@ -254,6 +255,7 @@ def _sum(machine: IdentifiedMachine, combination: Combination) -> DeterminedSum:
 
 
 def _unseen_change(machine: IdentifiedMachine, direction: Combination) -> UnseenChange:
+    """A change of numbers that leaves no trace in any column, in words and by its terms."""
     units = {system_name(u.name): u.unit for u in machine.plan.sought}
     changes = [
         f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"

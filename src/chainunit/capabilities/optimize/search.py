@@ -382,6 +382,9 @@ class Search:
         point: Solution,
         worst: float,
     ) -> Answer:
+        """The answer at a solution. `slacks` are the misses of an elastic program by their limits, and `worst` is the
+        most by which a limit is exceeded between the angles, over its scale. IPOPT's multipliers become derivatives
+        by the limits."""
         n, span = self.columns.size, self.columns.span
         # the inner points of IPOPT end a little off the bounds
         y = point.z[:n]

@@ -141,6 +141,7 @@ def _faults(
 
 
 def _run(check: Inspection, fmu: UnpackedFmu, experiments: ex.Experiments, limit: float) -> None:
+    """Run the experiments, and add a finding for each: it holds up to the `limit` of the deviation."""
     try:
         if sentence := make_runnable(fmu):
             check.add(None, "library", sentence, "its own library was not run")

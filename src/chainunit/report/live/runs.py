@@ -191,6 +191,7 @@ def _quantities(
 
 
 def _tables(drive: Drive, operation: OperatingConditions) -> Iterator[LiveQuantity]:
+    """The ramp and the torque limiter, if the drive has them."""
     if drive.follows:
         ramp = variable_of(Run, "ramp")
         yield LiveQuantity(("run", "ramp"), ramp, float(operation.run.ramp), "drive", role="ramp")
