@@ -136,6 +136,7 @@ def _peak(study: StudyRecord, pin: str) -> Number:
 
 
 def _pins(study: StudyRecord) -> b.Table:
+    """The forces in the bearings: in steady running, or else in the first run, and the largest peak of all runs."""
     reference = "steady" if "steady" in study.pins else next(iter(study.pins))
     tables = study.pins[reference]
     sizes = list(next(iter(tables.values())))

@@ -510,19 +510,22 @@ def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str,
     try:
         return make(parts.machine, parameters)
     except InputError as error:
-        model, spoil = parts.machine, dict[str, str]()
-        names = error.names if isinstance(error, GeometryError) else ()
-        if isinstance(error, GeometryError):
-            spoil = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
-        # the value that spoils the machine, and not one whose range that value sets
-        key = next((f"machine.{name}" for name in (*spoil, *names) if name in parameters), "machine")
-        declared = Layout(model.Parameters).by_name(model.Parameters())
-        taken = (
-            f"{name} = {declared[name]:g}" for name in names if name in declared and name not in parameters
-        )
-        line = f"machine: {error}"
-        if listed := ", ".join(taken):
-            line += f"; not in the file, so at the declared start value: {listed}"
-        if spoil:
-            line += f"; with all other values as they are, {', or '.join(spoil.values())}"
-        raise InputError(line, key=key) from error
+        raise _refused_machine(error, parts.machine, parameters) from error
+
+
+def _refused_machine(error: InputError, model: MachineModel, parameters: dict[str, float]) -> InputError:
+    """The refusal of a machine with these `parameters` of its file: the error, the values at fault that the file
+    leaves out, and the values that would do, if there is one."""
+    names, remedies = error.names if isinstance(error, GeometryError) else (), dict[str, str]()
+    if isinstance(error, GeometryError):
+        remedies = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
+    # the value that spoils the machine, and not one whose range that value sets
+    key = next((f"machine.{name}" for name in (*remedies, *names) if name in parameters), "machine")
+    declared = Layout(model.Parameters).by_name(model.Parameters())
+    left_out = [name for name in names if name in declared and name not in parameters]
+    text = f"machine: {error}"
+    if listed := ", ".join(f"{name} = {declared[name]:g}" for name in left_out):
+        text += f"; not in the file, so at the declared start value: {listed}"
+    if remedies:
+        text += f"; with all other values as they are, {', or '.join(remedies.values())}"
+    return InputError(text, key=key)

@@ -303,11 +303,7 @@ def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = Non
     """Keys that are no quantities, from their pydantic fields, with these `values` or their defaults."""
     for name, (annotation, field) in fields.items():
         value = field.default if values is None else values.get(name)
-        base, limits = annotation, list[Any]()
-        while typing.get_origin(base) is typing.Annotated:
-            base, *inner = typing.get_args(base)
-            limits += inner
-        lengths = [limit.max_length for extra in limits for limit in getattr(extra, "metadata", ())]
+        base, limits = _parted(annotation)
         sort = _sort(base)
         left_out = f'"{value}"' if value and sort not in ("switch", "table") else ""
         if sort == "switch" and value is not None:
@@ -318,9 +314,18 @@ def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = Non
             words=_choices(base),
             sort=sort,
             left_out=left_out,
-            items=next((extra for extra in limits if isinstance(extra, Variable)), None),
-            most=max(lengths, default=0),
+            items=next((limit for limit in limits if isinstance(limit, Variable)), None),
+            most=max((x.max_length for limit in limits for x in getattr(limit, "metadata", ())), default=0),
         )
+
+
+def _parted(annotation: Any) -> tuple[Any, list[Any]]:
+    """The type of a field, and its limits: what ``Annotated`` adds to the type."""
+    limits: list[Any] = []
+    while typing.get_origin(annotation) is typing.Annotated:
+        annotation, *inner = typing.get_args(annotation)
+        limits += inner
+    return annotation, limits
 
 
 def _sort(annotation: Any) -> Sort:

@@ -492,6 +492,7 @@ def _over_the_way(f: LinkageFindings) -> dict[str, InUnit]:
 
 
 def _at_rest(f: LinkageFindings) -> LinkageAtRest:
+    """The equilibria, and the holding force, its friction and the potential over the way of the driver."""
     equilibria, unit = f.rest, f.machine.model.driver_port.unit
     rest = equilibria.rest
     columns: dict[str, Any] = {

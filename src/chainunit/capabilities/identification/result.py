@@ -197,6 +197,7 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
 
 
 def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
+    """A run as it was identified: its recording and its conditions."""
     run, recording = machine.plan.runs[k], machine.problem.runs[k].recording
     return IdentifiedRun(
         file=str(run.file),
@@ -214,10 +215,9 @@ def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
 
 def _number(machine: IdentifiedMachine, estimate: FittedNumber) -> IdentifiedNumber:
     """A sought number: as fitted, as known before, and as sharp as was expected at the start values."""
-    variable = machine.plan.variables[estimate.unknown.name]
-    name, start = system_name(estimate.unknown.name), machine.information_at_start
-    before = next(one for one in start.determinations if one.name == name)
-    unknown, unit = estimate.unknown, variable.unit
+    unknown, variable = estimate.unknown, machine.plan.variables[estimate.unknown.name]
+    name, unit = system_name(unknown.name), variable.unit
+    at_start = next(entry for entry in machine.information_at_start.determinations if entry.name == name)
     return IdentifiedNumber(
         unit,
         variable.kind,
@@ -232,8 +232,8 @@ def _number(machine: IdentifiedMachine, estimate: FittedNumber) -> IdentifiedNum
         given_deviation=difference(unknown.prior_deviation, unit),
         least=unknown.low,
         most=unknown.high,
-        expected=difference(before.by_both, unit),
-        by_runs=difference(before.by_runs, unit),
+        expected=difference(at_start.by_both, unit),
+        by_runs=difference(at_start.by_runs, unit),
     )
 
 
