@@ -67,7 +67,7 @@ class _Citation(NamedTuple):
             return Words(value, path)
         if unit == GIVEN:
             return value
-        if isinstance(value, list | tuple) or (unit and getattr(value, "ndim", 0)):
+        if isinstance(value, list | tuple) or (unit and getattr(value, "ndim", False)):
             # numbers with a unit are the entry "value" beside "unit", once for all lists in a list
             place = f"{path}.value" if unit and ".value." not in path else path
             return [self.piece(entry, f"{place}.{k}", unit, kind) for k, entry in enumerate(value)]

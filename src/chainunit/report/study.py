@@ -73,14 +73,11 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
 def _report(
     study: StudyRecord, result: Mapping[str, Any], sections: Iterable[b.Section], source: Line = ()
 ) -> b.Report:
-    config, failure = study.config, _failure(study)
+    config = study.config
+    failure = () if study.failure is None else cited(str(study.failure), "failure")
     return b.Report(
         config.title, study.kind, result, (), tuple(sections), source, failure, units=config.units
     )
-
-
-def _failure(study: StudyRecord) -> Line:
-    return () if study.failure is None else cited(str(study.failure), "failure")
 
 
 def _motion(study: StudyRecord) -> list[b.Block]:

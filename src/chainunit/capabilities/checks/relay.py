@@ -113,17 +113,10 @@ def stall_heat(
     stall_current: float,
     after: float | None = None,
 ) -> StallHeat | None:
-    """The trip of the slowest relay of a class in an event, and the heat of the motor until then; None if the relay
-    never trips.
-
-    Parameters
-    ----------
-    time, current : of the run since the event [s, A], shape (n,)
-    setting : of the relay [A]
-    before : RMS current before the event [A]
-    stall_current : current with the rotor locked [A]; the heat is the time for which it would make the same heat
-    after : current after the run [A], see `lasting_current`
-    """
+    """The trip of the slowest relay of a class, set to `setting` [A], in an event, and the heat of the motor until
+    then, as time with its `stall_current` [A]; None if the relay never trips. The run has the `time` since the event
+    [s] and the `current` [A], shape (n,); `before` is the RMS current before it [A], for `after` see
+    `lasting_current`."""
     if before >= TRIPS_AT * setting:
         return None
     lasting = lasting_current(current, after)

@@ -72,8 +72,8 @@ class Thresholds:
     def of(cls, watched: WatchedRecording, settled: Any) -> Thresholds:
         """The thresholds at the `settled` rows, without the outermost 2 % of them at either end."""
         columns = (watched.outputs[f"imbalance.{ground}_threshold"][settled] for ground in GROUNDS)
-        ends = [float(x) for column in columns for x in np.percentile(column, [2.0, 98.0])]
-        return cls(*ends, *watched.uncertainty, *watched.widening)
+        feed, force = (map(float, np.percentile(column, [2.0, 98.0])) for column in columns)
+        return cls(*feed, *force, *watched.uncertainty, *watched.widening)
 
 
 @result
