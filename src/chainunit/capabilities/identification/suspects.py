@@ -382,7 +382,7 @@ class _Freed:
         return {self._names[k]: self._more[k].start + float(x) for k, x in zip(places, changes, strict=True)}
 
     def point(self, names: Collection[str]) -> dict[str, float]:
-        """The same with the values of all other unknowns that follow."""
+        """The best values of these numbers, as of `values`, and of all other unknowns, which follow them."""
         values = self.values(names)
         pairs = zip(self._more, self._now, strict=True)
         steps = [values.get(u.name, u.start) - u.start - now for u, now in pairs]

@@ -11,6 +11,7 @@ import numpy as np
 from ...drives.catalogue_couplings import CatalogueCoupling
 from ...study.arrays import peak
 from ...study.coupling import at_motor_shaft, hardest_start, pull_out
+from ...study.drive import Drive
 from ...study.event import Role
 from ...study.judgement import wrong_runs
 from ...study.record import StudyRecord
@@ -77,25 +78,37 @@ def effects(
     if runs is None:
         names = peaks_in_events(study, Role.SHOCK)
         runs = {name: from_event_on(study, name) for name in names}
-    by_shock = {}
-    for name, run in runs.items():
-        time, torque = run["time"].values, drive.at_crank(np.abs(run[drive.motor_torque].values))
-        passed = np.flatnonzero(torque > setting)
-        if not passed.size:
-            continue
-        k = int(passed[0])
-        before = slice(max(k - 1, 0), k + 1)
-        trip = float(np.interp(setting, torque[before], time[before]))
-        end = trip + release
-        # up to the opening the run is the same as without the coupling
-        until = run.sel(time=slice(None, end))
-        rows = until.sizes["time"]
-        last = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
-        without = at_gear(drive, run)
-        wanted = goal(without, study.config.drive.gear.torque_limit)
-        above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
-        in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
-        with_coupling = max(at_gear(drive, until), at_gear(drive, last))
-        current = peak(until[f"motor.{drive.motor.current}"].values)
-        by_shock[name] = CouplingEffect(without, with_coupling, wanted, in_time, current)
-    return by_shock
+    trips = {name: _trip_time(drive, run, setting) for name, run in runs.items()}
+    return {
+        name: _effect(study, runs[name], trip, release) for name, trip in trips.items() if trip is not None
+    }
+
+
+def _trip_time(drive: Drive, run: xr.Dataset, setting: float) -> float | None:
+    """The time at which the torque of the motor's shaft passes the `setting` [N m at the crank]; None if it never
+    does."""
+    time, torque = run["time"].values, drive.at_crank(np.abs(run[drive.motor_torque].values))
+    passed = np.flatnonzero(torque > setting)
+    if not passed.size:
+        return None
+    around = slice(max(int(passed[0]) - 1, 0), int(passed[0]) + 1)
+    return float(np.interp(setting, torque[around], time[around]))
+
+
+def _effect(study: StudyRecord, run: xr.Dataset, trip: float, release: float) -> CouplingEffect:
+    """The effect of a coupling that opens at the time `trip` [s] in a `run` without one; until no torque passes it any
+    more, both runs are the same."""
+    drive, time, end = study.drive, run["time"].values, trip + release
+    until = run.sel(time=slice(None, end))
+    rows = until.sizes["time"]
+    at_end = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
+    without = at_gear(drive, run)
+    wanted = goal(without, study.config.drive.gear.torque_limit)
+    above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
+    return CouplingEffect(
+        without,
+        with_coupling=max(at_gear(drive, until), at_gear(drive, at_end)),
+        goal=wanted,
+        release=max(float(time[max(above - 1, 0)]) - trip, 0.0),
+        current=peak(until[f"motor.{drive.motor.current}"].values),
+    )

@@ -72,8 +72,10 @@ class Thresholds:
     def of(cls, watched: WatchedRecording, settled: Any) -> Thresholds:
         """The thresholds at the `settled` rows, without the outermost 2 % of them at either end."""
         columns = (watched.outputs[f"imbalance.{ground}_threshold"][settled] for ground in GROUNDS)
-        feed, force = (map(float, np.percentile(column, [2.0, 98.0])) for column in columns)
-        return cls(*feed, *force, *watched.uncertainty, *watched.widening)
+        (feed_least, feed_most), (force_least, force_most) = (
+            map(float, np.percentile(column, [2.0, 98.0])) for column in columns
+        )
+        return cls(feed_least, feed_most, force_least, force_most, *watched.uncertainty, *watched.widening)
 
 
 @result
