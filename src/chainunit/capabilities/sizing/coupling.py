@@ -96,8 +96,8 @@ def _trip_time(drive: Drive, run: xr.Dataset, setting: float) -> float | None:
 
 
 def _effect(study: StudyRecord, run: xr.Dataset, trip: float, release: float) -> CouplingEffect:
-    """The effect of a coupling that opens at the time `trip` [s] in a `run` without one; until no torque passes it any
-    more, both runs are the same."""
+    """The effect of a coupling that opens at the time `trip` [s] in a `run` without one. Both runs are the same until
+    no torque passes it any more."""
     drive, time, end = study.drive, run["time"].values, trip + release
     until = run.sel(time=slice(None, end))
     rows = until.sizes["time"]
