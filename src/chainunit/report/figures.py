@@ -360,7 +360,7 @@ def _marks(study: StudyRecord, name: str, labelled: bool) -> list[fig.Item]:
     or the begin of steady running in the start-up."""
     event = run_names.event_time(study, name)
     if event is not None:
-        changing = _load_change(study, study.runs[name])
+        changing = _load_change(study.drive, study.runs[name])
         shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
         return [*shade, fig.Mark(0.0, words="event" if labelled else "")]
     if name == "start_up" and study.answers:
@@ -368,10 +368,10 @@ def _marks(study: StudyRecord, name: str, labelled: bool) -> list[fig.Item]:
     return []
 
 
-def _load_change(study: StudyRecord, run: xr.Dataset) -> tuple[float, float] | None:
+def _load_change(drive: Drive, run: xr.Dataset) -> tuple[float, float] | None:
     """The first and the last instant at which a load of the machine or the supply of the motor changes [s]; None if
     neither does."""
-    loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
+    loads = (name for name in drive.machine.model.input_layout.names if name not in _MOTION)
     changes = np.zeros(len(run["time"]) - 1, bool)
     for name in (*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"):
         if name in run:

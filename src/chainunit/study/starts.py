@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..core.quantities import quantity
+from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import START_FACTOR
 from ..reading.results import derived, part, result
 from ..reading.text import number
@@ -89,7 +90,10 @@ class StartFindings(Findings):
         """Warn of a start that is hard on the gear, of a motor that hunts, and of angles from which it does not
         start."""
         self._on_gear(study)
-        self._on_hunting(study)
+        if study.drive.follows and study.plate is not None:
+            hunting = self._hunting(study.drive, study.plate)
+            if hunting is not None:
+                study.say(_HUNTS, START, **hunting)
         if self.stuck:
             angles = " and ".join(number(start.angle, "rad") for start in self.stuck)
             is_soft = study.config.drive.start == "soft"
@@ -122,16 +126,17 @@ class StartFindings(Findings):
                 **numbers,
             )
 
-    def _on_hunting(self, study: StudyRecord) -> None:
-        """Warn of a motor on an inverter that turns backwards in a start."""
+    def _hunting(self, drive: Drive, plate: CatalogueMotor) -> dict[str, Any] | None:
+        """The values of the warning of a motor on an inverter that turns backwards in a start; None for others."""
         worst = max(self.starts, key=lambda start: start.backwards)
-        if study.drive.follows and study.plate is not None and worst.backwards > BACKWARDS:
-            p = study.drive.fmu_parameters
-            usual, boost = usual_boost(p, study.plate.nameplate), float(p.inverter.boost)
-            least = f"to {number(usual, '1', 'percent')} for this motor"
-            if boost <= usual:
-                least = f"below {number(boost, '1', 'percent')}"
-            study.say(_HUNTS, START, backwards=worst.backwards, angle=worst.angle, least=least)
+        if not worst.backwards > BACKWARDS:
+            return None
+        p = drive.fmu_parameters
+        usual, boost = usual_boost(p, plate.nameplate), float(p.inverter.boost)
+        least = f"to {number(usual, '1', 'percent')} for this motor"
+        if boost <= usual:
+            least = f"below {number(boost, '1', 'percent')}"
+        return {"backwards": worst.backwards, "angle": worst.angle, "least": least}
 
 
 _PUTS = "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and acceleration"

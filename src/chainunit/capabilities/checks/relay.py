@@ -8,7 +8,7 @@ must not trip it, and as slow as the other, where it must still save the motor.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -227,22 +227,16 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings |
         # the hardest of the starts from all crank angles, which are for a relay at the rated current
         times = share * drive.rated_current / settings["setting"]
         seconds = max(seconds, starts.relay_seconds * times**2)
-    runs = dict(_overload_currents(study, current_of, before))
+    runs: dict[str, tuple[Any, Any, float, float | None]] = {}
+    for name in study.overloads:
+        event, answer = study.config.events[name], study.answers[name]
+        # behind a coupling that opens no load is left that could trip the relay
+        if answer.coupling_trip_time is None:
+            run = from_event_on(study, name)
+            after = before if event.passes and answer.stall_time is None else None
+            time = run["time"].values - study.event[name]
+            runs[name] = time, current_of(run), 0.0 if event.from_rest else before, after
     numbers = RelaySetting(before=before, start_seconds=seconds, **settings)
     relay = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
     check_relay(checks, relay, study.titles)
     return relay
-
-
-def _overload_currents(
-    study: StudyRecord, current_of: Callable[[xr.Dataset], Any], before: float
-) -> Iterator[tuple[str, tuple[Any, Any, float, float | None]]]:
-    """The `runs` of `relay_findings`; `current_of` gives the current of a run in the relay, and `before` is that of
-    steady running [A]. Behind a coupling that opens no load is left that could trip the relay."""
-    for name in study.overloads:
-        event, answers = study.config.events[name], study.answers[name]
-        if answers.coupling_trip_time is None:
-            run = from_event_on(study, name)
-            after = before if event.passes and answers.stall_time is None else None
-            time = run["time"].values - study.event[name]
-            yield name, (time, current_of(run), 0.0 if event.from_rest else before, after)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.quantities import Layout, variable_of
+from ...drives.catalogue import CatalogueMotor
 from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
@@ -78,6 +79,10 @@ class FlywheelFindings(Findings):
     def permits(self, wheel: Wheel) -> bool:
         """Whether a flywheel keeps the permitted fluctuation and exceeds no other limit."""
         return wheel.keeps(self.permitted_fluctuation) and not wheel.excesses
+
+    def overloads_motor(self, plate: CatalogueMotor | None) -> bool:
+        """Whether the mean torque of the machine exceeds the rated one of the motor, so that no flywheel helps."""
+        return plate is not None and self.mean_torque > plate.nameplate.torque
 
     @derived("kg.m2", name="by_hand")
     def flywheel_by_hand(self) -> float:
@@ -404,7 +409,8 @@ _LEAST = note(
 def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study itself warns for its own
     flywheel."""
-    plate, too_small = study.config.plate, _is_motor_too_small(findings, study)
+    plate = study.config.plate
+    too_small = findings.overloads_motor(plate)
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
     if plate is not None and too_small:
         study.say(_TOO_SMALL, mean=findings.mean_torque, rated=plate.nameplate.torque)
@@ -421,12 +427,6 @@ def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
             where = ", ".join(map(trouble.words, wheels))
             limit = _limit(wheels[0], trouble.limit, study)
             study.say(trouble.code, where=where, motor=remedy, limit=limit, **amounts)
-
-
-def _is_motor_too_small(findings: FlywheelFindings, study: StudyRecord) -> bool:
-    """Whether the mean torque of the machine exceeds the rated one of the motor, so that no flywheel helps."""
-    plate = study.config.plate
-    return plate is not None and findings.mean_torque > plate.nameplate.torque
 
 
 def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
@@ -511,7 +511,7 @@ def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> N
         left_out = ", as it leaves out that the motor's torque rises where the speed falls"
     elif answers.motor_ripple is not None and by_hand < least.flywheel:
         left_out = ", as it leaves out the shaft line"
-    too_small = _is_motor_too_small(findings, study)
+    too_small = findings.overloads_motor(study.config.plate)
     excesses = [*least.excesses, *(["mean torque"] if too_small else [])]
     fitting = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)
     study.say(

@@ -79,8 +79,11 @@ def effects(
         names = peaks_in_events(study, Role.SHOCK)
         runs = {name: from_event_on(study, name) for name in names}
     trips = {name: _trip_time(drive, run, setting) for name, run in runs.items()}
+    limit = study.config.drive.gear.torque_limit
     return {
-        name: _effect(study, runs[name], trip, release) for name, trip in trips.items() if trip is not None
+        name: _effect(drive, runs[name], trip, release, limit)
+        for name, trip in trips.items()
+        if trip is not None
     }
 
 
@@ -95,15 +98,15 @@ def _trip_time(drive: Drive, run: xr.Dataset, setting: float) -> float | None:
     return float(np.interp(setting, torque[around], time[around]))
 
 
-def _effect(study: StudyRecord, run: xr.Dataset, trip: float, release: float) -> CouplingEffect:
+def _effect(drive: Drive, run: xr.Dataset, trip: float, release: float, limit: float) -> CouplingEffect:
     """The effect of a coupling that opens at the time `trip` [s] in a `run` without one. Both runs are the same until
     no torque passes it any more."""
-    drive, time, end = study.drive, run["time"].values, trip + release
+    time, end = run["time"].values, trip + release
     until = run.sel(time=slice(None, end))
     rows = until.sizes["time"]
     at_end = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
     without = at_gear(drive, run)
-    wanted = goal(without, study.config.drive.gear.torque_limit)
+    wanted = goal(without, limit)
     above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
     return CouplingEffect(
         without,
