@@ -166,6 +166,8 @@ def _show_remarks(loaded: Any) -> None:
 
 
 def _platforms(choice: str | None, fmi: int) -> list[str]:
+    """The platforms that --platforms names; `fmi` is the version, by which "all" has those that it knows."""
+
     from ..fmu.native.platforms import PLATFORMS
 
     if choice == "all":

@@ -306,6 +306,7 @@ def found_at(result: Any, path: str) -> tuple[str, Any]:
 
 
 def _matches(node: Any, path: str) -> Iterator[Any]:
+    """The nodes at a path below a node; a key may have dots."""
     keys: Mapping[str, Any] = {}
     if isinstance(node, Mapping):
         keys = node

@@ -47,29 +47,32 @@ class _Citation(NamedTuple):
     unit_of: UnitOf
 
     def piece(self, value: Any, path: str, unit: str = "", kind: str = "") -> Any:
-        """The piece or the pieces of a value: number, text, result, mapping or sequence. A switch stays as it is."""
+        """A value with pieces in place of its numbers and texts: a `Number` for a number with a unit, `Words` for a
+        text, a result whose attributes are pieces for a result; mappings and sequences keep their shape. A switch
+        stays as it is, and so does what has the unit `GIVEN` and is no text. `unit` and `kind` are those of all
+        numbers in the value."""
         if isinstance(value, InUnit):
             return self.piece(value.value, path, value.unit, value.kind)
         if isinstance(value, Estimate):
-            ends = (("value", path), ("low", f"{path}.low"), ("high", f"{path}.high"))
-            pieces: Any = {
-                end: Number(finite(getattr(value, end)), value.unit, value.kind, p) for end, p in ends
+            places = {"value": path, "low": f"{path}.low", "high": f"{path}.high"}
+            ends: Any = {
+                end: Number(finite(getattr(value, end)), value.unit, value.kind, place)
+                for end, place in places.items()
             }
-            return Estimate(**pieces)
+            return Estimate(**ends)
         if isinstance(value, Mapping):
             places = {key: f"{path}.{key}".removeprefix(".") for key in value}
             return {key: self.piece(entry, places[key], unit, kind) for key, entry in value.items()}
+        if isinstance(value, str):
+            return Words(value, path)
         if unit == GIVEN:
-            return Words(value, path) if isinstance(value, str) else value
-        if unit and (isinstance(value, list | tuple) or bool(getattr(value, "ndim", False))):
-            place = path if ".value." in path else f"{path}.value"
+            return value
+        if isinstance(value, list | tuple) or (unit and getattr(value, "ndim", False)):
+            # numbers with a unit are the entry "value" beside "unit", once for all lists in a list
+            place = f"{path}.value" if unit and ".value." not in path else path
             return [self.piece(entry, f"{place}.{k}", unit, kind) for k, entry in enumerate(value)]
         if unit:
             return Number(value if type(value) is int else finite(value), unit, kind, path)
-        if isinstance(value, list | tuple):
-            return [self.piece(entry, f"{path}.{k}") for k, entry in enumerate(value)]
-        if isinstance(value, str):
-            return Words(value, path)
         return _Cited(value, path, self) if is_dataclass(value) else value
 
 
@@ -120,6 +123,7 @@ def quantity_rows(
 
 
 def _numbers(cited_result: object) -> Iterator[tuple[ResultPart, Number]]:
+    """The numbers of a cited result with their declarations, without optional ones that are None."""
     assert isinstance(cited_result, _Cited), cited_result
     for name, declared in cited_result._parts.items():
         if declared.unit:

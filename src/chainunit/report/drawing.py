@@ -161,7 +161,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     whole = machine.drive(phi * machine.ratio)
     orbit = machine.drive(np.linspace(low, high, 73) * machine.ratio)
     crank, canvas, rails = whole.linkage.driver, _Canvas(), linkage.rails(orbit).values()
-    course = [*_curve(linkage.places(orbit)[crank.end])]
+    xs, ys = (np.atleast_1d(x).tolist() for x in linkage.places(orbit)[crank.end])
+    course = [*zip(xs, ys, strict=True)]
     to_page = _scale(
         [*_positions(whole).values(), *course, *(end for rail in rails for end in rail), *_rims(whole)]
     )
@@ -253,10 +254,6 @@ def _names(
 def _short(name: str) -> str:
     """The name of a part without its side."""
     return " ".join(word for word in name.replace("_", " ").split() if word not in ("left", "right"))
-
-
-def _curve(place: tuple[Any, Any]) -> Iterator[Point]:
-    yield from zip(np.atleast_1d(place[0]).tolist(), np.atleast_1d(place[1]).tolist(), strict=True)
 
 
 def _scale(points: list[Point]) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -316,7 +316,7 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         # a quarter turn before the event shows enough of steady running
         before = 0.5 * math.pi / study.setup.config.run.crank_speed
         low = max(low, -before if coasting is None else -min(before, 0.5 * high))
-    marks, title = _marks(study.runs, name, event), run_names.title(study.runs, name)
+    title = run_names.title(study.runs, name)
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
         title,
@@ -324,7 +324,10 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         + ("" if event is None else " The event is marked by a dashed line; the loads change in the shade."),
         fig.stacked(
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
-            ((axis, (*curves, *marks(axis is of_torque))) for axis, curves in items.items()),
+            (
+                (axis, (*curves, *_marks(study.runs, name, axis is of_torque)))
+                for axis, curves in items.items()
+            ),
         ),
         _after(study.runs, name) if event is not None else (),
         half=True,
@@ -351,29 +354,25 @@ def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]
     return {_CURRENT: items}
 
 
-def _marks(runs: StudyRuns, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
-    """The function that gives the marks in a panel of a run; its argument says whether the marks have words."""
-    run = runs.series[name]
-
-    def marks(labelled: bool) -> list[fig.Item]:
-        if event is not None:
-            loads = (name for name in runs.drive.machine.model.input_layout.names if name not in _MOTION)
-            changing = _load_change(
-                run, [*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"]
-            )
-            shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
-            return [*shade, fig.Mark(0.0, words="event" if labelled else "")]
-        if name == "start_up" and runs.answers:
-            return [fig.Mark(runs.steady_begin, words="steady from here" if labelled else "")]
-        return []
-
-    return marks
+def _marks(runs: StudyRuns, name: str, labelled: bool) -> list[fig.Item]:
+    """The marks in a panel of a run, with words if `labelled`: its event, with a shade while loads or supply change,
+    or the begin of steady running in the start-up."""
+    event = run_names.event_time(runs, name)
+    if event is not None:
+        changing = _load_change(runs.drive, runs.series[name])
+        shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
+        return [*shade, fig.Mark(0.0, words="event" if labelled else "")]
+    if name == "start_up" and runs.answers:
+        return [fig.Mark(runs.steady_begin, words="steady from here" if labelled else "")]
+    return []
 
 
-def _load_change(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
-    """The first and the last instant at which a load changes [s]; None where none does."""
+def _load_change(drive: Drive, run: xr.Dataset) -> tuple[float, float] | None:
+    """The first and the last instant at which a load of the machine or the supply of the motor changes [s]; None if
+    neither does."""
+    loads = (name for name in drive.machine.model.input_layout.names if name not in _MOTION)
     changes = np.zeros(len(run["time"]) - 1, bool)
-    for name in loads:
+    for name in (*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"):
         if name in run:
             changes |= np.diff(run[name].values) != 0.0
     places = np.flatnonzero(changes)

@@ -119,6 +119,8 @@ def _drivers(f: LinkageFindings) -> Iterator[Line]:
 
 
 def _motion(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
+    """Strokes, swings and time ratios, the links that turn or stand, the margins to dead positions, the limits of
+    points, and the animation."""
     if f.strokes:
         strokes = {name: (_along(f, name), stroke) for name, stroke in x.strokes.items()}
         yield _ends(f, strokes.values(), "sliding joint", "stroke", "way")
@@ -190,6 +192,7 @@ def _reversals(f: LinkageFindings, x: LinkageData, variables: Mapping[str, str])
 
 
 def _animation(f: LinkageFindings) -> Animation:
+    """The moving picture of a turn, or of the way there and back, at constant speed."""
     machine = f.machine
     low, _ = f.description.span
     step = (2 if f.back else 1) * (len(f.q) - 1) // _PICTURES

@@ -43,13 +43,16 @@ def at_rest(f: LinkageFindings, x: LinkageAtRest, file: str) -> Iterator[b.Block
         "lead",
         "long",
     )
-    yield from _table(f, x, effort)
+    yield from _equilibria(f, x, effort)
     yield b.Table(quantity_rows(x.summary), title=f"Holding {effort} over the way of the driver")
     yield from _notes(f, x, effort)
     yield _figure(f, effort, file)
 
 
-def _table(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Table]:
+def _equilibria(f: LinkageFindings, x: LinkageAtRest, effort: str) -> Iterator[b.Table]:
+    """The table with a row for each equilibrium in the cited `x`; `effort` is "torque" or "force", by what holds the
+    driver."""
+
     def place(equilibrium: Equilibrium) -> Line:
         begin = number(equilibrium.place)
         is_range = equilibrium.kind == INDIFFERENT

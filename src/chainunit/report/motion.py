@@ -123,6 +123,7 @@ def pictures(animation: Animation, units: Units) -> dict[str, Any]:
 
 
 def _run(run: Clip, reach: float, units: Units) -> dict[str, Any]:
+    """The data of a clip for the page: lists of numbers, rounded relative to the `reach` of the machine."""
     time = np.asarray(run.time, float)
     largest = max((float(np.max(np.hypot(a.x, a.y))) for a in run.arrows), default=0.0)
     return {

@@ -163,6 +163,7 @@ class ReportedResult(Generic[Question, Outcome]):
 
 
 def _single_numbers(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """By its path, each single number with a unit below a node of the result."""
     for name, below in node.items():
         if isinstance(below, Mapping) and "unit" in below and "value" in below:
             if not isinstance(below["value"], list | str | bool):

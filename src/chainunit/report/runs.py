@@ -138,6 +138,7 @@ def _peak(runs: StudyRuns, pin: str) -> Number:
 
 
 def _pins(runs: StudyRuns) -> b.Table:
+    """The forces in the bearings: in steady running, or else in the first run, and the largest peak of all runs."""
     reference = "steady" if "steady" in runs.pins else next(iter(runs.pins))
     tables = runs.pins[reference]
     sizes = list(next(iter(tables.values())))

@@ -94,6 +94,7 @@ def _speeds(study: StudyRecord) -> Iterator[fig.Figure]:
 
 
 def _speeds_of(runs: StudyRuns, part: PlacedPart) -> fig.Figure:
+    """The speeds on either side of a part that slips, a panel for the start and each event."""
     noun = {"fluid_coupling": "fluid coupling"}.get(part.name, part.name)
     panels = []
     for name, run in parts_of_runs(runs, part):

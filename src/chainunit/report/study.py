@@ -74,10 +74,10 @@ def summary(study: StudyRecord, result: Mapping[str, Any]) -> b.Report:
 def _report(
     study: StudyRecord, result: Mapping[str, Any], sections: Iterable[b.Section], source: Line = ()
 ) -> b.Report:
-    config, failure = study.setup.config, study.findings.failure
-    reason = () if failure is None else cited(str(failure), "failure")
+    config, error = study.setup.config, study.findings.failure
+    failure = () if error is None else cited(str(error), "failure")
     kind = f"{capital(study.setup.noun)}: forces, torque and overload"
-    return b.Report(config.title, kind, result, (), tuple(sections), source, reason, units=config.units)
+    return b.Report(config.title, kind, result, (), tuple(sections), source, failure, units=config.units)
 
 
 def _motion(study: StudyRecord) -> list[b.Block]:
@@ -95,9 +95,27 @@ _GIVEN_DRIVE = (
 
 
 def _question(study: StudyRecord) -> Iterator[b.Block]:
+    """What the study is about: the question in words, the given values in short, and the drawing of the machine."""
     # a linkage has its title in place of a noun
-    setup, runs = study.setup, study.runs
+    setup = study.setup
     noun = f"this {setup.noun}" if setup.noun[:1].islower() else f'the machine "{setup.noun}"'
+    yield b.Text(_question_text(study, noun), form="long")
+    is_chosen, driver = setup.proposal is not None, setup.driver_noun
+    rows: list[b.TableRow] = [] if is_chosen else [b.TableRow(("motor", motor_title(setup)))]
+    rows += quantity_rows(run_settings(setup), driver, only="crank_speed", as_given=True)
+    machine = cited(setup.drive.machine.p, "given.machine")
+    rows += () if is_chosen else quantity_rows(machine, driver, only="ratio", as_given=True)
+    rows += quantity_rows(cited(setup.config.feed, "given.feed"), driver, as_given=True)
+    yield b.Table(tuple(rows), title="In short", form="long")
+    if not setup.drive.foreign_machine:
+        alt, model = f"{capital(noun)}: its pins, links and dimensions", setup.drive.machine.model
+        caption = filled(of_driver(_DRAWING_CAPTION, driver), model.angle_counts)
+        yield b.Drawing(drawing(setup.drive.machine), alt, DRAWING, caption)
+
+
+def _question_text(study: StudyRecord, noun: str) -> Line:
+    """The question in words, with the runs by which it is answered; `noun` stands for the machine."""
+    setup, runs = study.setup, study.runs
     if setup.proposal is None:
         question = filled(
             of_driver(_GIVEN_DRIVE, setup.driver_noun),
@@ -124,20 +142,7 @@ def _question(study: StudyRecord) -> Iterator[b.Block]:
             sentence = " Then come {} overloads at random, each by itself: {}."
             counted = exact(cited(InUnit(plan.runs, "1"), f"findings.{plan.table}.runs"))
             question += filled(sentence, counted, plan.event.title)
-    yield b.Text(question, form="long")
-    is_chosen, feed = setup.proposal is not None, setup.config.feed
-    rows: list[b.TableRow] = []
-    if not is_chosen:
-        rows.append(b.TableRow(("motor", motor_title(setup))))
-    driver, machine = setup.driver_noun, cited(setup.drive.machine.p, "given.machine")
-    rows += quantity_rows(run, driver, only="crank_speed", as_given=True)
-    rows += () if is_chosen else quantity_rows(machine, driver, only="ratio", as_given=True)
-    rows += quantity_rows(cited(feed, "given.feed"), driver, as_given=True)
-    yield b.Table(tuple(rows), title="In short", form="long")
-    if not setup.drive.foreign_machine:
-        alt, model = f"{capital(noun)}: its pins, links and dimensions", setup.drive.machine.model
-        caption = filled(of_driver(_DRAWING_CAPTION, setup.driver_noun), model.angle_counts)
-        yield b.Drawing(drawing(setup.drive.machine), alt, DRAWING, caption)
+    return question
 
 
 def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -245,6 +250,7 @@ def software(runs: StudyRuns) -> b.Table:
 
 
 def _certificate(runs: StudyRuns) -> Iterator[b.Block]:
+    """The energy certificate: a table by run, and for each of its shares the largest one."""
     shares = {
         run: {
             name: Number(finite(share), "1", path=f"runs.certificate.{run}.{name}")

@@ -81,6 +81,8 @@ def machine_state(drive: Drive, part: Any) -> MachineState:
 
 
 def _run(runs: StudyRuns, name: str, interval: float, supplement: Supplement) -> Clip:
+    """The clip of a run at equal `interval`s [s]; `supplement` has what the model of the machine adds to its
+    picture."""
     run, drive = runs.series[name], runs.drive
     model = drive.machine.model
     time = run["time"].values

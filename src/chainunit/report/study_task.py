@@ -27,6 +27,7 @@ from .task import Task, Writer
 
 
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
+    """Refuse options of the command that do not fit the study, before any run."""
     check_motor(config.motor, config.drive, config.plans, config.file.catalogues)
     if scheduler is not None:
         for runs in random_runs(config.plans):

@@ -93,8 +93,8 @@ class EventRun:
 
 
 def names_read(rig: Rig, events: Iterable[Event]) -> list[str]:
-    """Full names of the outputs and states that an answer of a run reads, and the events themselves; the system of
-    the `rig` may not have all."""
+    """Full names of the outputs and states from which the answers of a run and the signals of these events follow;
+    the system of the `rig` may not have all."""
     names = [f"motor.{rig.drive.motor.current}", "machine.rocker.tau"]
     names += [f"machine.{name}" for event in events for name in event.reads]
     for bond in rig.graph.bonds:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..core.errors import Faults, InputError, each_refusal, near_name, refusal_prefix, shown
 from ..core.messages import unit_behind
-from ..core.quantities import Layout
+from ..core.quantities import Layout, Variable
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue, offer
 from ..machines.chain_unit import SideLoads
 from ..mechanism.models import MachineModel
@@ -19,7 +19,7 @@ from ..models import MACHINES, MOTORS
 from ..reading.tables import named_table, read_table
 from ..reading.text import chosen_units
 from ..system.signals import Profile
-from .event import Event
+from .event import Event, OverTime
 from .event_table import inputs_of, random_runs, read_events, read_random_event
 from .operation import OperatingConditions
 from .parts import Parts, beside, catalogues_of, is_designation, parts_of
@@ -245,24 +245,20 @@ def loads_beyond(
         if fault := event.fault(normal):
             yield InputError(f"{where}: {fault}", key=key)
         for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
-            most = (
-                max([signal.start, *(x for *_, x in signal.changes)])
-                if isinstance(signal, Profile)
-                else signal
-            )
-            v = inputs[name]
-            if v.quantity.type != "Real" and isinstance(signal, Profile) and signal.changes:
-                kind = "whole number" if v.quantity.type == "Integer" else "switch"
-                yield InputError(
-                    f"{where}: {name} is a {kind}, and the event changes its input smoothly; name another input",
-                    key=key,
-                )
-            elif not v.quantity.admits(most):
-                yield InputError(
-                    f"{where}: {name} comes to {most:.9g}{unit_behind(v.unit)} with the feed: must be "
-                    f"{v.quantity.allowed_range}",
-                    key=key,
-                )
+            if fault := _fault_of_signal(signal, inputs[name]):
+                yield InputError(f"{where}: {name} {fault}", key=key)
+
+
+def _fault_of_signal(signal: OverTime, v: Variable) -> str:
+    """Why an input cannot take the values of a signal, in words; empty if it can."""
+    changes = signal.changes if isinstance(signal, Profile) else ()
+    if v.quantity.type != "Real" and changes:
+        kind = "whole number" if v.quantity.type == "Integer" else "switch"
+        return f"is a {kind}, and the event changes its input smoothly; name another input"
+    most = max([signal.start, *(x for *_, x in changes)]) if isinstance(signal, Profile) else signal
+    if v.quantity.admits(most):
+        return ""
+    return f"comes to {most:.9g}{unit_behind(v.unit)} with the feed: must be {v.quantity.allowed_range}"
 
 
 def endless(

@@ -59,6 +59,7 @@ def _keys(table: str, types: list[str]) -> Iterator[Key]:
 
 
 def _absent(present: set[str]) -> Iterable[KeyTable]:
+    """The tables that a file without them may have, but for events: for its machine, and for each motor."""
     return (
         key_table
         for key_table in key_tables()

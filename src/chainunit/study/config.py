@@ -288,6 +288,8 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
 
 
 def _of_tables(data: Mapping[str, Any], source: str) -> Config:
+    """See `of_tables`. Faults of single values are refused together with those of the whole study that do not depend
+    on them."""
     in_system = with_linkage(data)
     parts, faults = check_values(in_system, source)
     if parts is None:
@@ -375,16 +377,12 @@ _OF_DRIVE = ("gear", "starter", "flywheel")
 
 
 def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: FileContents) -> Config:
-    """The study of a file each of whose values is allowed."""
+    """The study of a file each of whose values is allowed: first its parts, whose faults are refused together, then
+    the whole, in which parts may not fit each other. An optional table that the file leaves out is None."""
     sections, faults = parts.sections, Faults()
     data, source = contents.tables, contents.source
     tables, values = _read_sections(sections, checked, faults)
     faults.add(check_order(values))
-    of_study: dict[str, Any] = {
-        name: values[name] if name in data or not section.optional else None
-        for name, section in sections.items()
-        if name not in _OF_PARTS
-    }
     catalogues: tuple[Path, ...] = ()
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
         catalogues = catalogues_of(checked.catalogue, source)
@@ -403,11 +401,14 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
         with faults.collected():
             plans[capability.name] = capability.plan(reading)
     faults.refuse()
-    for name, table in of_study.items():
-        of_study[name] = None if table is None else sections[name].completed(table, reading)
+    completed: dict[str, Any] = {
+        name: section.completed(values[name], reading) if name in data or not section.optional else None
+        for name, section in sections.items()
+        if name not in _OF_PARTS
+    }
     config = Config(
         title=checked.title,
-        machine=organ_models()[checked.organ].machine(machine, of_study),
+        machine=organ_models()[checked.organ].machine(machine, completed),
         motor=_motor(data, parts, checked, values["motor"], plate, source),
         drive=DriveTables(
             feed_forward=checked.feed_forward,
@@ -415,19 +416,18 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
             given=contents.given,
             flywheel_shaft=FlywheelShaft(checked.flywheel.place, float(values["flywheel"].turns)),
             line=tuple(plan for plan in plans.values() if isinstance(plan, SlipPlan)),
-            **{name: of_study[name] for name in _OF_DRIVE},
+            **{name: completed[name] for name in _OF_DRIVE},
         ),
         events=events,
         empty_start=checked.empty_start,
         simulation=checked.simulation,
         file=dataclasses.replace(contents, catalogues=catalogues),
         units=chosen_units(checked.report.units),
-        values={name: x for name, x in of_study.items() if name not in (*_OWN_TABLES, *_OF_DRIVE)},
+        values={name: table for name, table in completed.items() if name not in (*_OWN_TABLES, *_OF_DRIVE)},
         plans=plans,
-        **{name: of_study[name] for name in _OWN_TABLES},
+        **{name: completed[name] for name in _OWN_TABLES},
     )
-    known_motor = not parts.file
-    faults.add(loads_beyond(machine.model, config.feed, events, plans, known_motor=known_motor))
+    faults.add(loads_beyond(machine.model, config.feed, events, plans, known_motor=not parts.file))
     for capability in registered():
         faults.add(capability.faults(config))
     faults.add(endless(config.operation, events, plans))
@@ -510,19 +510,22 @@ def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str,
     try:
         return make(parts.machine, parameters)
     except InputError as error:
-        model, spoil = parts.machine, dict[str, str]()
-        names = error.names if isinstance(error, GeometryError) else ()
-        if isinstance(error, GeometryError):
-            spoil = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
-        # the value that spoils the machine, and not one whose range that value sets
-        key = next((f"machine.{name}" for name in (*spoil, *names) if name in parameters), "machine")
-        declared = Layout(model.Parameters).by_name(model.Parameters())
-        taken = (
-            f"{name} = {declared[name]:g}" for name in names if name in declared and name not in parameters
-        )
-        line = f"machine: {error}"
-        if listed := ", ".join(taken):
-            line += f"; not in the file, so at the declared start value: {listed}"
-        if spoil:
-            line += f"; with all other values as they are, {', or '.join(spoil.values())}"
-        raise InputError(line, key=key) from error
+        raise _refused_machine(error, parts.machine, parameters) from error
+
+
+def _refused_machine(error: InputError, model: MachineModel, parameters: dict[str, float]) -> InputError:
+    """The refusal of a machine with these `parameters` of its file: the error, the values at fault that the file
+    leaves out, and the values that would do, if there is one."""
+    names, remedies = error.names if isinstance(error, GeometryError) else (), dict[str, str]()
+    if isinstance(error, GeometryError):
+        remedies = causes(admits(model), parameters, model.parameter_layout, model.Parameters())
+    # the value that spoils the machine, and not one whose range that value sets
+    key = next((f"machine.{name}" for name in (*remedies, *names) if name in parameters), "machine")
+    declared = Layout(model.Parameters).by_name(model.Parameters())
+    left_out = [name for name in names if name in declared and name not in parameters]
+    text = f"machine: {error}"
+    if listed := ", ".join(f"{name} = {declared[name]:g}" for name in left_out):
+        text += f"; not in the file, so at the declared start value: {listed}"
+    if remedies:
+        text += f"; with all other values as they are, {', or '.join(remedies.values())}"
+    return InputError(text, key=key)

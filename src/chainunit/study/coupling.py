@@ -75,7 +75,9 @@ class RamForce:
 
 
 def rams(study: StudyRecord) -> Iterator[RamForce]:
-    """The rams of a linkage: links that slide on the ground and that a pin drives."""
+    """The rams of a linkage with the forces of its turn in normal running: links that slide on the ground and that a
+    pin moves, not a driver. A ram works before the dead centre to which it goes with the larger force; one without
+    a force or a dead centre is left out."""
     description = getattr(study.setup.drive.machine.model, "described_by", None)
     if description is None or TurnAnalysis.name not in study.findings.by_analysis:
         return
@@ -88,15 +90,16 @@ def rams(study: StudyRecord) -> Iterator[RamForce]:
         pin = next((k for k, j in joints.items() if j.kind == REVOLUTE and ram in (j.on[0], j.by[0])), None)
         if pin is None or any(name == driver.joint for driver in description.structure.drivers):
             continue
-        guide, force = (
+        guide, pin_force = (
             attrgetter(description.variable("joint", joint_name))(turn.outputs) for joint_name in (name, pin)
         )
-        shape = turn.angle.shape
-        rate = np.broadcast_to(guide.v, shape) / study.setup.config.run.crank_speed
-        size = np.broadcast_to(_along(guide, force), shape)
-        dead = max(_dead_centres(turn.angle, rate), key=lambda q: _before(turn.angle, size, q), default=None)
-        if dead is not None and np.max(size) > 0.0:
-            yield RamForce(ram, turn.angle, rate, float(np.max(size)), dead)
+        angle = turn.angle
+        rate = np.broadcast_to(guide.v, angle.shape) / study.setup.config.run.crank_speed
+        force = np.broadcast_to(_along(guide, pin_force), angle.shape)
+        dead_centres = _dead_centres(angle, rate)
+        if dead_centres and np.max(force) > 0.0:
+            worked = max(dead_centres, key=lambda q: _mean_before(angle, force, q))
+            yield RamForce(ram, angle, rate, float(np.max(force)), worked)
 
 
 def _along(guide: Any, force: Any) -> Any:
@@ -121,10 +124,10 @@ def _dead_centres(angle: Any, rate: Any) -> list[float]:
     return [round(float(q), 9) % (2.0 * math.pi) for q in angles]
 
 
-def _before(angle: Any, size: Any, place: float) -> float:
-    """Mean of a force over the thirty degrees before a place."""
+def _mean_before(angle: Any, force: Any, place: float) -> float:
+    """Mean of a force [N] over the thirty degrees before a place [rad]."""
     places = place - np.radians(np.arange(0.5, 30.0))
-    return float(np.mean(np.interp(places, angle, size, period=2.0 * math.pi)))
+    return float(np.mean(np.interp(places, angle, force, period=2.0 * math.pi)))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -75,6 +74,7 @@ class CycleQuantity:
 
 
 def _installed_power(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:
+    """Power [W] of the motor that carries RMS and peak of its torque, `values` [N m], at the speed `w` [rad/s]."""
     rms, peak = values
     return w * np.maximum(rms, peak / basis.overload)
 
@@ -92,6 +92,7 @@ def _difference(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:
 
 
 def _extent(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:
+    """The largest of the first half of the `values` less the least of the second half; NaN without values."""
     half = len(values) // 2
     highest, lowest = (
         np.stack(np.broadcast_arrays(*part)) if half else np.array([np.nan])
@@ -148,16 +149,24 @@ def cycle_quantity(name: str, model: Model) -> CycleQuantity:
 
 
 def _named(name: str, model: Model) -> CycleQuantity:
-    named_quantity = partial(CycleQuantity, name, *NAMED[name], reduction=name)
+    """The quantity of one of the names `NAMED`."""
+    integrands: tuple[Integrand, ...]
+    combine: Callable[..., Any]
     if name == "installed_power":
-        return named_quantity((Integrand("tau", "rms"), Integrand("tau", "peak")), _installed_power)
-    if name == "energy_per_year":
-        return named_quantity((Integrand("power", "mean"),), _energy_per_year, "energy")
-    axis = {"box.width": "x", "box.height": "y"}[name]
-    pins = [v.name for v in columns_of(model) if v.name.startswith(f"{axis}(")]
-    if not pins:
-        raise InputError(f"{name}: the pins of the {model.name} have no places of their own; leave it out")
-    return named_quantity(tuple(Integrand(pin, end) for end in ("max", "min") for pin in pins), _extent)
+        integrands, combine = (Integrand("tau", "rms"), Integrand("tau", "peak")), _installed_power
+    elif name == "energy_per_year":
+        integrands, combine = (Integrand("power", "mean"),), _energy_per_year
+    else:
+        axis = {"box.width": "x", "box.height": "y"}[name]
+        places = [v.name for v in columns_of(model) if v.name.startswith(f"{axis}(")]
+        if not places:
+            raise InputError(
+                f"{name}: the pins of the {model.name} have no places of their own; leave it out"
+            )
+        integrands = tuple(Integrand(place, end) for end in ("max", "min") for place in places)
+        combine = _extent
+    kind = "energy" if name == "energy_per_year" else ""
+    return CycleQuantity(name, *NAMED[name], integrands, combine, kind, reduction=name)
 
 
 def evaluate(

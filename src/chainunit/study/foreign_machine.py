@@ -39,7 +39,8 @@ class ForeignModel(MachineModel):
 
 
 def foreign_model(file: Path, names: Mapping[str, str]) -> ForeignModel:
-    """The machine in an FMU; `names` gives the FMU's names by ours, where they differ.
+    """The machine in an FMU; `names` gives the FMU's names by ours, where they differ. Its feed are the inputs that
+    are not of its shaft. The gear ratio is a parameter of the machine even if the FMU has none.
 
     Raises
     ------
@@ -47,17 +48,16 @@ def foreign_model(file: Path, names: Mapping[str, str]) -> ForeignModel:
         see `chainunit.system.foreign_component`.
     """
     component = foreign_component(file, "machine", names)
-    connectors = component.connectors.values()
-    shaft = {v for terminal in component.terminals.values() for v in terminal.members.values()}
-    parameters = [_GEAR, *(c for c in connectors if c.causality == "parameter" and c.name != "ratio")]
-    if ratio := component.connectors.get("ratio"):
-        parameters[0] = replace(ratio, most=_GEAR.most, least=_GEAR.least)
+    connectors, ratio = component.connectors.values(), component.connectors.get("ratio")
+    gear = _GEAR if ratio is None else replace(ratio, most=_GEAR.most, least=_GEAR.least)
+    others = [c for c in connectors if c.causality == "parameter" and c.name != "ratio"]
+    shaft = {name for terminal in component.terminals.values() for name in terminal.members.values()}
     feed = _declared("Feed", [c for c in connectors if c.causality == "input" and c.name not in shaft])
     return ForeignModel(
         name=component.title,
         description=component.description or component.title,
         component=component,
-        Parameters=_declared("Parameters", parameters),
+        Parameters=_declared("Parameters", [gear, *others]),
         Inputs=feed,
         Feed=feed,
         made=(foreign_model, (file, names)),

@@ -103,6 +103,8 @@ def _system(choices: Mapping[str, Any], *, is_chosen: bool) -> dict[str, Any]:
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
+    """The declared tables that the study uses, with their values, and their random overloads as sections of their
+    own."""
     config = study.setup.config
     randoms = {runs.key: runs.event for runs in random_runs(config.plans)}
     for name, section in all_sections().items():
@@ -152,23 +154,24 @@ def origin_of(setup: StudySetup, name: str) -> str:
     """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "linkage" (the
     file of the machine), "example", "tuned", "catalogue" (by the motor that the file names), the name of a proposal,
     or "declared"."""
-    config, (section, _, parameter) = setup.config, name.partition(".")
-    if name in _CHOSEN and setup.proposal is not None and _of(config.file, name) == "declared":
-        return setup.proposal.name
-    if name == SLIP and config.drive.start == "inverter" and _of(config.file, name) == "declared":
+    config, proposal, (section, _, parameter) = setup.config, setup.proposal, name.partition(".")
+    file, is_declared = config.file, _of(config.file, name) == "declared"
+    if is_declared and proposal is not None and name in _CHOSEN:
+        return proposal.name
+    if is_declared and name == SLIP and config.drive.start == "inverter":
         return "catalogue"
     if section == "motor" and (tuning := setup.drive.tuning) and parameter in tuning.parameters:
-        return "file" if name in config.file.given else "tuned"
-    if section == "machine" and parameter in LENGTHS and config.file.gives("ratios"):
+        return "file" if name in file.given else "tuned"
+    # the papers' ratios stand for the lengths
+    if section == "machine" and parameter in LENGTHS and file.gives("ratios"):
         return "file"
-    if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.file.of_example:
+    if section == "machine" and parameter in LENGTHS and "ratios.rho" in file.of_example:
         return "example"
     if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
-        name_in_file = _name_in_file(setup, parameter)
-        if not name_in_file:
-            return "catalogue" if setup.proposal is None else setup.proposal.name
-        name = name_in_file
-    return _of(config.file, name)
+        if name_in_file := _name_in_file(setup, parameter):
+            return _of(file, name_in_file)
+        return "catalogue" if proposal is None else proposal.name
+    return _of(file, name)
 
 
 def place_of(setup: StudySetup, name: str) -> str:

@@ -40,20 +40,18 @@ def need_of(
 
 
 def inverter_need(study: StudyRecord) -> InverterNeed | None:
-    """The inverter of a study, by its runs and the runs of the choice; None on the line. An overload that opens a
-    recommended torque limiter counts until the limiter opens."""
-    rated, overload = study.setup.drive.rated_current, study.setup.config.drive.starter.overload
-    if rated is None or study.setup.config.drive.start != "inverter":
+    """The inverter of a study, by its runs, or by the runs of the choice of the drive if these need more; None on the
+    line. An overload that opens a recommended torque limiter counts until the limiter opens."""
+    setup, runs = study.setup, study.runs
+    rated, overload = setup.drive.rated_current, setup.config.drive.starter.overload
+    if rated is None or setup.config.drive.start != "inverter":
         return None
-    named = (("start_up", study.runs.start), *study.runs.answers.items())
-    currents = {name: a.current_peak for name, a in named if a and a.current_peak is not None}
+    peaks: dict[str, float] = {}
     until_trip = study.currents_until_trip
-    peaks = {
-        f"{study.runs.title_of(name)}{', with the torque limiter' * (name in until_trip)}": until_trip.get(
-            name, current
-        )
-        for name, current in currents.items()
-    }
+    for name, answers in (("start_up", runs.start), *runs.answers.items()):
+        if answers and answers.current_peak is not None:
+            limiter = ", with the torque limiter" if name in until_trip else ""
+            peaks[runs.title_of(name) + limiter] = until_trip.get(name, answers.current_peak)
     lasting: list[float] = []
     if starts := StartFindings.found_in(study.findings):
         worst = max(starts.starts, key=lambda start: start.current)
@@ -61,7 +59,7 @@ def inverter_need(study: StudyRecord) -> InverterNeed | None:
         lasting = [start.long_current for start in starts.starts]
     steady = study.runs.answers.get(STEADY)
     need = need_of(rated, None if steady is None else steady.current_rms, lasting, peaks, overload)
-    chosen = None if study.setup.proposal is None else study.setup.proposal.inverter_current
-    if chosen is None or chosen <= need.current:
+    of_choice = None if setup.proposal is None else setup.proposal.inverter_current
+    if of_choice is None or of_choice <= need.current:
         return need
-    return replace(need, current=chosen, case="the runs of the choice")
+    return replace(need, current=of_choice, case="the runs of the choice")

@@ -20,18 +20,18 @@ from .window import Phase
 
 
 def model_verdict(study: StudyRecord) -> Verdict:
-    """The verdict on the model of the machine, from the numbers of the runs."""
-    config, answers = study.setup.config, study.runs.answers
-    steady = answers.get(STEADY)
-    mean = steady.speed_mean if steady else config.run.crank_speed
-    speed, residuals = max(config.run.crank_speed, mean), _residuals(study.runs.certificate)
-    if study.setup.drive.machine.model.sides and not study.setup.drive.foreign_machine:
-        verdict: Verdict = config.organs.verdict(study, speed, mean, residuals)
+    """The verdict on the model of the machine, from the numbers of the runs: at the crank speed asked for, or at that
+    of steady running if it is higher."""
+    setup, runs = study.setup, study.runs
+    asked, steady = setup.config.run.crank_speed, runs.answers.get(STEADY)
+    actual = steady.speed_mean if steady else asked
+    speed, residuals = max(asked, actual), _residuals(runs.certificate)
+    if setup.drive.foreign_machine:
+        return Verdict("energy balance", None, speed, balance_faults(residuals), actual)
+    if setup.drive.machine.model.sides:
+        verdict: Verdict = setup.config.organs.verdict(study, speed, actual, residuals)
         return verdict
-    faults = balance_faults(residuals)
-    if study.setup.drive.foreign_machine:
-        return Verdict("energy balance", None, speed, faults, mean)
-    return Verdict("machine", "rigid links", speed, faults, mean, study.setup.driver_noun)
+    return Verdict("machine", "rigid links", speed, balance_faults(residuals), actual, setup.driver_noun)
 
 
 def wrong_runs(runs: StudyRuns) -> list[str]:

@@ -213,6 +213,7 @@ def quantity_keys(
 
 
 def _of_machine(name: str, table: str) -> Iterator[Key]:
+    """The keys of [machine], or of the `table` [feed], for a machine of that name."""
     config = _study(name)
     if table == "feed":
         return quantity_keys(config.machine.model.Feed, config.feed)
@@ -220,12 +221,14 @@ def _of_machine(name: str, table: str) -> Iterator[Key]:
 
 
 def _of_motor(name: str) -> Iterator[Key]:
+    """The keys of [motor] for a motor of that name."""
     motor = _study(motor=name).motor
     values = motor.parameters if isinstance(motor, OwnMotor) else None
     return quantity_keys(MOTORS[name].Parameters, values, sources=_OF_MOTORS)
 
 
 def _of_section(name: str, section: FileSection) -> Iterator[Key]:
+    """The keys of a declared table of that name: its quantities, its other keys, and those that may stand instead."""
     values = _study().table(name)
     if values is None:
         values = section.default or section.declaration()
@@ -238,6 +241,7 @@ def _of_section(name: str, section: FileSection) -> Iterator[Key]:
 
 
 def _of_system() -> Iterator[Key]:
+    """The keys of [system]: machine and motor with the names to choose from, and the names of variables in FMUs."""
     machines = tuple(f'"{name}"' for name in MACHINES)
     motors = tuple(f'"{name}"' for name in MOTORS)
     choices = {
@@ -267,6 +271,7 @@ def _of_system() -> Iterator[Key]:
 
 
 def _of_report() -> Iterator[Key]:
+    """The keys of [report]: the units of kinds of quantities, and the labels at its head."""
     for kind, names in UNITS.items():
         choices = tuple(f'"{name}"' for name in names)
         yield Key(f"units.{kind}", f"unit of each {kind} in the report", words=choices, sort="text")
@@ -276,6 +281,7 @@ def _of_report() -> Iterator[Key]:
 
 
 def _of_event(event_type: type[Event]) -> Iterator[Key]:
+    """The keys of an [[event]] of that type."""
     yield Key("type", "type of the event", words=(f'"{event_type.kind}"',), sort="text")
     if event_type.has_side:
         yield Key("side", "side that it comes on", words=('"left"', '"right"'), sort="text")
@@ -286,6 +292,7 @@ def _of_event(event_type: type[Event]) -> Iterator[Key]:
 
 
 def _of_entry(entry: TableList) -> Iterator[Key]:
+    """The keys of an entry in a list of tables: those that are no quantities, then its quantities."""
     for key in _of_fields(entry.keys):
         yield dataclasses.replace(key, follows=entry.follows.get(key.name, ""))
     if entry.declared is not None:
@@ -296,11 +303,7 @@ def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = Non
     """Keys that are no quantities, from their pydantic fields, with these `values` or their defaults."""
     for name, (annotation, field) in fields.items():
         value = field.default if values is None else values.get(name)
-        base, limits = annotation, list[Any]()
-        while typing.get_origin(base) is typing.Annotated:
-            base, *inner = typing.get_args(base)
-            limits += inner
-        lengths = [limit.max_length for extra in limits for limit in getattr(extra, "metadata", ())]
+        base, limits = _parted(annotation)
         sort = _sort(base)
         left_out = f'"{value}"' if value and sort not in ("switch", "table") else ""
         if sort == "switch" and value is not None:
@@ -311,9 +314,18 @@ def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = Non
             words=_choices(base),
             sort=sort,
             left_out=left_out,
-            items=next((extra for extra in limits if isinstance(extra, Variable)), None),
-            most=max(lengths, default=0),
+            items=next((limit for limit in limits if isinstance(limit, Variable)), None),
+            most=max((x.max_length for limit in limits for x in getattr(limit, "metadata", ())), default=0),
         )
+
+
+def _parted(annotation: Any) -> tuple[Any, list[Any]]:
+    """The type of a field, and its limits: what ``Annotated`` adds to the type."""
+    limits: list[Any] = []
+    while typing.get_origin(annotation) is typing.Annotated:
+        annotation, *inner = typing.get_args(annotation)
+        limits += inner
+    return annotation, limits
 
 
 def _sort(annotation: Any) -> Sort:

@@ -284,6 +284,7 @@ def _point_of_study(
 
 
 def _run_and_time(operating_point: str, runs: list[str]) -> tuple[str, float | None]:
+    """The run and the time [s] of a point RUN:TIME; without a time the end of steady running."""
     name, sign, text = (part.strip() for part in operating_point.partition(":"))
     if name not in runs:
         raise InputError(
@@ -410,6 +411,8 @@ def equilibrium_point(
 
 
 def _number(operating_point: str, equilibria: Equilibria, model: InverseMachine) -> int:
+    """The number, from 1 on, of the equilibrium that a point names; without a number the stable one of the least
+    potential."""
     match = _FORM.fullmatch(operating_point.strip())
     text = match[1] if match else operating_point
     if text is None:

@@ -220,7 +220,7 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
 
 
 def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindings:
-    """The linkage over its way in one direction."""
+    """The linkage over its way in one direction: extremes between the `PLACES`, means over the way."""
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
     q = np.linspace(*description.span, PLACES)
     way = _Way(machine, speed)
@@ -270,11 +270,11 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         q,
         outputs,
         turn,
-        {
+        groups={
             name: GroupTurn(margin=-top[f"-margin {name}"], margin_at=peak_places[f"-margin {name}"])
             for name in groups
         },
-        {
+        joints={
             name: JointTurn(
                 peak=top[f"force {name}"],
                 peak_at=peak_places[f"force {name}"],
@@ -283,13 +283,13 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
             )
             for (name, variable), force_rms in zip(joints.items(), forces_rms, strict=True)
         },
-        {name: motion for name, motion, _ in motions if isinstance(motion, Stroke)},
-        {name: motion for name, motion, _ in motions if isinstance(motion, Swing)},
-        {
-            description.variable("joint" if isinstance(motion, Stroke) else "link", name): back
-            for name, motion, back in motions
+        strokes={name: motion for name, motion, _ in motions if isinstance(motion, Stroke)},
+        swings={name: motion for name, motion, _ in motions if isinstance(motion, Swing)},
+        dead_centres={
+            description.variable("joint" if isinstance(motion, Stroke) else "link", name): places_of_turning
+            for name, motion, places_of_turning in motions
         },
-        {
+        drivers={
             entry.name: DriverTurn(
                 entry.linear,
                 top[f"{name}.tau"],
@@ -297,8 +297,8 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
             )
             for entry, name in drivers
         },
-        {name: (_plain(-top[f"-{name}"]), _plain(top[name])) for name in moving},
-        rest,
+        limits={name: (_plain(-top[f"-{name}"]), _plain(top[name])) for name in moving},
+        rest=rest,
     )
 
 
@@ -492,6 +492,7 @@ def _over_the_way(f: LinkageFindings) -> dict[str, InUnit]:
 
 
 def _at_rest(f: LinkageFindings) -> LinkageAtRest:
+    """The equilibria, and the holding force, its friction and the potential over the way of the driver."""
     equilibria, unit = f.rest, f.machine.model.driver_port.unit
     rest = equilibria.rest
     columns: dict[str, Any] = {

@@ -62,6 +62,7 @@ def torque_reserve(limit: Any, torque: Any) -> float:
 
 
 def _reserve(w: Window) -> float:
+    """The least reserve of torque in a window, see `torque_reserve`."""
     # in a dip the remaining field brakes for a moment, which is no lack of torque
     driving = np.maximum(w.value("motor.air_gap_tau") * np.sign(w.value("motor.w")), 0.0)
     if w.drive.follows and (w.steady or w).speed_mean < 0.99 * w.requested_speed:

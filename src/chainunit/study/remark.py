@@ -81,15 +81,21 @@ class RemarkCode:
         for name, value in values.items():
             if value is None or isinstance(value, str):
                 texts[name] = value
-                continue
-            # a name of a run has no dots, that of a quantity has none
-            size = self.sizes.get(name.rpartition(".")[2])
-            x, size = (value[0], Size(*value[1:])) if isinstance(value, tuple) else (value, size)
-            assert size is not None, f"{self.code}: {name} has no unit"
-            quantities[name] = InUnit(x, size.unit, size.kind, of_driver(size.title, driver))
-            texts[name] = None if x is None else number(x, size.unit, size.kind, size.digits)
+            else:
+                x, size = self._sized(name, value)
+                quantities[name] = InUnit(x, size.unit, size.kind, of_driver(size.title, driver))
+                texts[name] = None if x is None else number(x, size.unit, size.kind, size.digits)
         said = [_said(of_driver(sentence, driver), texts) for sentence in (*self.sentences, self.remedy)]
         return Remark(self.code, self.severity, " ".join(filter(None, said)), said[-1], runs, quantities)
+
+    def _sized(self, name: str, value: float | Amount) -> tuple[float | None, Size]:
+        """The number in a value, and its size: the one that comes with it, or else the declared one of its name."""
+        if isinstance(value, tuple):
+            return value[0], Size(*value[1:])
+        # neither the name of a run nor that of a quantity has dots
+        quantity_name = name.rpartition(".")[2]
+        assert quantity_name in self.sizes, f"{self.code}: {name} has no unit"
+        return value, self.sizes[quantity_name]
 
 
 def _said(sentence: str, texts: Mapping[str, str | None]) -> str:

@@ -326,6 +326,8 @@ _NO_THERMAL = fault(
 
 
 def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
+    """Say what steady running lacks: the speed asked for; a whole turn, or turns that close, or a speed and an energy
+    that stay, the first of these alone; a final temperature."""
     setup, runs, findings = study.setup, study.runs, study.findings
     requested, never = setup.config.run.crank_speed, setup.drive.simulated_machine.model.never_repeats
     refused = None if lasts(runs) else ""

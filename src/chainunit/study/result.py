@@ -172,6 +172,8 @@ def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
 
 
 def _runs(runs: StudyRuns) -> RunData:
+    """The events, and the numbers of each run."""
+
     def begin(phase: Phase, answers: Answers | None) -> dict[str, InUnit] | None:
         if answers is None:
             return None

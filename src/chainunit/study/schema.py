@@ -178,6 +178,7 @@ class _Schema:
                 place[name] = {"anyOf": [*others, form], "description": description}
 
     def _event(self, table: KeyTable, *, random: bool = False) -> dict[str, Any]:
+        """The form of an event of one type; a `random` one may have a pair of ends for a quantity."""
         properties: dict[str, Any] = {}
         for key in table.keys:
             if random and key.name in (*PLACED, "name"):
@@ -237,6 +238,8 @@ class _Schema:
         return text | ({"examples": choices} if choices else {})
 
     def _list(self, key: Key) -> dict[str, Any]:
+        """The form of a list of quantities; the outline of a shaft is a list of corners (x, y), and its holes are
+        outlines."""
         assert key.items is not None
         entry = self._quantity(key.items)
         if not key.name.startswith("shaft"):
@@ -282,6 +285,7 @@ def _reference(name: str) -> dict[str, Any]:
 
 
 def _sentence(key: Key) -> str:
+    """The meaning of a key, with its unit and the value that it has if the file leaves it out."""
     parts: Iterable[str] = (
         key.description,
         f"[{key.unit.replace('.', ' ')}]" if key.unit else "",

@@ -89,34 +89,38 @@ def _start_empty(
 
 
 def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]) -> StartUp:
-    """Start-up and steady running to the time at which it should end, or longer, see `_missing`; a machine that
-    starts empty runs so long after it is fed."""
-    pieces: list[Dataset] = []
-    steady_from, stop = rig.operation.steady_begin, rig.operation.stop
-    if rig.operation.empty_start:
+    """Start-up and steady running to the planned end, which counts from the feed on if the machine starts empty.
+
+    It runs longer while the machine still speeds up, or while turns are missing (see `_missing`) and the patience
+    lasts. A run in which an output reaches its limit in `guards` ends there.
+    """
+    operation, pieces = rig.operation, list[Dataset]()
+    steady_from, stop = operation.steady_begin, operation.stop
+    if operation.empty_start:
         run, rig = _start_empty(rig, simulation, progress, guards)
         pieces = [run]
         # a motor that follows a ramp is not steady before its end
-        feed_time = max(simulation.time, rig.operation.ramp_end) if rig.drive.follows else simulation.time
-        later = feed_time - rig.operation.ramp_end
-        stop, steady_from = stop + later, steady_from + later
+        feed_time = max(simulation.time, operation.ramp_end) if rig.drive.follows else simulation.time
+        delay = feed_time - operation.ramp_end
+        stop, steady_from = stop + delay, steady_from + delay
         if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
             return StartUp(run, steady_from, stop, rig)
-    patience = max(PATIENCE * rig.operation.turn, _SETTLES)
+    patience = max(PATIENCE * operation.turn, _SETTLES)
     longest = stop + patience
     run = join([*pieces, simulation.run(stop, rig.step, progress, guards=guards)])
+    # a run that ends before `stop` was ended by a guard
     while stop - 0.5 * rig.step <= simulation.time < longest:
-        lack, later = _missing(rig, run, steady_from)
-        if lack is None:
+        missing_turns, settled_from = _missing(rig, run, steady_from)
+        if missing_turns is None:
             break
         if speeds_up(rig, run):
             # its turns cannot close yet
-            stop, later = stop + max(rig.operation.turn, _PIECE * stop), simulation.time
+            steady_from, stop = simulation.time, stop + max(operation.turn, _PIECE * stop)
             longest = stop + max(patience, 2.0 * simulation.time)
         else:
-            # at most at the requested speed; the next round finds the turns that are still missing then
-            stop = min(longest, stop + max(lack * rig.operation.turn, rig.step))
-        steady_from = later
+            # the time at the requested speed; if the crank turns slower, the next round finds what is still missing
+            steady_from = settled_from
+            stop = min(longest, stop + max(missing_turns * operation.turn, rig.step))
         run = join([run, simulation.run(stop, rig.step, progress, guards=guards)])
     return StartUp(run, steady_from, stop, rig)
 

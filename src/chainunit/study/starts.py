@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..core.quantities import quantity
+from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import START_FACTOR
 from ..reading.results import derived, part, result
 from ..reading.text import number
@@ -86,24 +87,36 @@ class StartFindings(Findings):
         return float(self.worst.quasi_static / self.running)
 
     def remark(self, study: StudyRecord) -> None:
-        """Warn of a start that the gear does not carry, or that puts much more on it than running does, and of angles
-        from which the motor does not start."""
-        worst, start = self.worst, _STARTERS[study.setup.config.drive.start]
+        """Warn of a start that is hard on the gear, of a motor that hunts, and of angles from which it does not
+        start."""
+        self._on_gear(study)
+        setup = study.setup
+        if setup.drive.follows and setup.plate is not None:
+            hunting = self._hunting(setup.drive, setup.plate)
+            if hunting is not None:
+                study.findings.say(_HUNTS, START, **hunting)
+        if self.stuck:
+            angles = " and ".join(number(start.angle, "rad") for start in self.stuck)
+            is_soft = setup.config.drive.start == "soft"
+            ramp = ", or a higher voltage of the soft starter" if is_soft else ""
+            study.findings.say(_NO_START, START, where=angles, ramp=ramp)
+
+    def _on_gear(self, study: StudyRecord) -> None:
+        """Warn of a start that the gear does not carry, or, if its limit is not known, that puts much more on it than
+        running does."""
+        worst, starter = self.worst, study.setup.config.drive.start
         numbers: dict[str, Any] = {
-            "start": start,
+            "start": _STARTERS[starter],
             "torque": worst.quasi_static,
             "angle": worst.angle,
             "transient": transient_words(study.setup),
             "most": self.transient,
-            "softer": SOFTER[study.setup.config.drive.start],
+            "softer": SOFTER[starter],
         }
+        large = START_FACTOR * self.running
         if worst.quasi_static > self.limit:
             study.findings.say(_OVER_LIMIT, START, limit=self.limit, **numbers)
-        elif (
-            study.setup.drive.is_geared
-            and math.isinf(self.limit)
-            and worst.quasi_static > START_FACTOR * self.running
-        ):
+        elif study.setup.drive.is_geared and math.isinf(self.limit) and worst.quasi_static > large:
             study.findings.say(
                 _OVER_RUNNING,
                 START,
@@ -113,23 +126,18 @@ class StartFindings(Findings):
                 running_in=running_words(study.runs, self.running_in),
                 **numbers,
             )
-        hunting = max(self.starts, key=lambda start: start.backwards)
-        if study.setup.drive.follows and study.setup.plate is not None and hunting.backwards > BACKWARDS:
-            p = study.setup.drive.fmu_parameters
-            usual, boost = usual_boost(p, study.setup.plate.nameplate), float(p.inverter.boost)
-            least = f"to {number(usual, '1', 'percent')} for this motor"
-            if boost <= usual:
-                least = f"below {number(boost, '1', 'percent')}"
-            study.findings.say(_HUNTS, START, backwards=hunting.backwards, angle=hunting.angle, least=least)
-        if self.stuck:
-            study.findings.say(
-                _NO_START,
-                START,
-                where=" and ".join(number(stuck_start.angle, "rad") for stuck_start in self.stuck),
-                ramp=", or a higher voltage of the soft starter"
-                if study.setup.config.drive.start == "soft"
-                else "",
-            )
+
+    def _hunting(self, drive: Drive, plate: CatalogueMotor) -> dict[str, Any] | None:
+        """The values of the warning of a motor on an inverter that turns backwards in a start; None for others."""
+        worst = max(self.starts, key=lambda start: start.backwards)
+        if not worst.backwards > BACKWARDS:
+            return None
+        p = drive.fmu_parameters
+        usual, boost = usual_boost(p, plate.nameplate), float(p.inverter.boost)
+        least = f"to {number(usual, '1', 'percent')} for this motor"
+        if boost <= usual:
+            least = f"below {number(boost, '1', 'percent')}"
+        return {"backwards": worst.backwards, "angle": worst.angle, "least": least}
 
 
 _PUTS = "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and acceleration"

@@ -111,6 +111,7 @@ def _key(name: str) -> str:
 
 
 def _value(value: Any) -> str:
+    """A value as TOML writes it."""
     if isinstance(value, Mapping):
         return (
             f"{{ {', '.join(f'{_key(name)} = {_value(x)}' for name, x in value.items())} }}"

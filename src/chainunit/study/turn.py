@@ -117,6 +117,7 @@ def _lost_energy(cycle: Cycle, turn: float) -> float:
 
 
 def _reaction(loaded: Cycle, free: Cycle, output: str) -> Reaction:
+    """The largest reaction of a pin in the turn with its loads and in the one without, with their crank angles."""
     forces = (attrgetter(output)(turn.outputs) for turn in (loaded, free))
     sizes = [np.broadcast_to(np.hypot(force.fx, force.fy), loaded.angle.shape) for force in forces]
     peak_rows = [int(np.argmax(size)) for size in sizes]

@@ -146,35 +146,33 @@ class BladeAnalysis(Analysis):
                 f"machine.stack.top = {stack.top:g} m: must be > {stack.table:g} m, the height of the table"
             )
         turn = cycle(machine, config.run.crank_speed, config.feed, POINTS)
-        return BladeFindings(turn, stack, _numbers(turn, stack, config.operation))
+        return BladeFindings(turn, stack, _cutting(turn, stack, config.operation))
 
 
-def _numbers(turn: Cycle, stack: Stack, operation: OperatingConditions) -> Cutting:
-    blade, time = turn.outputs.blade, operation.turn
-    against = -(blade.cut_fx * blade.vx + blade.cut_fy * blade.vy)
-    work = float(np.mean(against)) * time
-    losses = float(np.mean(turn.outputs.dissipated_power)) * time - work
-    inside = in_stack(stack, blade.x, blade.y)
-    path = float(np.sum(inside * _way(blade.x, blade.y)))
+def _cutting(turn: Cycle, stack: Stack, operation: OperatingConditions) -> Cutting:
+    """The numbers of a turn of the crank. The path of the blade is closed, a piece from each sample to the next; of a
+    piece counts the share that is in the stack."""
+    blade, turn_time = turn.outputs.blade, operation.turn
+    dx, dy = np.roll(blade.x, -1) - blade.x, np.roll(blade.y, -1) - blade.y
+    share = in_stack(stack, blade.x, blade.y)
+    path = float(np.sum(share * np.hypot(dx, dy)))
+    cut_power = -(blade.cut_fx * blade.vx + blade.cut_fy * blade.vy)
+    cut_work = float(np.mean(cut_power)) * turn_time
+    losses = float(np.mean(turn.outputs.dissipated_power)) * turn_time - cut_work
     speed = np.hypot(blade.vx, blade.vy)
     return Cutting(
         blade_top=float(np.max(blade.y)),
         blade_bottom=float(np.min(blade.y)),
-        blade_draw=abs(float(np.sum(inside * (np.roll(blade.x, -1) - blade.x)))),
+        blade_draw=abs(float(np.sum(share * dx))),
         tilt_least=float(np.min(blade.tilt)),
         tilt_largest=float(np.max(blade.tilt)),
-        speed_in_stack=float(np.max(speed, where=inside > 0.0, initial=0.0)),
-        cut_work=work,
+        speed_in_stack=float(np.max(speed, where=share > 0.0, initial=0.0)),
+        cut_work=cut_work,
         cut_path=path,
         cut_work_by_path=operation.feed.cut_force * path,
         # a smaller difference of the two sums is roundoff
-        losses=losses if losses > 1e-9 * work else 0.0,
+        losses=losses if losses > 1e-9 * cut_work else 0.0,
     )
-
-
-def _way(x: Any, y: Any) -> Any:
-    """Length of each piece of a closed path [m]."""
-    return np.hypot(np.roll(x, -1) - x, np.roll(y, -1) - y)
 
 
 def in_stack(stack: Stack, x: Any, y: Any) -> Any:

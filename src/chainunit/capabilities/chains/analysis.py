@@ -228,37 +228,20 @@ def numbers_at(
         is_stopped=is_stopped,
     )
     values, ratio = sample.values, drive.driven_machine.p.ratio
-
-    def peaks(x: Any) -> Any:
-        return np.max(np.abs(x), axis=2)
-
     two = cycle(drive.machine, crank_speed, feed)
-    snatch, two_bar_snatch = [], []
-    for side in SIDES:
-        bars = getattr(two.outputs, side).rocker_joint
-        size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
-        rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(rods_of(drive)))
-        snatch.append(peaks(size) / rest)
-        two_bar_snatch.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
-    snatches = np.maximum(*snatch)
+    snatches, two_bar_snatch = _snatches(drive, feed, values, two)
     is_pushed = drive.chain_unit.mean_pulls(crank_speed, feed.left, feed.right) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
     gap = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)
     slack = {side: sample.pulls[side] < 0.0 for side in SIDES}
     all_rods = np.concatenate([slack[side] for side in SIDES], axis=-1)
-    crank, rocker = values["tau"] * ratio, values["rocker.tau"]
-    medians = np.median(snatches, axis=1)
-    of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatches}
-    of_peaks: dict[str, float] = {}
-    for name, sizes in of_turns.items():
-        for title, q in (("median", 0.5), ("high", HIGH)):
-            estimate = quantile(sizes, q)
-            of_peaks |= {
-                f"{name}_{title}": float(np.quantile(sizes, q)),
-                f"{name}_{title}_from": estimate.low if estimate else math.nan,
-                f"{name}_{title}_to": estimate.high if estimate else math.nan,
-            }
+    crank, medians = values["tau"] * ratio, np.median(snatches, axis=1)
+    peaks = {
+        "crank_torque": _peaks(crank),
+        "rocker_torque": _peaks(values["rocker.tau"]),
+        "snatch": snatches,
+    }
     slack_time = mean_share(np.mean(np.any(all_rods, axis=-1), axis=(1, 2)))
     return (
         SpeedNumbers(
@@ -273,14 +256,47 @@ def numbers_at(
             two_bar_crank_torque=peak(two.crank_torque),
             two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
             two_bar_rocker_torque=peak(two.outputs.rocker.tau),
-            two_bar_snatch=float(max(two_bar_snatch)),
+            two_bar_snatch=two_bar_snatch,
             two_bar_slack_time=float(np.mean(np.any(is_pushed, axis=0))),
             energy_residual=gap / max(energy, 1e-300),
-            independent_turns=float(min(independent_count(sizes, HIGH) for sizes in of_turns.values())),
-            **of_peaks,
+            independent_turns=float(min(independent_count(sizes, HIGH) for sizes in peaks.values())),
+            **_quantiles(peaks),
         ),
         {side: np.mean(slack[side], axis=(0, 1, 2)) for side in SIDES},
     )
+
+
+def _peaks(x: Any) -> Any:
+    """The peak of each turn, shape (starts, turns), of values of the shape (starts, turns, points)."""
+    return np.max(np.abs(x), axis=2)
+
+
+def _snatches(drive: Drive, feed: Feed, values: Mapping[str, Any], two_bars: Cycle) -> tuple[Any, float]:
+    """The snatch in each turn, shape (starts, turns), and that of two bars: the largest force at A2 over the force
+    there at rest, of the side on which it is larger."""
+    of_chains, of_bars = [], []
+    for side in SIDES:
+        bars = getattr(two_bars.outputs, side).rocker_joint
+        force = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
+        rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(rods_of(drive)))
+        of_chains.append(_peaks(force) / rest)
+        of_bars.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
+    return np.maximum(*of_chains), float(max(of_bars))
+
+
+def _quantiles(peaks: Mapping[str, Any]) -> dict[str, float]:
+    """Median and quantile of peaks of the shape (starts, turns), with their intervals, by the names in
+    `SpeedNumbers`; NaN if the starts differ too much for an interval."""
+    numbers: dict[str, float] = {}
+    for name, sizes in peaks.items():
+        for title, q in (("median", 0.5), ("high", HIGH)):
+            estimate = quantile(sizes, q)
+            numbers |= {
+                f"{name}_{title}": float(np.quantile(sizes, q)),
+                f"{name}_{title}_from": estimate.low if estimate else math.nan,
+                f"{name}_{title}_to": estimate.high if estimate else math.nan,
+            }
+    return numbers
 
 
 def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> tuple[float, float]:

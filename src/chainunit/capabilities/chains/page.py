@@ -23,7 +23,7 @@ from .result import ChainResult, CriticalSpeed, SpeedNumbers
 PICTURES = Pictures()
 CERTAIN = 0.02
 """The tables give the interval of a number where it is wider than this share of the number."""
-_OWN = (
+_ROWS = (
     ("crank torque, peak", ("crank_torque_median", "crank_torque_high", "two_bar_crank_torque")),
     ("crank torque, RMS", ("crank_torque_rms", "", "two_bar_crank_torque_rms")),
     ("rocker torque, peak", ("rocker_torque_median", "rocker_torque_high", "two_bar_rocker_torque")),
@@ -38,6 +38,8 @@ _OWN = (
     ("largest angle between neighbouring rods", ("fold_largest", "", "")),
     ("energy residual of an organ, share of the energy moved", ("energy_residual", "", "")),
 )
+"""The rows at the speed of the study: a title, and the numbers of the median, the quantile and two bars; empty for
+none."""
 _ORDERS = (
     "Modes are the natural modes of an organ, counted from the lowest frequency; at order n, n times the crank speed "
     "is the natural frequency of the mode."
@@ -58,7 +60,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
     if not chain.avoid and len(chain.speeds) > 1:
         ends = number(x.speeds[0].speed), number(x.speeds[-1].speed)
         yield b.Text(filled("No speed to avoid from {} to {}.", *ends), "fine")
-    yield _own_speed(x)
+    yield _at_study_speed(x)
     slack = {
         side: join(
             filled("{}: {}", rod.rod, number(rod.share))
@@ -103,23 +105,20 @@ def _estimate(x: SpeedNumbers, name: str, unknown: str = "starts differ") -> Lin
     return line(size, Aside(filled("{} to {}", least, most)))
 
 
-def _own_speed(x: ChainResult) -> b.Table:
-    rows = [
-        b.TableRow((title, *(_estimate(x.own, name) if name else "" for name in names)))
-        for title, names in _OWN
+def _at_study_speed(x: ChainResult) -> b.Table:
+    """The table of chains beside two bars at the speed of the study, and of the distance to a resonance."""
+    rows: list[tuple[b.Cell, ...]] = [
+        (title, *(_estimate(x.own, name) if name else "" for name in names)) for title, names in _ROWS
     ]
     if number(x.resonance).value is not None:
-        rows += [
-            b.TableRow(("resonance of an organ, crank speed", number(x.resonance), "", "")),
-            b.TableRow(
-                ("relative distance of the speed from it (negative: below)", number(x.distance), "", "")
-            ),
-        ]
+        distance = "relative distance of the speed from it (negative: below)"
+        rows.append(("resonance of an organ, crank speed", number(x.resonance), "", ""))
+        rows.append((distance, number(x.distance), "", ""))
     title = "Chains and two bars at constant {}, {} starts of {} turns; in brackets: the interval of {} confidence"
     sizes = map(exact, (x.own.speed, x.starts, x.turns, x.confidence))
     quantile = filled("chains, {} of turns", exact(x.quantile))
     heads = b.heads("peaks of single turns", "chains, median", quantile, "two bars")
-    return b.Table(tuple(rows), heads, title=filled(title, *sizes))
+    return b.Table(tuple(map(b.TableRow, rows)), heads, title=filled(title, *sizes))
 
 
 def _sweep(x: ChainResult) -> b.Table:

@@ -347,6 +347,8 @@ def _order(candidate: CouplingCandidate) -> tuple[bool, float, float, str]:
 
 
 def _judged(candidate: CouplingCandidate, best: CouplingCandidate, name: str) -> CouplingCandidate:
+    """A coupling of the catalogue with its verdict and the reason for it, beside the `best` one; `name` is the one
+    that the file names, or empty."""
     hardest, price = candidate.hardest, candidate.price
     value, limit = (number(x, hardest.unit, hardest.kind) for x in (hardest.value, hardest.limit))
     share = f"{hardest.title} {value}, {number(hardest.utilisation, '1', 'used')} of the permitted {limit}"

@@ -160,6 +160,8 @@ def _check_keys(
 
 
 def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, BearingPlan]:
+    """By title of its pin, the bearing of each of the `tables` [bearing.name]: a name that several pins begin with
+    stands for a bearing in each of them."""
     taken: dict[str, str] = {}
 
     def read(entry: Entry, name: str) -> tuple[list[str], BearingPlan]:
@@ -188,6 +190,8 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
 
 
 def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, SectionPlan]:
+    """By name, the section of each of the `tables` [section.name], with the whole title of its pin."""
+
     def read(entry: Entry, name: str) -> SectionPlan:
         for key in t.SECTION_NEEDS:
             if key not in entry.raw:
@@ -195,27 +199,35 @@ def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
                 entry.fault(key, f"must be given{choice}")
         keys = {key: entry.raw.pop(key) for key in t.SECTIONS.keys if key in entry.raw}
         if pin := keys.get("pin"):
-            pins = _pins_named(pin, titles)
-            if len(pins) > 1:
-                entry.fault("pin", f"stands for {', '.join(pins)}; give the whole title of one")
-            elif not pins:
-                entry.fault("pin", _no_pin(pin, titles))
-            else:
-                (keys["pin"],) = pins
+            keys["pin"] = _only_pin(entry, pin, titles)
         notch = keys.get("notch", "none")
-        _check_keys(
-            entry, "notch", notch, t.NOTCH_KEYS[t.SHOULDER] if notch == t.SHOULDER else (), t.NOTCH_KEYS
-        )
+        needed = t.NOTCH_KEYS[t.SHOULDER] if notch == t.SHOULDER else ()
+        _check_keys(entry, "notch", notch, needed, t.NOTCH_KEYS)
         entry.refuse()
         table = instance(t.SectionTable, entry.raw)
         if table.bore >= table.diameter:
             entry.fault("bore", "must be less than the diameter")
         if notch == t.SHOULDER:
-            depth = 0.5 * (table.outer_diameter - table.diameter)
-            if table.diameter > _LEAST_STEP * table.outer_diameter:
-                entry.fault("outer_diameter", f"must be at least the diameter over {_LEAST_STEP:g}")
-            elif table.radius < _LEAST_FILLET * depth:
-                entry.fault("radius", f"must be at least {_LEAST_FILLET:g} of the depth of the shoulder")
+            _check_shoulder(entry, table)
         return SectionPlan(table, **keys)
 
     return t.SECTIONS.read_named(tables, faults, read)
+
+
+def _only_pin(entry: Entry, name: str, titles: list[str]) -> str:
+    """The title of the one pin with a name; a fault of the entry if there is none or more than one."""
+    pins = _pins_named(name, titles)
+    if len(pins) > 1:
+        entry.fault("pin", f"stands for {', '.join(pins)}; give the whole title of one")
+    elif not pins:
+        entry.fault("pin", _no_pin(name, titles))
+    return pins[0] if len(pins) == 1 else name
+
+
+def _check_shoulder(entry: Entry, table: t.SectionTable) -> None:
+    """Refuse a shoulder for which DIN 743-2 does not hold: one that is too low, or whose fillet is too sharp."""
+    depth = 0.5 * (table.outer_diameter - table.diameter)
+    if table.diameter > _LEAST_STEP * table.outer_diameter:
+        entry.fault("outer_diameter", f"must be at least the diameter over {_LEAST_STEP:g}")
+    elif table.radius < _LEAST_FILLET * depth:
+        entry.fault("radius", f"must be at least {_LEAST_FILLET:g} of the depth of the shoulder")

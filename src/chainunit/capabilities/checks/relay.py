@@ -112,18 +112,19 @@ def stall_heat(
     stall_current: float,
     after: float | None = None,
 ) -> StallHeat | None:
-    """An event: the trip of the slowest relay of a class, and the heat of the motor until then. `time` [s] since the
-    event and `current` [A] are of shape (n,); the current flows on as `lasting_current` says. None if the relay never
-    trips."""
+    """The trip of the slowest relay of a class, set to `setting` [A], in an event, and the heat of the motor until
+    then, as time with its `stall_current` [A]; None if the relay never trips. The run has the `time` since the event
+    [s] and the `current` [A], shape (n,); `before` is the RMS current before it [A], for `after` see
+    `lasting_current`."""
     if before >= TRIPS_AT * setting:
         return None
-    lasts = lasting_current(current, after)
-    trip = relay_trip(time, current, setting, before, lasts, relay_class.longest)
+    lasting = lasting_current(current, after)
+    trip = relay_trip(time, current, setting, before, lasting, relay_class.longest)
     if trip is None:
         return None
     until = time <= trip
     heat = float(np.trapezoid((current[until] / stall_current) ** 2, time[until]))
-    heat += max(0.0, trip - float(time[-1])) * (lasts / stall_current) ** 2
+    heat += max(0.0, trip - float(time[-1])) * (lasting / stall_current) ** 2
     return StallHeat(trip_time=trip, seconds=heat)
 
 

@@ -108,7 +108,8 @@ def compare(a: StoredResult, b: StoredResult) -> StudyComparison:
     values = {side: dict(_given_values(stored.data)) for side, stored in results.items()}
     runs = {side: _runs(stored.data) for side, stored in results.items()}
     drivers = {stored.words("driver") or USUAL_DRIVER for stored in results.values()}
-    descriptions = _words(drivers.pop() if len(drivers) == 1 else "driver")
+    driver = drivers.pop() if len(drivers) == 1 else "driver"
+    descriptions = {v.name: v.described(driver) for kind in (ShaftAnswers, Answers) for v in variables(kind)}
     names = dict.fromkeys([*values["a"], *values["b"]])
     different = [name for name in names if not _same(*(values[side].get(name) for side in SIDES))]
     origins = {side: as_mapping(stored.data.get("origins")) for side, stored in results.items()}
@@ -235,11 +236,6 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
 
 
 # -- their words
-
-
-def _words(driver: str) -> dict[str, str]:
-    """By name, the words on the numbers of a result."""
-    return {v.name: v.described(driver) for kind in (ShaftAnswers, Answers) for v in variables(kind)}
 
 
 def _spoken(name: str, descriptions: Mapping[str, str]) -> str:

@@ -54,6 +54,8 @@ def _opening(x: StudyComparison) -> Iterator[b.Block]:
 
 
 def _given(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
+    """The given values that differ; in the long form also those of events that one study has alone, and how many are
+    equal."""
     names, equal = comparison.given, exact(x.given_equal)
     # of an event that one of them has alone the terminal gives the name of its run
     alone = tuple(f"event.{event}." for side in comparison.only.values() for event in side.events)
@@ -111,6 +113,7 @@ def _only(comparison: StudyComparison) -> Iterator[b.Block]:
 
 
 def _runs(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
+    """A table of the measures of each run; the runs in which all are equal are only named."""
     equal = []
     for run, compared in comparison.runs.items():
         measures = compared.measures.items()

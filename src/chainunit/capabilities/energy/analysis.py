@@ -215,6 +215,7 @@ class _Task:
         )
 
     def _duty(self, drive: Drive, inverter: InverterRating | None, suffix: str) -> LoadDuty:
+        """The runs of the loads with a drive; `suffix` follows their names in the progress."""
         steady = self.study.runs.answers[STEADY].winding_temperature
         usual = drive.parameters.ambient.T if steady is None else steady
         # a duty with the feed of the study is its steady running
@@ -228,6 +229,7 @@ class _Task:
         return duty_of(self.work.rig, drive, self.plan.loads, inverter, usual, hottest, progress, is_steady)
 
     def _inverter(self, drive: Drive, motor: CatalogueMotor | None) -> InverterRating | None:
+        """The losses of an inverter for the motor, by the file or typical; None on the line."""
         if not drive.follows or motor is None:
             return None
         power = motor.nameplate.power

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.quantities import Layout, variable_of
+from ...drives.catalogue import CatalogueMotor
 from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
@@ -78,6 +79,10 @@ class FlywheelFindings(Findings):
     def permits(self, wheel: Wheel) -> bool:
         """Whether a flywheel keeps the permitted fluctuation and exceeds no other limit."""
         return wheel.keeps(self.permitted_fluctuation) and not wheel.excesses
+
+    def overloads_motor(self, plate: CatalogueMotor | None) -> bool:
+        """Whether the mean torque of the machine exceeds the rated one of the motor, so that no flywheel helps."""
+        return plate is not None and self.mean_torque > plate.nameplate.torque
 
     @derived("kg.m2", name="by_hand")
     def flywheel_by_hand(self) -> float:
@@ -406,7 +411,7 @@ def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study itself warns for its own
     flywheel."""
     plate = study.setup.config.plate
-    too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
+    too_small = findings.overloads_motor(plate)
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
     if plate is not None and too_small:
         study.findings.say(_TOO_SMALL, mean=findings.mean_torque, rated=plate.nameplate.torque)
@@ -497,33 +502,33 @@ def _on_heavier(findings: FlywheelFindings, study: StudyRecord) -> None:
 
 
 def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
-    """Note the least flywheel that keeps the fluctuation; it is not recommended if another limit is still
-    exceeded."""
-    a, by_hand, has_one = least.answers, findings.flywheel_by_hand, bool(least.flywheel)
+    """Note the least flywheel that keeps the permitted fluctuation, beside that of the hand formula; it is not
+    recommended if another limit is still exceeded. None as a value leaves out the sentence that has it, and empty
+    words keep a sentence."""
+    answers, by_hand, is_needed = least.answers, findings.flywheel_by_hand, bool(least.flywheel)
     left_out = ""
     if by_hand > least.flywheel:
         left_out = ", as it leaves out that the motor's torque rises where the speed falls"
-    elif a.motor_ripple is not None and by_hand < least.flywheel:
+    elif answers.motor_ripple is not None and by_hand < least.flywheel:
         left_out = ", as it leaves out the shaft line"
-    plate = study.setup.config.plate
-    too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
+    too_small = findings.overloads_motor(study.setup.config.plate)
     excesses = [*least.excesses, *(["mean torque"] if too_small else [])]
-    fit = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)
+    fitting = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)
     study.findings.say(
         _LEAST,
         permitted=findings.permitted_fluctuation,
         flywheel=least.flywheel,
-        close=number(CLOSE, "1", "percent", full=False) if has_one else None,
-        bare=None if has_one else "",
+        close=number(CLOSE, "1", "percent", full=False) if is_needed else None,
+        bare=None if is_needed else "",
         by_hand=by_hand or None,
         left_out=left_out,
         none_by_hand=None if by_hand else left_out,
-        beside="With it flywheel and moving masses" if has_one else "Without one the moving masses",
-        stored=a.stored_share_most,
-        current=a.current_share,
-        start=a.start_time,
-        heavy="" if has_one and excesses else None,
+        beside="With it flywheel and moving masses" if is_needed else "Without one the moving masses",
+        stored=answers.stored_share_most,
+        current=answers.current_share,
+        start=answers.start_time,
+        heavy="" if is_needed and excesses else None,
         excesses=", ".join(excesses) or None,
-        fit=number(fit.flywheel, "kg.m2") if fit and excesses else None,
-        no_fit="" if excesses and fit is None else None,
+        fit=number(fitting.flywheel, "kg.m2") if fitting and excesses else None,
+        no_fit="" if excesses and fitting is None else None,
     )

@@ -302,6 +302,7 @@ def _same_rows(first: Recording, second: Recording) -> bool:
 def _problem(
     loads: Any, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
 ) -> Problem:
+    """The problem of the recordings: the plant with the columns that they measure, their runs, and the sensors."""
     sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
     measured = dict.fromkeys(
         name for recording in recordings.values() for name in recording.columns if name != "mark"
@@ -340,6 +341,8 @@ def _run(
 def _sensors(
     plan: IdentificationPlan, measured: Mapping[str, Any], recordings: Mapping[str, Recording]
 ) -> dict[str, Sensor]:
+    """By analog column, what is known of its sensor; an offset that the file does not give is the usual one of the
+    size of the column."""
     sensors = {}
     for name in measured:
         if not MEASURANDS[name].analog:
@@ -353,26 +356,25 @@ def _sensors(
     return sensors
 
 
+def _current_swing(machine: IdentifiedMachine) -> float:
+    """The change of the simulated current within the last turn of the first run that has it, over its mean."""
+    of_current = next(comparison for comparison in machine.best.comparisons if comparison.column == "motor.i")
+    column = machine.columns_over_time(of_current)
+    speed = next(run.crank_speed for run in machine.problem.runs if run.name == of_current.run)
+    turn = column.simulated[column.time > column.time[-1] - 2.0 * np.pi / speed]
+    return float(np.ptp(turn) / np.mean(turn))
+
+
 def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     """Sentences on data that are missing or assumed."""
     runs, motor = machine.problem.runs, machine.config.motor
     columns = {name for run in runs for name in run.recording.columns}
-    if (
-        motor is not None
-        and motor.kind is InductionMotor
-        and "motor.i" in columns
-        and "motor.power" not in columns
-    ):
-        of_current = next(
-            comparison for comparison in machine.best.comparisons if comparison.column == "motor.i"
-        )
-        column = machine.columns_over_time(of_current)
-        speed = next(run.crank_speed for run in runs if run.name == of_current.run)
-        turn = column.simulated[column.time > column.time[-1] - 2.0 * np.pi / speed]
-        swing = np.ptp(turn) / np.mean(turn)
+    is_induction = motor is not None and motor.kind is InductionMotor
+    if is_induction and "motor.i" in columns and "motor.power" not in columns:
         yield (
-            f"The recordings have no active power. The current of this induction motor changes by {100.0 * swing:.2g}"
-            " % within a turn, as most of it magnetises the motor: record the power, too, which tells far more"
+            "The recordings have no active power. The current of this induction motor changes by "
+            f"{100.0 * _current_swing(machine):.2g} % within a turn, as most of it magnetises the motor: record the "
+            "power, too, which tells far more"
         )
     for run in runs:
         yield run.recording.sentence

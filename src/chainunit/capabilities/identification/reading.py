@@ -170,6 +170,7 @@ def _deviation(entry: Entry, variable: Variable, value: float) -> float:
 def _run(
     entry: Entry, name: str, crank_speed: float, numbers: Mapping[str, tuple[Variable, float]], source: str
 ) -> PlannedRun:
+    """A run of the file; `numbers` are those of the study that an amount may be added to, by their full names."""
     content = entry.given
     if not _NAME.fullmatch(name):
         reason = "must begin with a small letter, and have at most 20 small letters, digits and _"
@@ -224,6 +225,7 @@ def _speeds(entry: Entry) -> Iterator[tuple[float, float, float]]:
 
 
 def _sensor(entry: Entry, column: str, table: IdentifyTable) -> SensorKnowledge:
+    """What the file says of the sensor of a column; the `table` has the noise and the gain of all others."""
     content, numbers = entry.given, dict[str, float]()
     for name in ("offset", "resolution"):
         if name in content:

@@ -197,6 +197,7 @@ def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
 
 
 def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
+    """A run as it was identified: its recording and its conditions."""
     run, recording = machine.plan.runs[k], machine.problem.runs[k].recording
     return IdentifiedRun(
         file=str(run.file),
@@ -213,10 +214,10 @@ def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
 
 
 def _number(machine: IdentifiedMachine, estimate: FittedNumber) -> IdentifiedNumber:
-    variable = machine.plan.variables[estimate.unknown.name]
-    name, start = system_name(estimate.unknown.name), machine.information_at_start
-    before = next(one for one in start.determinations if one.name == name)
-    unknown, unit = estimate.unknown, variable.unit
+    """A sought number: as fitted, as known before, and as sharp as was expected at the start values."""
+    unknown, variable = estimate.unknown, machine.plan.variables[estimate.unknown.name]
+    name, unit = system_name(unknown.name), variable.unit
+    at_start = next(entry for entry in machine.information_at_start.determinations if entry.name == name)
     return IdentifiedNumber(
         unit,
         variable.kind,
@@ -231,8 +232,8 @@ def _number(machine: IdentifiedMachine, estimate: FittedNumber) -> IdentifiedNum
         given_deviation=difference(unknown.prior_deviation, unit),
         least=unknown.low,
         most=unknown.high,
-        expected=difference(before.by_both, unit),
-        by_runs=difference(before.by_runs, unit),
+        expected=difference(at_start.by_both, unit),
+        by_runs=difference(at_start.by_runs, unit),
     )
 
 
@@ -254,6 +255,7 @@ def _sum(machine: IdentifiedMachine, combination: Combination) -> DeterminedSum:
 
 
 def _unseen_change(machine: IdentifiedMachine, direction: Combination) -> UnseenChange:
+    """A change of numbers that leaves no trace in any column, in words and by its terms."""
     units = {system_name(u.name): u.unit for u in machine.plan.sought}
     changes = [
         f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"

@@ -382,7 +382,7 @@ class _Freed:
         return {self._names[k]: self._more[k].start + float(x) for k, x in zip(places, changes, strict=True)}
 
     def point(self, names: Collection[str]) -> dict[str, float]:
-        """The same with the values of all other unknowns that follow."""
+        """The best values of these numbers, as of `values`, and of all other unknowns, which follow them."""
         values = self.values(names)
         pairs = zip(self._more, self._now, strict=True)
         steps = [values.get(u.name, u.start) - u.start - now for u, now in pairs]
@@ -404,22 +404,20 @@ class _Freed:
     def _solution(self, places: Sequence[int]) -> tuple[Any, float]:
         """The changes of some numbers from their known values with the least sum of squares, within their bounds, and
         that sum, in parts of that at the fit."""
-        chosen = list(places)
-        # all others go back to their known values
+        chosen, form = list(places), self._form
+        # from the fit all others step back to their known values
         step = -self._now
-        form, step_of = self._form, step.copy()
-        step_of[chosen] = 0.0
-        pull = self._pull[chosen] - form[chosen] @ step_of + self._prior[chosen] * -self._now[chosen]
+        step[chosen] = 0.0
+        pull = self._pull[chosen] - form[chosen] @ step - self._prior[chosen] * self._now[chosen]
         matrix = form[np.ix_(chosen, chosen)] + np.diag(self._prior[chosen])
-        step_of[chosen] = np.linalg.solve(matrix, pull)
-        changes = self._now[chosen] + step_of[chosen]
+        changes = self._now[chosen] + np.linalg.solve(matrix, pull)
         low, high = (
             np.array([getattr(self._more[k], end) - self._more[k].start for k in chosen])
             for end in ("low", "high")
         )
         changes = np.clip(changes, low, high)
-        step_of[chosen] = changes - self._now[chosen]
-        cost = step_of @ form @ step_of - 2.0 * self._pull @ step_of
+        step[chosen] = changes - self._now[chosen]
+        cost = step @ form @ step - 2.0 * self._pull @ step
         return changes, float(cost + np.sum(self._prior[chosen] * changes**2))
 
 

@@ -81,6 +81,7 @@ def find(question: LinearQuestion, progress: TaskProgress) -> LinearResult:
 
 
 def _pairs(text: str | None) -> list[tuple[str, str]]:
+    """The pairs (input, output) of the option --pairs; none without it."""
     if text is None:
         return []
     pairs = []

@@ -137,6 +137,9 @@ class Columns:
 
 
 def _pieces(expression: Any, choice: str) -> list[Any]:
+    """The expressions of which an expression is the `choice`, FMIN or FMAX, with choices inside it opened; the
+    expression itself if it is none."""
+
     import casadi
 
     expression = casadi.SX(expression)

@@ -126,36 +126,35 @@ class TurnProgram:
         )
         at_nodes = casadi.horzcat(nodes[:, 0], casadi.repmat(casadi.MX(speed), fine)).T
         mean, distances = table(["mean", "rms"], at_nodes), columns.distance(x)
-        constraints = []
-        for k, row in enumerate(rows):
-            parts: list[Any] = []
-            if row.kind in OVER_TURN:
-                ((_, column, factor),) = row.terms
-                if peaks:
-                    place = peaks * over_turn.index(k)
-                    lanes = extremes[:, place : place + peaks]
-                    value, slope = casadi.vertsplit(columns.function([column], 1)(x, derived, lanes[:2, :]))
-                    parts = [factor * (value - 0.5 * slope**2 * lanes[2, :]).T]
-                else:
-                    parts = [factor * tables[row.kind][column]]
-            elif row.kind in ("mean", "rms"):
-                ((_, column, factor),) = row.terms
-                power = 2 if row.kind == "rms" else 1
-                size = casadi.dot(nodes[:, 1], mean[column] ** power)
-                parts = [factor * (casadi.sqrt(size) if power == 2 else size)]
-            elif row.kind == "distance":
-                ((_, place, factor),) = row.terms
-                parts = [factor * distances[place]]
-            else:
+
+        def terms(k: int, row: Row) -> Any:
+            """The terms of a row at its angles."""
+            if row.kind in ("reached", "slope", "auxiliary"):
                 order = int(row.kind == "slope")
                 reached = [
                     factor
                     * columns.function([column], order)(x, derived, casadi.vertcat(z[n + angle], speed))[-1]
                     for angle, column, factor in row.terms
                 ]
-                parts = [sum(reached, casadi.MX(0.0))]
+                return sum(reached, casadi.MX(0.0))
+            ((_, column, factor),) = row.terms
+            if row.kind == "distance":
+                return factor * distances[column]
+            if row.kind in ("mean", "rms"):
+                power = 2 if row.kind == "rms" else 1
+                size = casadi.dot(nodes[:, 1], mean[column] ** power)
+                return factor * (casadi.sqrt(size) if power == 2 else size)
+            if not peaks:
+                return factor * tables[row.kind][column]
+            place = peaks * over_turn.index(k)
+            lanes = extremes[:, place : place + peaks]
+            value, slope = casadi.vertsplit(columns.function([column], 1)(x, derived, lanes[:2, :]))
+            return factor * (value - 0.5 * slope**2 * lanes[2, :]).T
+
+        constraints = []
+        for k, row in enumerate(rows):
             rest = sum((factor * z[n + place] for place, factor in row.aux), -upper[k])
-            constraints.append((casadi.vertcat(*parts) + rest) / row.scale)
+            constraints.append((casadi.vertcat(terms(k, row)) + rest) / row.scale)
         self._row = np.repeat(np.arange(len(rows)), [part.numel() for part in constraints])
         self._equal = np.array([row.equal for row in rows])[self._row]
         self._lifts = {

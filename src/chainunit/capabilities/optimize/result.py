@@ -252,6 +252,7 @@ def _neighbours(best: Best, neighbours: Neighbours) -> NeighbourCheck:
 
 
 def _front(best: Best) -> list[FrontMachine]:
+    """The machines of the front; chosen is the one nearest to the best machine in both objectives."""
     if not best.front:
         return []
     names, objectives = best.wishes.names, best.wishes.objectives

@@ -71,7 +71,7 @@ class LimitRows:
     def at_most(
         self, q: CycleQuantity, owner: str, scale: float, bound: float = 0.0, objective: int | None = None
     ) -> None:
-        """LimitRows by which a quantity is at most `bound`, or at most `scale` times the variable `objective`."""
+        """Rows by which a quantity is at most `bound`, or at most `scale` times the variable `objective`."""
 
         def add(kind: Kind, column: int, factor: float, times: float = 1.0) -> None:
             aux = () if objective is None else ((objective, -times * scale),)
@@ -93,19 +93,25 @@ class LimitRows:
         elif (mean := self._mean(q)) is not None:
             add(*mean)
         else:
-            places = [self.columns.whole(name) for name in dict.fromkeys(i.column for i in q.integrands)]
-            values = self.turn(places) / scale
-            high = self.auxiliary(float(np.max(values)) + _MARGIN)
-            low = self.auxiliary(float(np.min(values)) - _MARGIN)
-            for k in places:
-                for sign, aux in ((1.0, high), (-1.0, low)):
-                    ends_at = (aux, -sign * scale)
-                    self.rows.append(Row("turn", "", "max", 0.0, scale, ((-1, k, sign),), (ends_at,)))
-            extent = ((high, scale), (low, -scale)) + (() if objective is None else ((objective, -scale),))
+            extent = self._extent(q, scale) + (() if objective is None else ((objective, -scale),))
             self.rows.append(Row("auxiliary", owner, "max", bound, scale, (), extent))
 
+    def _extent(self, q: CycleQuantity, scale: float) -> tuple[tuple[int, float], ...]:
+        """The largest value of any column of a range or a box less the least one: two auxiliary variables, in units
+        of `scale`, between which rows keep all columns at each angle."""
+        places = [self.columns.whole(name) for name in dict.fromkeys(i.column for i in q.integrands)]
+        values = self.turn(places) / scale
+        high = self.auxiliary(float(np.max(values)) + _MARGIN)
+        low = self.auxiliary(float(np.min(values)) - _MARGIN)
+        for k in places:
+            for sign, end in ((1.0, high), (-1.0, low)):
+                self.rows.append(
+                    Row("turn", "", "max", 0.0, scale, ((-1, k, sign),), ((end, -sign * scale),))
+                )
+        return (high, scale), (low, -scale)
+
     def at_least(self, q: CycleQuantity, owner: str, scale: float, bound: float, equal: bool = False) -> None:
-        """LimitRows by which a quantity is at least, or exactly, `bound`."""
+        """Rows by which a quantity is at least, or exactly, `bound`."""
         if (mean := self._mean(q)) is not None:
             kind, column, factor = mean
             self.rows.append(Row(kind, owner, "min", -bound, scale, ((-1, column, -factor),), (), equal))
@@ -117,11 +123,11 @@ class LimitRows:
     def over_turn(
         self, kind: Kind, places: Sequence[int], owner: str, scale: float, upper: float = 0.0
     ) -> None:
-        """LimitRows by which columns are at least ``-upper`` at each angle."""
+        """Rows by which columns are at least ``-upper`` at each angle."""
         self.rows += [Row(kind, owner, "min", upper, scale, ((-1, k, -1.0),)) for k in places]
 
     def distances(self, owner: str, clearance: float, sizes: Any, names: Sequence[str]) -> None:
-        """LimitRows by which the distance from each requirement is at least a share of its size of today."""
+        """Rows by which the distance from each requirement is at least a share of its size of today."""
         for k, (size, name) in enumerate(zip(sizes, names, strict=True)):
             term = ((-1, k, -1.0),)
             self.rows.append(Row("distance", owner, name, -clearance * size, size, term, (), False, size))
@@ -168,7 +174,7 @@ class LimitRows:
         factor: float,
         equal: bool = False,
     ) -> None:
-        """LimitRows by which `factor` times a quantity is at most `upper`, at angles of its own."""
+        """Rows by which `factor` times a quantity is at most `upper`, at angles of its own."""
         terms: list[tuple[int, str, float]] = []
         for reduction in ("max", "min", "peak"):
             names = [i.column for i in q.integrands if i.reduction == reduction]

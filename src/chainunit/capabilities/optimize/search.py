@@ -285,34 +285,41 @@ class Search:
 
     def _followed(self, rows: Sequence[Row], point: Solution, lanes: Lanes) -> tuple[Lanes, bool, float]:
         """The lanes of a further program; whether there must be one: a limit is exceeded between the angles, a peak
-        has moved too far, or a mean is rough; and the most by which a limit is exceeded."""
-        x, aux, highest = self._x(point), point.z[self.columns.size :], self.wishes.slack_free_speed
-        peaks, first, more = [], [], not lanes.sizes[0]
-        for k, before in zip(
-            (k for k, row in enumerate(rows) if row.kind in OVER_TURN), lanes.peaks, strict=True
-        ):
-            row, ((_, column, factor),) = rows[k], rows[k].terms
-            offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
-            is_slack = row.kind == "slack"
-            speeds = [share * highest for share in CHECKED] if is_slack else [self.wishes.crank_speed]
-            top = self._peaks(x, column, factor, speeds, -offset - _LOOKED_AT * row.scale)
-            top[:, 0] = (top[:, 0] + offset) / row.scale
-            # the largest one stays: the next solution may be near it
-            peaks.append(top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))])
-            first.append(speeds[0])
+        has moved too far, or a mean is rough; and the most by which a limit is exceeded, over its scale."""
+        x, over_turn = self._x(point), [k for k, row in enumerate(rows) if row.kind in OVER_TURN]
+        tops, more = [], not lanes.sizes[0]
+        for k, before in zip(over_turn, lanes.peaks, strict=True):
+            tops.append(self._tops(rows[k], x, point.z[self.columns.size :]))
             if len(before):
-                _, (slopes,) = self.columns.values(x, before[:, 0], before[:, 1], [column], 1)
-                holds = point.exceeded[k] > -_MET
-                more |= bool(np.any(holds & (np.abs(slopes * before[:, 2]) > _WAY)))
-        worst = max((float(np.max(top[:, 0])) for top in peaks), default=-math.inf)
-        room = max((2 ** math.ceil(math.log2(len(top))) for top in peaks), default=1)
-        followed = np.zeros((len(peaks), max(room, lanes.sizes[0], 2), 3))
-        for place, top, w in zip(followed, peaks, first, strict=True):
-            place[:, 1] = w
+                angle, speed, inverse_bend = before.T
+                ((_, column, _),) = rows[k].terms
+                _, (slopes,) = self.columns.values(x, angle, speed, [column], 1)
+                has_moved = np.abs(slopes * inverse_bend) > _WAY
+                more |= bool(np.any((point.exceeded[k] > -_MET) & has_moved))
+        worst = max((float(np.max(top[:, 0])) for top in tops), default=-math.inf)
+        # few sizes of programs serve all numbers of peaks
+        room = max((2 ** math.ceil(math.log2(len(top))) for top in tops), default=1)
+        peaks = np.zeros((len(tops), max(room, lanes.sizes[0], 2), 3))
+        for place, top, k in zip(peaks, tops, over_turn, strict=True):
+            place[:, 1] = self._speeds(rows[k])[0]
             place[: len(top)] = top[:, 1:]
         near = [row for row, exceeded in zip(rows, point.exceeded, strict=True) if exceeded[0] > -_NEAR]
         nodes, rough = self._nodes(near, x, lanes.nodes)
-        return Lanes(followed, nodes), more or rough or worst > _EXCEEDED, worst
+        return Lanes(peaks, nodes), more or rough or worst > _EXCEEDED, worst
+
+    def _speeds(self, row: Row) -> list[float]:
+        """The crank speeds at which a row over the turn stands [rad/s]."""
+        highest = self.wishes.slack_free_speed
+        return [share * highest for share in CHECKED] if row.kind == "slack" else [self.wishes.crank_speed]
+
+    def _tops(self, row: Row, x: Any, aux: Any) -> Any:
+        """The peaks of a row over the turn near its limit, and the largest one, near which the next solution may be:
+        as of `_peaks`, with the share of its scale by which each exceeds the limit in place of the value."""
+        ((_, column, factor),) = row.terms
+        offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
+        top = self._peaks(x, column, factor, self._speeds(row), -offset - _LOOKED_AT * row.scale)
+        top[:, 0] = (top[:, 0] + offset) / row.scale
+        return top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))]
 
     def _is_tight(self, row: Row, x: Any) -> bool:
         """Whether a mean is near its limit at a machine."""
@@ -375,6 +382,9 @@ class Search:
         point: Solution,
         worst: float,
     ) -> Answer:
+        """The answer at a solution. `slacks` are the misses of an elastic program by their limits, and `worst` is the
+        most by which a limit is exceeded between the angles, over its scale. IPOPT's multipliers become derivatives
+        by the limits."""
         n, span = self.columns.size, self.columns.span
         # the inner points of IPOPT end a little off the bounds
         y = point.z[:n]

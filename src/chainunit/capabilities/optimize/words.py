@@ -113,7 +113,7 @@ def conflict_sentences(best: Best) -> Iterator[str]:
     """Why no machine meets the limits: which of them conflict, and how near the nearest machine comes."""
     assert best.conflict is not None
     wishes, conflict = best.wishes, best.conflict
-    limits = {limit.name: limit for limit in wishes.limits}
+    quantities = {limit.name: limit.quantity for limit in wishes.limits}
     alone, together = (
         [_wish_words(best, name) for name in names] for names in (conflict.alone, conflict.together)
     )
@@ -126,21 +126,21 @@ def conflict_sentences(best: Best) -> Iterator[str]:
             f"{begin} has {' and '.join(filter(None, (', '.join(together[:-1]), together[-1])))} together; without "
             "any one of them the others can be met."
         )
-    several = len(conflict.names) > len(conflict.together) and len(conflict.names) > 1
-    reached = [
-        f"{name} = {number(value, limits[name].quantity.unit, limits[name].quantity.kind)}"
-        for name, value in (
-            conflict.alone if several else {n: best.found.get(n, math.nan) for n in conflict.names}
-        ).items()
-        if name in limits and not math.isnan(value)
-    ]
-    if reached and several:
+    # limits that are impossible alone have a nearest machine each
+    several = bool(conflict.alone) and len(conflict.names) > 1
+    values = conflict.alone if several else {n: best.found.get(n, math.nan) for n in conflict.names}
+    reached = ", ".join(
+        f"{name} = {number(value, quantities[name].unit, quantities[name].kind)}"
+        for name, value in values.items()
+        if name in quantities and not math.isnan(value)
+    )
+    which = "machine that comes nearest has"
+    if several and len(conflict.alone) == 1:
+        which = "machine that comes nearest to the first of these limits alone has"
+    elif several:
         which = "machines that come nearest to each of these limits alone have"
-        if len(conflict.alone) == 1:
-            which = "machine that comes nearest to the first of these limits alone has"
-        yield f"The {which} {', '.join(reached)}."
-    elif reached:
-        yield f"The machine that comes nearest has {', '.join(reached)}."
+    if reached:
+        yield f"The {which} {reached}."
     if conflict.bounds:
         units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
         bounds = (

@@ -61,7 +61,7 @@ class RandomOverloads(Capability):
         return RandomPlan(_EVENT, event, int(table.runs), float(table.duration), int(table.seed))
 
     def not_with_foreign_motor(self, plan: RandomPlan) -> str:
-        """They read the motor's current and torque."""
+        """The refusal of runs at random: they read the motor's current and torque."""
         if not plan.runs:
             return ""
         return (

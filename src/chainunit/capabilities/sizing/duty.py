@@ -102,23 +102,24 @@ def cycle_numbers(
     one_sided: Mapping[SideName, Cycle],
     heavier: SideName | None,
 ) -> CycleNumbers:
-    """The numbers of a duty at that speed of the crank [rad/s], with the `ratio` of the gear. With all feed on one
-    side the RMS torque is that of the heavier side, and the peak the larger of both sides."""
-    w, share = crank_speed, demands.one_sided_share
-    inertia, wanted = normal.outputs.J * ratio**2, None
+    """The numbers of a duty at that speed of the crank [rad/s], with the `ratio` of the gear. The RMS torque has the
+    feed on the `heavier` side for the share of the time that the `demands` state, and the normal feed otherwise. An
+    infinite fluctuation stands for none that is wanted."""
+    torque, inertia, wanted = normal.crank_torque, normal.outputs.J * ratio**2, None
     if math.isfinite(demands.fluctuation):
-        swings = [energy_swing(turn) for turn in np.atleast_2d(normal.crank_torque)]
-        wanted = needed_inertia(float(np.quantile(swings, HIGH)), w, demands.fluctuation)
-    mean = float(np.mean(normal.crank_torque))
-    cases = [(1.0, normal.crank_torque)]
+        swings = [energy_swing(turn) for turn in np.atleast_2d(torque)]
+        wanted = needed_inertia(float(np.quantile(swings, HIGH)), crank_speed, demands.fluctuation)
+    mean = float(np.mean(torque))
+    parts = [(1.0, torque)]
     if heavier is not None:
-        cases = [(1.0 - share, normal.crank_torque), (share, one_sided[heavier].crank_torque)]
+        share = demands.one_sided_share
+        parts = [(1.0 - share, torque), (share, one_sided[heavier].crank_torque)]
     return CycleNumbers(
-        power_mean=mean * w,
+        power_mean=mean * crank_speed,
         torque_mean=mean,
         torque_peak=_peak(normal),
         torque_peak_one_sided=max(map(_peak, one_sided.values()), default=None),
-        torque_rms=rms(*cases),
+        torque_rms=rms(*parts),
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),

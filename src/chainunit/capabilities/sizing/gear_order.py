@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from ...drives.gearing import ordered_torque
@@ -62,32 +62,51 @@ def gear_order(
     `gear.start_factor` times the rated torque on the gear."""
     if study.setup.insufficient or STEADY not in study.runs.answers:
         return None
-    gear, wrong, peaks = study.setup.config.drive.gear, wrong_runs(study.runs), gear_peaks(study.runs)
-    running, factor, kept = running_peak(study, at_gear), gear.start_factor, 1.0 - margin
+    setup, wrong, peaks = study.setup, wrong_runs(study.runs), gear_peaks(study.runs)
+    findings = StartFindings.found_in(study.findings)
+    starts, overloads = _starts(setup, findings, peaks), _overloads(setup, setting, peaks)
+    left_out = tuple(name for name in wrong if name in overloads)
+    starts, overloads = (
+        {name: torque for name, torque in torques.items() if name not in wrong}
+        for torques in (starts, overloads)
+    )
+    loads = dict(_loads(study, setting, margin, service, starts, overloads))
+    least, bare = max(load.rated for load in loads.values()), _overloads(setup, None, peaks)
+    permitted = setup.config.drive.gear.start_factor * (1.0 - margin)
+    without = max([least, *(bare[name] / permitted for name in overloads)])
+    transient = None if findings is None else findings.transient
+    return GearOrder(ordered_torque(least), loads, left_out, ordered_torque(without), transient)
+
+
+def _loads(
+    study: StudyRecord,
+    setting: Setting | None,
+    margin: float,
+    service: float,
+    starts: Mapping[str, float],
+    overloads: Mapping[str, float],
+) -> Iterator[tuple[str, GearLoad]]:
+    """The loads of a gear by name: running, the motor at its rating, and the hardest of the `starts` and of the
+    `overloads`, torques by name [N m]."""
+    gear, kept = study.setup.config.drive.gear, 1.0 - margin
+    running, factor = running_peak(study, at_gear), gear.start_factor
     free = f", {number(margin, '1', 'percent', full=False)} of the rated torque left free" if margin else ""
-    loads = {"running": GearLoad(running.torque, running_words(study.runs, running.run), kept, free)}
+    yield "running", GearLoad(running.torque, running_words(study.runs, running.run), kept, free)
     times = f" times the service factor {service:g}"
     if study.setup.plate is not None:
         rated = study.setup.plate.nameplate.torque * study.setup.drive.ratio * gear.efficiency
-        loads["service"] = GearLoad(rated, "the motor at its rating", 1.0 / service, times)
-    findings = StartFindings.found_in(study.findings)
-    starts, overloads = _starts(study.setup, findings, peaks), _overloads(study.setup, setting, peaks)
-    left_out = tuple(name for name in wrong if name in overloads)
-    if starts := {name: torque for name, torque in starts.items() if name not in wrong}:
+        yield "service", GearLoad(rated, "the motor at its rating", 1.0 / service, times)
+    if starts:
         name = max(starts, key=lambda name: starts[name])
         title = f"a start ({study.runs.title_of(name)})" if name else "a start"
         rule = f", permitted {factor:g} x rated,{times}"
-        loads["start"] = GearLoad(starts[name], title, factor / service, rule)
-    if overloads := {name: torque for name, torque in overloads.items() if name not in wrong}:
+        yield "start", GearLoad(starts[name], title, factor / service, rule)
+    if overloads:
         name = max(overloads, key=lambda name: overloads[name])
         with_coupling = setting is not None and setting.torque and name in setting.effects
         title = f"an overload ({study.runs.title_of(name)}{', with the limiter' if with_coupling else ''})"
         rule = f", permitted {factor:g} x rated{free}"
-        loads["overload"] = GearLoad(overloads[name], title, factor * kept, rule)
-    least, bare = max(load.rated for load in loads.values()), _overloads(study.setup, None, peaks)
-    without = max([least, *(bare[name] / (factor * kept) for name in overloads)])
-    transient = None if findings is None else findings.transient
-    return GearOrder(ordered_torque(least), loads, left_out, ordered_torque(without), transient)
+        yield "overload", GearLoad(overloads[name], title, factor * kept, rule)
 
 
 def _starts(

@@ -140,8 +140,8 @@ def is_overtaxed(c: Candidate) -> bool:
 
 
 def spent(c: Candidate, tried: Iterable[Candidate]) -> Candidate | None:
-    """The candidate `c`, whose gear the runs of a candidate that was `tried` with another gear surely rule out, with
-    the values of these runs beside its own limits; None where it has to be tried itself."""
+    """The candidate `c` without runs of its own, if its gear surely does not hold: it has the values of a candidate
+    that was `tried` with another gear, beside the limits of its own gear. None if it has to be tried itself."""
     assert c.sold is not None
     data, transmission = c.sold.data, c.sold.transmission
     limits = {

@@ -54,7 +54,8 @@ def inverter_needs(best: Candidate, is_given: bool) -> Iterator[str]:
     """The settings of the inverter, whose boost may be given."""
     boost, trial = best.drive.parameters.inverter.boost, best.trial
     if best.starts and not is_given:
-        text = f"The inverter needs a voltage boost of {_percent(boost)} at frequency zero (starter.inverter.boost)"
+        share = number(boost, "1", "percent", full=False)
+        text = f"The inverter needs a voltage boost of {share} at frequency zero (starter.inverter.boost)"
         less = f"; with less the motor does not start the machine from every {best.drive.driver_noun} angle"
         usual = usual_boost(best.drive.parameters, best.motor.nameplate)
         yield f"{text}{less if boost > usual else ''}."
@@ -68,7 +69,3 @@ def inverter_needs(best: Candidate, is_given: bool) -> Iterator[str]:
         "The electronic motor protection of the inverter stands in place of a thermal relay: set it to the rated "
         "current of the motor. No trip class is to be chosen for it."
     )
-
-
-def _percent(share: float) -> str:
-    return number(share, "1", "percent", full=False)

@@ -55,13 +55,12 @@ _BY_PRICE = (
 
 
 def order_words(larger: float, objective: str) -> list[str]:
-    """The criteria of `choice` in their order, in words."""
-    texts = dict(ORDER)
-    if objective == PRICE:
-        rest = {
-            name: text for name, text in texts.items() if name not in (Criterion.MARGIN, Criterion.LARGER)
-        }
-        texts = {Criterion.MARGIN: texts[Criterion.MARGIN], Criterion.PRICE: _BY_PRICE} | rest
+    """The criteria of `choice` in their order, in words. If the price is the objective, it stands in the place of the
+    power that is up to `larger` times the smallest one."""
+    texts = {
+        criterion: _BY_PRICE if objective == PRICE and criterion is Criterion.LARGER else text
+        for criterion, text in ORDER.items()
+    }
     return [text.format(larger=f"{larger:g}") for text in texts.values()]
 
 

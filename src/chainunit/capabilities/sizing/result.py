@@ -334,6 +334,8 @@ def _effects(runs: StudyRuns, effects: Mapping[str, CouplingEffect]) -> dict[str
 
 
 def _relay(study: StudyRecord, rated: float) -> MotorProtection:
+    """The protection of a motor with that `rated` current [A]: a relay with its setting and trip class, or the
+    inverter's own."""
     if study.setup.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)

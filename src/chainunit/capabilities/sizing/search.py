@@ -338,8 +338,8 @@ def _is_weak(c: Candidate) -> bool:
 def _cost_of_wishes(
     trials: MotorTrials, motors: list[CatalogueMotor], candidates: list[Candidate], progress: TaskProgress
 ) -> str:
-    """The wishes of the file that decide the choice, beside the choice without them, in words; empty where none
-    decides."""
+    """The wishes of the file that decide the choice, and the choice without them, in words; empty if none decides.
+    Motors up to the largest one among the rivals of the best candidate are tried without the wishes."""
     best, demands = candidates[0], trials.plan.demands
     rivals = [c for c in candidates if not best.fits or c.power <= best.power]
     deciding = {name for c in rivals for name in _wishes_of(c)}
@@ -348,26 +348,35 @@ def _cost_of_wishes(
         return ""
     names = " and ".join(f"sizing.{key} = {_value(demands, key)}" for key in wishes)
     progress(f"the choice without {names}", 0.0, 1.0)
-    free = dataclasses.replace(demands, candidates=1, **dict.fromkeys(wishes, math.inf))
-    plan = dataclasses.replace(trials.plan, demands=free)
-    without = dataclasses.replace(trials, task=dataclasses.replace(trials.task, plan=plan))
     largest = max(c.power for c in rivals)
-    other = _search(without, [m for m in motors if m.nameplate.power <= largest], progress)[0]
+    small = [m for m in motors if m.nameplate.power <= largest]
+    other = _search(_without_wishes(trials, wishes), small, progress)[0]
     is_same = (other.motor, other.gear) == (best.motor, best.gear)
     if not other.fits or (best.fits and is_same and other.drive.added_inertia >= best.drive.added_inertia):
         return ""
+    return f"{names} {'decide' if len(wishes) > 1 else 'decides'}: else {_would_do(other, best)}"
+
+
+def _without_wishes(trials: MotorTrials, wishes: Sequence[str]) -> MotorTrials:
+    """The same trials without the limits of these `wishes`, for the first motor that fits."""
+    demands = dataclasses.replace(trials.plan.demands, candidates=1, **dict.fromkeys(wishes, math.inf))
+    plan = dataclasses.replace(trials.plan, demands=demands)
+    return dataclasses.replace(trials, task=dataclasses.replace(trials.task, plan=plan))
+
+
+def _would_do(other: Candidate, best: Candidate) -> str:
+    """Another candidate as the choice, in words, with its start and its price beside those of a `best` that fits."""
     wheel = f"a flywheel of {other.flywheel_words}" if other.disc else "no flywheel"
-    verb = "decide" if len(wishes) > 1 else "decides"
-    sentence = f"{names} {verb}: else {other.motor.designation} with {wheel} would do"
+    text = f"{other.motor.designation} with {wheel} would do"
     if not best.fits:
-        return sentence
+        return text
     starts = [c.checks["gear_start"].value for c in (best, other) if "gear_start" in c.checks]
     if len(starts) == 2:
         here, there = (number(torque, "N.m") for torque in starts)
-        sentence += f", and its start would put {there} on the gear in place of {here}"
+        text += f", and its start would put {there} on the gear in place of {here}"
     if best.price is not None and other.price is not None:
-        sentence += f", at a price of {other.price:g} in place of {best.price:g}"
-    return sentence
+        text += f", at a price of {other.price:g} in place of {best.price:g}"
+    return text
 
 
 def _wishes_of(c: Candidate) -> set[str]:

@@ -208,23 +208,23 @@ class SizingPlan:
         """The source of the service factor of a gear in words; see `gear_factor`."""
         starts = f"{float(self.demands.starts_per_hour):g}"
         noun = "start" if starts == "1" else "starts"
-        return self._factor_words(inertia_factor, f"{starts} {noun} an hour; typical of makers")
+        return self._factor_source(inertia_factor, f"{starts} {noun} an hour; typical of makers")
 
     def belt_words(self, inertia_factor: float, is_on_line: bool) -> str:
         """The source of the service factor of a belt in words; see `belt_factor`."""
         start = (
             "started direct on line, or as hard" if is_on_line else "started in star and delta or more gently"
         )
-        return self._factor_words(inertia_factor, f"{start}; DIN 7753-2")
+        return self._factor_source(inertia_factor, f"{start}; DIN 7753-2")
 
-    def _factor_words(self, inertia_factor: float, rest: str) -> str:
+    def _factor_source(self, inertia_factor: float, starts: str) -> str:
+        """The source of a service factor in words: the file, or class of the load, hours a day and `starts`, which is
+        the clause on the starts and the table of factors."""
         if self.demands.service_factor:
             return "of the file"
+        load, hours = LOAD_WORDS[self.load(inertia_factor)], f"{float(self.demands.hours):g} h a day"
         by = "by the file" if self.load_class else f"by an inertia factor of {inertia_factor:.3g}"
-        load, hours = LOAD_WORDS[self.load(inertia_factor)], f"{float(self.demands.hours):g}"
-        return (
-            f"{load} {by}, {hours} h a day, {rest} (sizing.load_class, sizing.hours, sizing.service_factor)"
-        )
+        return f"{load} {by}, {hours}, {starts} (sizing.load_class, sizing.hours, sizing.service_factor)"
 
     @property
     def offer(self) -> GearOffer:

@@ -349,22 +349,23 @@ class Trial:
             inertia = float(np.max(load_inertia(self.drive, self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
-        if "gear.torque_limit" in self.task.tables.given:
-            gear = self.task.tables.gear
-            checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")
-            first = quasi_static_peak(self.drive, self.start)
-            hardest = max([first, *(s.quasi_static for s in self.starts)])
-            title = "torque of the gear in a start"
-            checks["gear_start"] = Check(title, hardest, gear.start_limit, "N.m")
-            if (rating := self.drive.gear_rating) is not None:
-                factor = self.task.plan.gear_factor(self.inertia_factor)
-                title += ", times the service factor"
-                checks["gear_start"] = Check(title, factor * hardest, gear.start_limit, "N.m")
-                title = "rated torque of the motor at the gear, times the service factor"
-                rated = plate.torque * self.drive.ratio * gear.efficiency
-                checks["gear_service"] = Check(title, factor * rated, gear.torque_limit, "N.m")
-                checks |= gear_checks(rating, self.drive, self._running, self._cases)
-        return checks
+        return checks | self._gear_checks() if "gear.torque_limit" in self.task.tables.given else checks
+
+    def _gear_checks(self) -> dict[str, Check]:
+        """The checks of a gear whose permitted torque is known; a gear of a catalogue also has a service factor."""
+        gear, rating = self.task.tables.gear, self.drive.gear_rating
+        checks = {"gear": Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")}
+        starts = [quasi_static_peak(self.drive, self.start), *(s.quasi_static for s in self.starts)]
+        hardest, title = max(starts), "torque of the gear in a start"
+        if rating is None:
+            return checks | {"gear_start": Check(title, hardest, gear.start_limit, "N.m")}
+        factor = self.task.plan.gear_factor(self.inertia_factor)
+        title += ", times the service factor"
+        checks["gear_start"] = Check(title, factor * hardest, gear.start_limit, "N.m")
+        title = "rated torque of the motor at the gear, times the service factor"
+        rated = self.motor.nameplate.torque * self.drive.ratio * gear.efficiency
+        checks["gear_service"] = Check(title, factor * rated, gear.torque_limit, "N.m")
+        return checks | gear_checks(rating, self.drive, self._running, self._cases)
 
 
 def start_check(

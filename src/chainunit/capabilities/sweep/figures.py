@@ -81,6 +81,7 @@ def _wide_levels(low: float, high: float) -> tuple[float, ...]:
 
 
 def _map(summary: SweepSummary, name: str) -> fig.Figure:
+    """The map of a result over two parameters; a long axis is thinned."""
     plan, dataset = summary.findings.plan, summary.findings.dataset
     across, up = plan.parameters
     order = {
@@ -126,6 +127,7 @@ def _infeasible(summary: SweepSummary, x: Any, y: Any, reason: Any) -> Iterator[
 
 
 def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
+    """The results over the only parameter, some rows of panels a figure; many points are thinned."""
     findings = summary.findings
     (parameter,), points = findings.plan.parameters, findings.points
     part = points.isel(point=slice(None, None, -(-points.sizes["point"] // 20_000)))

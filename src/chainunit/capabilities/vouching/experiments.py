@@ -159,8 +159,10 @@ def _at_point(fmu: UnpackedFmu, point: StatePoint) -> Deviation:
 
 
 def chosen_points(interface: Interface) -> list[StatePoint]:
-    """Points about the start values with the outputs by the equations in Python; always the same. At the first one
-    the parameters have their start values. The crank stands at another angle of its turn at each point."""
+    """The points of the experiments with their outputs by the equations in Python; always the same. The parameters
+    lie about their start values, at the first point on them, and the crank stands at another angle at each point. If
+    no machine has the parameters of a point, they come closer to the start values, by the `SPREADS`; a point without
+    a machine even at the start values is left out."""
     rng = np.random.default_rng(20)
     course, gear = excitation(interface), _gear(interface)
     parameters = interface.signals_of("parameter")
@@ -170,14 +172,13 @@ def chosen_points(interface: Interface) -> list[StatePoint]:
     points = []
     for k in range(POINTS):
         inputs = {name: float(x) for name, x in course(0.08 * k).items()}
-        _turn(interface, inputs, gear, k)
-        at_rest = {"phi_start": gear * _ANGLE * k, "w_start": gear * 0.2 * k}
-        moved = {
-            n: at_rest[end] for n, x in start.items() if x == 0.0 and (end := n.rpartition(".")[2]) in at_rest
-        }
-        factors = {name: 2.0 * rng.random() - 1.0 for name in real}
+        inputs |= _turned_shafts(interface, inputs, gear, k)
+        motion = {"phi_start": gear * _ANGLE * k, "w_start": gear * 0.2 * k}
+        last_words = {name: name.rpartition(".")[2] for name, x in start.items() if x == 0.0}
+        moved = {name: motion[word] for name, word in last_words.items() if word in motion}
+        shifts = {name: 2.0 * rng.random() - 1.0 for name in real}
         for spread in (*SPREADS, 0.0) if k else (0.0,):
-            values = start | moved | {name: start[name] * (1.0 + spread * x) for name, x in factors.items()}
+            values = start | moved | {name: start[name] * (1.0 + spread * x) for name, x in shifts.items()}
             values = {name: quantities[name].within_bounds(x) for name, x in values.items()}
             if (outputs := outputs_at(interface.model, values, inputs)) is not None:
                 points.append(StatePoint(values | inputs, outputs))
@@ -191,17 +192,21 @@ def _gear(interface: Interface) -> float:
     return float(ratios[0] or 1.0) if ratios else 1.0
 
 
-def _turn(interface: Interface, inputs: dict[str, float], gear: float, k: int) -> None:
-    """Turn each shaft among the inputs of the point `k` that has no bounds so far on and so fast that the crank after
-    the gear stands at an angle of its own, and has the speed of the course."""
+def _turned_shafts(
+    interface: Interface, inputs: Mapping[str, float], gear: float, k: int
+) -> dict[str, float]:
+    """Angle, speed and acceleration of each shaft among the `inputs` of the point `k` whose angle has no bounds: the
+    crank after the gear stands at an angle of its own, and has the speed of the course."""
     quantities = {s.name: s.variable.quantity for s in interface.signals_of("input")}
+    turned = dict[str, float]()
     for terminal in interface.model.terminals:
         names = [terminal.members.get(key) for key in ("phi", "w", "a")]
         if set(names) <= set(inputs) and names[0]:
             angle = quantities[names[0]]
             if not math.isfinite(angle.high - angle.low):
-                inputs[names[0]] += _ANGLE * k
-                inputs |= {name: gear * inputs[name] for name in names if name}
+                turned |= {name: gear * inputs[name] for name in names if name}
+                turned[names[0]] = gear * (inputs[names[0]] + _ANGLE * k)
+    return turned
 
 
 def outputs_at(

@@ -57,7 +57,7 @@ def check_bytes(
         check.members = contents(data, name)
     except InputError as error:
         faults = str(error).splitlines()[:_MOST_NAMED]
-    _check_signature(check, data, key, whose, is_read=not faults)
+    check.findings.append(_signature(check, data, key, whose, is_read=not faults))
     for fault in faults:
         check.add(False, "members", fault.removeprefix(f"{name}: "))
     if check.public and not faults:
@@ -65,24 +65,30 @@ def check_bytes(
     return check
 
 
-def _check_signature(check: Inspection, data: bytes, key: bytes | None, whose: str, is_read: bool) -> None:
-    holds, sentence, left = False, "the file is not signed; chainunit vouch certify FILE signs one", ""
-    if signature := signature_of(data):
-        message, public, number = signature
-        signer = fingerprint(public)
-        sentence = f"does not hold: the file was changed, or not signed by the key {signer} that it names"
-        if is_signed(public, number, message):
-            check.public, holds, sentence = public, key == public, f"holds, by {whose} {signer}"
-            if key is None:
-                remedy = "whose it is, a file cannot tell: get the key of the signer, and give --key"
-                sentence = f"is of the key {signer}; {remedy}"
-                left = f"signed by {signer}, whom you have not named"
-            elif key != public:
-                sentence = f"holds, but by another key: expected {fingerprint(key)}, signed by {signer}"
-    elif EVIDENCE in check.members or not is_read:
+def _signature(check: Inspection, data: bytes, key: bytes | None, whose: str, is_read: bool) -> Finding:
+    """The finding on the signature, left open without an expected `key`; the `check` gets the key of one that holds.
+    `is_read` tells whether the members of the file could be read."""
+    topic, signature = "signature", signature_of(data)
+    if not signature and (EVIDENCE in check.members or not is_read):
         remedy = "ask for it as it was certified"
-        sentence = f"is missing: the file is damaged, or another program packed it anew; {remedy}"
-    check.add(None if left else holds, "signature", sentence, left)
+        damaged = f"is missing: the file is damaged, or another program packed it anew; {remedy}"
+        return Finding(False, topic, damaged)
+    if not signature:
+        return Finding(False, topic, "the file is not signed; chainunit vouch certify FILE signs one")
+    message, public, number = signature
+    signer = fingerprint(public)
+    if not is_signed(public, number, message):
+        changed = f"does not hold: the file was changed, or not signed by the key {signer} that it names"
+        return Finding(False, topic, changed)
+    check.public = public
+    if key is None:
+        remedy = "whose it is, a file cannot tell: get the key of the signer, and give --key"
+        left_open = f"signed by {signer}, whom you have not named"
+        return Finding(None, topic, f"is of the key {signer}; {remedy}", left_open)
+    if key != public:
+        other = f"holds, but by another key: expected {fingerprint(key)}, signed by {signer}"
+        return Finding(False, topic, other)
+    return Finding(True, topic, f"holds, by {whose} {signer}")
 
 
 def conclusion(findings: Sequence[Finding]) -> tuple[int, str]:

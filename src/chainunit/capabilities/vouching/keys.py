@@ -93,6 +93,7 @@ def public_key(file: Path) -> bytes:
 
 
 def _loaded(file: Path, load: Callable[[bytes], Any], kind: str, key_class: type) -> Any:
+    """The key in a file, read by `load`; `kind` is its noun."""
     try:
         key = load(file_bytes(file, MIB))
     except InputError as error:

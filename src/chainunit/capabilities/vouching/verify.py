@@ -93,7 +93,8 @@ def _judge_system(check: Inspection, name: str, unrun: str) -> None:
 def _judge_fmu(
     check: Inspection, fmu: UnpackedFmu, stated: Mapping[str, Any], model: Model | None, unrun: str
 ) -> None:
-    """Add a line for each part. Code of the FMU runs only if all else holds, and `unrun` gives no reason."""
+    """Add the lines on the equations, on the evidence that the file has `stated`, and on its experiments. Code of the
+    FMU runs only if all else holds and `unrun`, the reason why it does not run, is empty."""
     # the names of the model come with it, and the tables have them
     interface = certify.interface_in(fmu, model)
     tables = ex.tables_in(fmu)
@@ -141,6 +142,7 @@ def _faults(
 
 
 def _run(check: Inspection, fmu: UnpackedFmu, experiments: ex.Experiments, limit: float) -> None:
+    """Run the experiments, and add a finding for each: it holds up to the `limit` of the deviation."""
     try:
         if sentence := make_runnable(fmu):
             check.add(None, "library", sentence, "its own library was not run")

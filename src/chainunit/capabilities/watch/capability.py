@@ -34,8 +34,9 @@ class WatchPlans(PartBeside, EstimateUser):
         return drive if self.observer is None else with_observer(drive, self.observer, feed, turn)
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
-        """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that
-        they make."""
+        """Complete [watch] and [observer] of a study file with the estimated numbers, if it has these tables: the
+        recording is watched with the errors of the estimates, and the observer knows the false imbalance that they
+        make."""
         from ...study.choice import drive_of
         from .observation import false_imbalance_of
 

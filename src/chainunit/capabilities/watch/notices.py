@@ -158,6 +158,7 @@ class ObserverAnalysis(Analysis):
 
 
 def _observed(steady: xr.Dataset, normal: float) -> Observed:
+    """The observer in steady running: its errors and thresholds; `normal` is the usual rocker torque [N m]."""
     estimate = steady["observer.imbalance.feed"].values
     left, right = (steady[f"machine.{side}.material_mass"].values for side in SIDES)
     return Observed(

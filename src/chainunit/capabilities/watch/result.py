@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -35,6 +36,21 @@ class WatchedFile:
     crank_speed: float = quantity("rad/s", "speed of the crank", kind="speed")
     learning: float = quantity("s", "time from the begin in which the observer learns")
 
+    @classmethod
+    def of(cls, watched: WatchedRecording) -> WatchedFile:
+        """The file of a watched recording."""
+        plan, recording = watched.plan, watched.recording
+        duration = float(recording.time[-1]) - float(recording.time[0])
+        return cls(
+            file=str(plan.file),
+            understood=recording.understood,
+            columns=list(recording.columns),
+            duration=duration,
+            turns=duration / plan.turn,
+            crank_speed=plan.crank_speed,
+            learning=plan.table.learning,
+        )
+
 
 @result
 class Thresholds:
@@ -51,6 +67,15 @@ class Thresholds:
     )
     widening: float = quantity("1", "factor by which the thresholds of the feed are wider for it")
     force_widening: float = quantity("1", "factor by which the thresholds of the forces are wider for it")
+
+    @classmethod
+    def of(cls, watched: WatchedRecording, settled: Any) -> Thresholds:
+        """The thresholds at the `settled` rows, without the outermost 2 % of them at either end."""
+        columns = (watched.outputs[f"imbalance.{ground}_threshold"][settled] for ground in GROUNDS)
+        (feed_least, feed_most), (force_least, force_most) = (
+            map(float, np.percentile(column, [2.0, 98.0])) for column in columns
+        )
+        return cls(feed_least, feed_most, force_least, force_most, *watched.uncertainty, *watched.widening)
 
 
 @result
@@ -101,30 +126,15 @@ def summary_of(watched: WatchedRecording) -> WatchSummary:
 
 
 def _summary(watched: WatchedRecording) -> WatchSummary:
+    """The summary of a watched recording; its rows are `settled` after the time of learning."""
     plan, recording, begin = watched.plan, watched.recording, watched.begin
-    learning, start, sought = plan.table.learning, float(recording.time[0]), begin.problem.sought
-    duration = float(recording.time[-1]) - start
-    settled = recording.time > start + learning
-    (feed_least, feed_most), (force_least, force_most) = (
-        map(float, np.percentile(watched.outputs[f"imbalance.{ground}_threshold"][settled], [2.0, 98.0]))
-        for ground in GROUNDS
-    )
-    loads = {load.name for load in sought}
+    settled = recording.time > float(recording.time[0]) + plan.table.learning
+    loads = {load.name for load in begin.problem.sought}
     columns = *columns_watched(recording).values(), speed_column(recording)
-    every = max(1, -(-len(recording.time) // ROWS))
-    declared = declared_outputs()
     return WatchSummary(
         watched=watched,
         heading=Heading.of(watched.config.title, watched.config.file),
-        recording=WatchedFile(
-            file=str(plan.file),
-            understood=recording.understood,
-            columns=list(recording.columns),
-            duration=duration,
-            turns=duration / plan.turn,
-            crank_speed=plan.crank_speed,
-            learning=learning,
-        ),
+        recording=WatchedFile.of(watched),
         learned={
             _file_name(unknown.name): fitted
             for unknown, fitted in fitted_values(begin.problem, begin.fit)
@@ -136,9 +146,7 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
         doubts=list(_doubts(begin)),
         of_feed_alone=not begin.is_described and describes(begin.problem, begin.fit, begin.tests, loads),
         alarms=watched.alarms,
-        thresholds=Thresholds(
-            feed_least, feed_most, force_least, force_most, *watched.uncertainty, *watched.widening
-        ),
+        thresholds=Thresholds.of(watched, settled),
         noise=dict(zip(("signal", "speed"), begin.noises, strict=True)),
         constant_parts=list(constant_parts(recording, [name for name in columns if name])),
         gaps=[Gap(*ends) for ends in recording.gaps if ends[1] - ends[0] > GAP * plan.turn],
@@ -150,9 +158,16 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
             if v.name.split(".")[0] in ("noise", "feed", "force", "offset", "imbalance", "alarm")
         },
         usual=dict(_usual(watched, settled)),
-        course={"time": InUnit(recording.time[::every], "s")}
-        | {name: InUnit(watched.outputs[name][::every], declared[name].unit) for name in OUTPUTS},
+        course=_course(watched),
     )
+
+
+def _course(watched: WatchedRecording) -> dict[str, InUnit]:
+    """Time and outputs at evenly spaced rows, at most `ROWS`."""
+    time, declared = watched.recording.time, declared_outputs()
+    every = slice(None, None, max(1, math.ceil(len(time) / ROWS)))
+    outputs = {name: InUnit(watched.outputs[name][every], declared[name].unit) for name in OUTPUTS}
+    return {"time": InUnit(time[every], "s"), **outputs}
 
 
 def _file_name(name: str) -> str:

@@ -55,13 +55,15 @@ def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
     return _report(machine.model.description, "Live linkage", "the file", live, str(file))
 
 
-def _report(title: str, kind: str, whole: str, live: b.LiveMachine, source: str) -> b.Report:
+def _report(title: str, kind: str, changed: str, live: b.LiveMachine, source: str) -> b.Report:
+    """The report whose only section is a live machine; `changed` is the noun of the thing whose values its reader
+    changes, `source` the file that it is from."""
     return b.Report(
         title,
         kind,
-        {"chainunit": __version__, "source": source},
-        (),
-        (b.Section("live", "Try it", (b.Live(lambda: live, whole),)),),
+        result={"chainunit": __version__, "source": source},
+        opening=(),
+        sections=(b.Section("live", "Try it", (b.Live(lambda: live, changed),)),),
         source=line(f"{source} · chainunit {__version__}"),
         status="no run was made",
     )

@@ -146,6 +146,8 @@ def _profile(signal: Profile) -> dict[str, Any]:
 
 
 def _event(rig: Rig, event: Event) -> dict[str, Any]:
+    """The data by which the page brings an event: its quantities, the `normal` values of the inputs that it changes,
+    the outputs that it `reads` at its begin, and the formulas of its `signals`."""
     return {
         "name": event.name,
         "title": event.title,
@@ -189,6 +191,7 @@ def _quantities(
 
 
 def _tables(drive: Drive, operation: OperatingConditions) -> Iterator[LiveQuantity]:
+    """The ramp and the torque limiter, if the drive has them."""
     if drive.follows:
         ramp = variable_of(Run, "ramp")
         yield LiveQuantity(("run", "ramp"), ramp, float(operation.run.ramp), "drive", role="ramp")

@@ -37,7 +37,11 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     model = machine.model
     low, high = model.span
     whole = machine.drive(np.linspace(low, high, 121) * machine.ratio)
-    forces = list(_forces(machine))
+    # output, joint at which it acts, and name in the picture
+    forces = [
+        {"title": title, "of": output, "at": joint, "short": short}
+        for output, title, joint, short in machine_picture.reactions(machine)
+    ]
     model_columns = trace(model).columns
     results = list(_results(machine, forces, model_columns, units))
     shown = [pin for pin in places(whole) if f"x({pin})" in model_columns]
@@ -78,12 +82,6 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         },
     }
     return LiveTurn(model_text(model, tuple(columns)), data)
-
-
-def _forces(machine: Machine) -> Iterator[dict[str, str]]:
-    """The reactions: title, output, joint at which it acts, and name in the picture."""
-    for output, title, joint, short in machine_picture.reactions(machine):
-        yield {"title": title, "of": output, "at": joint, "short": short}
 
 
 def _results(

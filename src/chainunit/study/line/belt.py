@@ -36,7 +36,7 @@ _IRON, _FILLED, _WIDTH = 7200.0, 0.5, 0.35
 SLIPS = 5.0
 """Slip over the rated one from which on the belt slips through."""
 LOADS = (0.25, 0.5, 0.75, 1.0, 1.25)
-"""Loads for the table of the efficiency, over the rated torque."""
+"""Torques of the motor for the table of the efficiency, over its rated torque."""
 
 
 @declaration
@@ -171,13 +171,15 @@ _PROTECTS = note("belt-slips-in-overload", *_SLIPS_THROUGH, sizes=_SIZES)
 
 
 def at_loads(table: BeltTable) -> tuple[BeltLoad, ...]:
-    """The belt at the `LOADS`, as far as it carries them."""
+    """Slip and efficiency at the rated speed under each of the `LOADS` that the belt passes on without slipping
+    through."""
     radius, rated, rows = 0.5 * table.diameter, table.rated_power / table.rated_speed, []
     for load in LOADS:
         pull = (load * rated - bending(MATH, table)) / radius
         if 0.0 < pull < rated_grip(MATH, table):
             slip = slip_at(MATH, table, pull)
-            rows.append(BeltLoad(load, slip, (1.0 - slip) * pull * radius / (load * rated)))
+            efficiency = (1.0 - slip) * pull * radius / (load * rated)
+            rows.append(BeltLoad(load, slip, efficiency))
     return tuple(rows)
 
 

@@ -89,6 +89,8 @@ def _rigid_runs(runs: StudyRuns, work: Work) -> dict[str, xr.Dataset]:
 
 
 def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindings:
+    """The findings of the shaft in start-up, steady running and each event, beside the `twins`, the runs of the rigid
+    drive at the same times."""
     setup, runs, steady = study.setup, study.runs, study.runs.steady
     until = slice(None, steady["time"].values[0])
     # the damage of steady running comes first, as that of the other runs is relative to it
