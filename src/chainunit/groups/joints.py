@@ -252,6 +252,10 @@ class Hinge(Placed):
             return None
         return (self._by, ZERO) if self._by_arm is ZERO else (self._link, self._arm)
 
+    def held_by(self, link: int, arm: Vec2) -> Hinge:
+        """The same joint of the start of its link with a `link` of the group, at the arm from the start of that."""
+        return Hinge(self._link, ZERO, link, arm)
+
     def rows(self) -> list[Row]:
         """Its rows: of the point along x and y."""
         k, r = UNKNOWNS * self._link, self._arm
@@ -333,6 +337,10 @@ class Guide(Hinge):
     @property
     def seat(self) -> Seat | None:
         return None
+
+    def held_by(self, link: int, arm: Vec2) -> Guide:
+        """See `Hinge`."""
+        return Guide(self._link, self._d, self._s, arm, link)
 
     def rows(self) -> list[Row]:
         """See `Hinge`; then of the angle. The way is an unknown, too."""

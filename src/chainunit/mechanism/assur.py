@@ -49,13 +49,14 @@ class JointOf(NamedTuple):
 
 
 class AssurGroup(NamedTuple):
-    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, or that of a single link), its links, and its joints in the
-    order of their roles.
+    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, tetrad, or that of a single link), its links, and its joints
+    in the order of their roles.
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
-    the joints are the outer ones of the legs, then their inner ones. Of a single link the revolute one
-    stands first.
+    the joints are the outer ones of the legs, then their inner ones. Of a tetrad the two links with an outer joint
+    stand first, then its legs; the joints are the outer ones, those of the legs with the first link, then with the
+    second. Of a single link the revolute one stands first.
     """
 
     kind: str
@@ -267,7 +268,14 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
             if not outer[ternary] and all(
                 len(meeting) == 1 for meeting in (*pairs, *(outer[leg] for leg in legs))
             ):
-                return _triad(ternary, legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs])
+                return _on_legs(TRIAD, [ternary], legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs])
+        held = [link for link in part if len(outer[link]) == 1]
+        legs = [link for link in part if not outer[link]]
+        ends = [[j for j in inner if {j.on, j.by} == {plate, leg}] for plate in held for leg in legs]
+        if len(held) == len(legs) == 2 and len(inner) == 4 and all(len(pair) == 1 for pair in ends):
+            near, far = ([pair[0] for pair in pairs] for pairs in (ends[:2], ends[2:]))
+            group = _on_legs(TETRAD, held, legs, near, far)
+            return group._replace(joints=(*(outer[plate][0] for plate in held), *group.joints))
     number, many = (
         len([j for j in joints if {*part} & {*j.links} and {*j.links} <= {*part} | placed]),
         len(part) > 1,
@@ -275,14 +283,16 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
     raise InputError(
         f"the link{'s' * many} {', '.join(part)} form{'s' * (not many)} one group with {len(part)} "
         f"link{'s' * many} and {number} joint{'s' * (number > 1)}: a class that is not covered; covered are dyads "
-        "(class II) and triads (class III, a ternary link on three legs); drive another link, or add a link that "
-        "splits the group",
+        "(class II), triads (class III, a ternary link on three legs) and tetrads (class IV, two links with an outer "
+        "joint each and two legs between them); drive another link, or add a link that splits the group",
         key=part[0],
     )
 
 
 _LETTERS = {REVOLUTE: "R", PRISMATIC: "P"}
 DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
+TRIAD, TETRAD = ON_LEGS = "triad", "tetrad"
+"""Kinds of groups of which links stand on legs, without a closed form."""
 
 
 def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -> AssurGroup:
@@ -308,22 +318,21 @@ def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -
     return AssurGroup(kind, (first, second), (outer[first], inner, outer[second]))
 
 
-def _triad(
-    ternary: str, legs: Sequence[str], outer: Sequence[JointOf], inner: Sequence[JointOf]
+def _on_legs(
+    kind: str, plates: Sequence[str], legs: Sequence[str], near: Sequence[JointOf], far: Sequence[JointOf]
 ) -> AssurGroup:
-    """The triad of a `ternary` link on three legs; by leg, an `inner` joint with the ternary link and an `outer` one
-    with a link before the group.
+    """The group of `plates` on legs; by leg, the joints at its ends.
 
     Raises
     ------
     InputError
         for a leg that slides in both joints.
     """
-    for leg, a, b in zip(legs, outer, inner, strict=True):
+    for leg, a, b in zip(legs, near, far, strict=True):
         if a.kind == b.kind == PRISMATIC:
             raise InputError(
-                f"the link {leg} slides in both of its joints, {a.name} and {b.name}: such a leg of a triad is not "
+                f"the link {leg} slides in both of its joints, {a.name} and {b.name}: such a leg of a {kind} is not "
                 "covered; make one of them a revolute joint",
                 key=leg,
             )
-    return AssurGroup("triad", (ternary, *legs), (*outer, *inner))
+    return AssurGroup(kind, (*plates, *legs), (*near, *far))

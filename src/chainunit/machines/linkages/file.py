@@ -17,7 +17,7 @@ from typing import Any
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
 from ...core.inputs import TOML, file_text
-from ...mechanism.assur import DYADS, FURTHER_DRIVERS, GROUND, PRISMATIC, REVOLUTE
+from ...mechanism.assur import DYADS, FURTHER_DRIVERS, GROUND, ON_LEGS, PRISMATIC, REVOLUTE
 from ...mechanism.curves import TableCurve
 from ...mechanism.expressions import expression, value_of
 from ...mechanism.models import InverseMachine
@@ -245,7 +245,7 @@ class _LinkageReader(LoadReader):
         if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
             self.fault("groups", f"is {shown(tables)}; must be tables [[groups]] with kind and links")
             return []
-        kinds = (*DYADS, "triad", CYLINDER, *SINGLES)
+        kinds = (*DYADS, *ON_LEGS, CYLINDER, *SINGLES)
         for k, table in enumerate(tables, 1):
             key, kind, links = f"groups.{k}", table.get("kind", ""), table.get("links")
             self.keys(key, table, ("kind", "links"))

@@ -110,6 +110,19 @@ class LinkGeometry:
         joint_point, other = self.point(link, joint.at(link)), joint.other_link(link)
         return self.point(other, joint.at(other)) + self.across(joint, point - joint_point, link)
 
+    def rough_place(self, link: str, point: str) -> Vec2:
+        """A point of a link in the rough pose of the start [m]."""
+        x, y, angle = self.structure.poses.get(link, (0.0, 0.0, 0.0))
+        turned = rotated(self.point(link, point), Vec2(math.cos(angle), math.sin(angle)))
+        return Vec2(x, y) + turned
+
+    def rough_way(self, joint: JointEntry, link: str) -> Any:
+        """The way of a link along the line in the link on the other side, in the rough pose of the start [m]."""
+        (by, start), other = joint.by, joint.other_link(link)
+        line = self.rough_place(by, joint.toward) - self.rough_place(by, start)
+        way = self.rough_place(link, joint.at(link)) - self.rough_place(other, joint.at(other))
+        return way.dot(line) / self.xp.sqrt(line.squared())
+
 
 def start_sides(geometry: LinkGeometry) -> dict[str, float]:
     """The assembly mode of each dyad that has two, by its first link, from the rough poses of the structure; the
@@ -120,12 +133,7 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
     InputError
         if a dyad starts in a dead position.
     """
-    structure = geometry.structure
-
-    def place(link: str, point: str) -> Vec2:
-        x, y, angle = structure.poses.get(link, (0.0, 0.0, 0.0))
-        turned = rotated(geometry.point(link, point), Vec2(math.cos(angle), math.sin(angle)))
-        return Vec2(x, y) + turned
+    structure, place = geometry.structure, geometry.rough_place
 
     def line(joint: JointEntry) -> Vec2:
         link, start = joint.by

@@ -13,8 +13,9 @@ from ...groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from ...groups.group import Group
 from ...groups.joints import Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
+from ...groups.tetrad import Plate, Tetrad
 from ...groups.triad import Pose, Triad
-from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
+from ...mechanism.assur import GROUND, REVOLUTE, TETRAD, TRIAD, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry
 from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
@@ -31,13 +32,13 @@ class LinkageParts:
     def __init__(
         self,
         geometry: LinkGeometry,
-        sides: Mapping[str, float],
+        sides: Mapping[str, Any],
         courses: Mapping[str, Callable[[Any, Any], Course]] = MappingProxyType({}),
     ) -> None:
         """
         Parameters
         ----------
-        sides : the assembly modes, of a triad the turns of its ternary link, by the first link of each group
+        sides : the assembly modes, of a triad or tetrad the turns of its coordinates, by the first link of each group
         courses : those of the drivers besides the first one, by the joint of each
         """
         self.geometry, self.structure, self.sides = geometry, geometry.structure, sides
@@ -176,8 +177,10 @@ class LinkageParts:
             return self._driver(next(entry for entry in self.structure.further if entry.joint == joint))
         if group.kind == CYLINDER:
             return self._cylinder(group)
-        if group.kind == "triad":
+        if group.kind == TRIAD:
             return self._triad(group.links[0], group.links[1:], joints[:3], joints[3:])
+        if group.kind == TETRAD:
+            return self._tetrad(group.links, joints)
         if group.kind in SINGLES:
             return SINGLES[group.kind].group(self, group.links[0], *joints)
         build: Callable[..., Group] = {
@@ -257,15 +260,39 @@ class LinkageParts:
             plate.points,
             Pose(*self.structure.poses[ternary]),
             self.structure.start,
-            self.sides.get(ternary, 0.0),
+            self.sides.get(ternary, ()),
         )
 
+    def _tetrad(self, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
+        """Two links, each on its outer joint, with two legs between them; they carry the pins of the legs."""
+        start = self.structure.start
+        held = zip(links[:2], joints[:2], (joints[2:4], joints[4:]), strict=True)
+        (first, x1), (second, x2) = [self._plate(*plate) for plate in held]
+        one, other = [
+            self._leg(leg, near, far, links[1])
+            for leg, near, far in zip(links[2:], joints[2:4], joints[4:], strict=True)
+        ]
+        return Tetrad((first, second), (one, other), (x1, x2), start, self.sides.get(links[0], ()))
+
+    def _plate(self, link: str, outer: JointEntry, inner: Sequence[JointEntry]) -> tuple[Plate, Any]:
+        """A plate of a tetrad, by its `outer` joint and those with the legs, and its rough coordinate."""
+        geometry, pins = self.geometry, [joint for joint in inner if joint.kind == REVOLUTE]
+        self._carriers |= {self.pin(link, joint.at(link)): link for joint in pins}
+        rail, guide, coordinate = None, "", self.structure.poses[link][2]
+        if outer.kind == REVOLUTE:
+            bar = self.hung(link, outer)
+        else:
+            bar, rail, guide = self._slider(link, outer, outer.at(link))
+            coordinate = geometry.rough_way(outer, link)
+        arms = {self.pin(link, j.at(link)): geometry.point(link, j.at(link)) for j in pins}
+        return Plate(bar, {pin: self.frames[link].coordinates(p) for pin, p in arms.items()}, rail, guide), coordinate
+
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
-        """A leg of a triad by its joints: a rod between two pins, a block on a line before it, or a slot in the
-        ternary link."""
-        pin = self.pin(ternary, inner.at(ternary))
+        """A leg by its joints: a rod between two pins, a block on a line before it, or a slot in the plate at its
+        end, the ternary link of a triad."""
+        pin, frame = self.pin(ternary, inner.at(ternary)), self.frames[ternary]
         if inner.kind == REVOLUTE:
-            arm = self.geometry.point(ternary, inner.at(ternary))
+            arm = frame.coordinates(self.geometry.point(ternary, inner.at(ternary)))
             self.receive(inner, pin, link)
             if outer.kind == REVOLUTE:
                 return RodLeg(self._rod(link, outer, inner), pin, arm)
@@ -273,4 +300,5 @@ class LinkageParts:
             return BlockLeg(bar, pin, arm, rail, guide)
         place = self.geometry.line_through(inner, link, self.geometry.point(link, outer.at(link)))
         bar = self.hung(link, outer, self.geometry.direction(inner, link))
-        return SlotLeg(bar, place, self.geometry.direction(inner, ternary), self._guide(inner, link))
+        along = frame.components(self.geometry.direction(inner, ternary))
+        return SlotLeg(bar, frame.coordinates(place), along, self._guide(inner, link))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import InputError
-from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
+from ...mechanism.assur import GROUND, ON_LEGS, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
 from .joint_kind import Entry, JointEntry
 from .joint_kinds import SINGLES, in_decomposition
 from .names import LinkPoint, connected, owners_of
@@ -89,20 +89,21 @@ def groups_of(
     ]
     first = int(driving[0] in cylinders)
     groups[first:first] = alone
-    triad = next((group for group in groups if group.kind == "triad"), None)
-    if triad is not None and any(entry.is_free for entry in drivers):
+    followed = next((group for group in groups if group.kind in ON_LEGS), None)
+    if followed is not None and any(entry.is_free for entry in drivers):
+        kind = followed.kind
         raise InputError(
-            f"the links {', '.join(triad.links)} form a triad, and two drivers are inputs: a triad needs one; give "
-            'the other one a law, phi = "..."',
-            key=triad.links[0],
+            f"the links {', '.join(followed.links)} form a {kind}, and two drivers are inputs: a {kind} needs one; "
+            'give the other one a law, phi = "..."',
+            key=followed.links[0],
         )
-    if triad is not None and (driver.linear or driver.swings):
+    if followed is not None and (driver.linear or driver.swings):
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
         raise InputError(
-            f"the links {', '.join(triad.links)} form a triad, and the driver {moves}: a triad needs a driver that "
-            f"{remedy} drive another link",
-            key=triad.links[0],
+            f"the links {', '.join(followed.links)} form a {followed.kind}, and the driver {moves}: a {followed.kind} "
+            f"needs a driver that {remedy} drive another link",
+            key=followed.links[0],
         )
     return groups
 
