@@ -18,7 +18,8 @@ from chainunit.groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from chainunit.groups.group import SolvedGroup
 from chainunit.groups.joints import UNKNOWNS, CrankDrive, Hinge, Rail
 from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
-from chainunit.groups.triad import Pose, SolvedTriad
+from chainunit.groups.tetrad import Plate, Tetrad
+from chainunit.groups.triad import Pose, solved_triad
 
 
 def unit(angle):
@@ -54,6 +55,28 @@ LEGS = {
         SlotLeg(Bar("c", "O", None), Vec2(0.0, 0.1), unit(0.4), "O"),
     ),
 }
+SEATS = {"A": Vec2(0.2, 0.5), "B": Vec2(-0.1, 0.6)}
+RODS = (RodLeg(Bar("a", "A", 0.7), "C", Vec2(-0.2, 0.5)), RodLeg(Bar("b", "B", 0.6), "D", Vec2(0.3, 0.4)))
+TETRADS = {
+    "tetrad": Tetrad(
+        "f", (Plate(Bar("f", "P", None), SEATS), Plate(Bar("s", "Q", None), {})), RODS, (0.2, -0.3)
+    ),
+    "tetrad on rails": Tetrad(
+        "f",
+        (Plate(Bar("f", "", None), SEATS, RAIL, "X"), Plate(Bar("s", "", None), {}, CROSS, "Y")),
+        RODS,
+        (0.2, 0.6),
+    ),
+    "tetrad with slots": Tetrad(
+        "f",
+        (Plate(Bar("f", "P", None), SEATS), Plate(Bar("s", "", None), {}, RAIL, "Y")),
+        (
+            BlockLeg(Bar("a", "", None), "C", Vec2(-0.2, 0.5), Rail("f", Vec2(0.1, 0.2), unit(0.7)), "C"),
+            SlotLeg(Bar("b", "B", None), Vec2(0.3, 0.4), unit(2.0), "B"),
+        ),
+        (0.2, 0.5),
+    ),
+}
 GROUPS = {
     "crank": Crank(Bar("a", "P", 0.2), "A"),
     "ram": Ram(Bar("a", "", None), RAIL, "G"),
@@ -70,10 +93,17 @@ GROUPS = {
 
 def solved(name, rng):
     at = before(rng)
+    return placed(name, at, rng.uniform(0.2, 0.6, 3))
+
+
+def placed(name, at, x):
+    """The group at any place, also one at which its legs do not fit: its rows are the same."""
     if name in GROUPS:
         return GROUPS[name].solve(MATH, 0.3, at, ())
+    if name in TETRADS:
+        return TETRADS[name].solved(MATH, TETRADS[name].at_position(at), x[:2])
     legs = [leg.at_position(k, at) for k, leg in enumerate(LEGS[name])]
-    return SolvedTriad(MATH, legs, Pose(*rng.uniform(0.2, 0.6, 3)))
+    return solved_triad(MATH, legs, Pose(*x))
 
 
 def dense(joints, links):
@@ -87,7 +117,7 @@ def dense(joints, links):
     return rows, matrix, unknowns
 
 
-@pytest.mark.parametrize("name", [*GROUPS, *LEGS])
+@pytest.mark.parametrize("name", [*GROUPS, *LEGS, *TETRADS])
 @pytest.mark.parametrize("seed", range(3))
 def test_each_group_is_solved_in_both_directions(name, seed):
     rng = np.random.default_rng(seed)
@@ -106,7 +136,7 @@ def test_each_group_is_solved_in_both_directions(name, seed):
     assert all(step.per in (1, -1) or -1.0 / step.per > 1e-3 for step in block._steps)
 
 
-@pytest.mark.parametrize("name", [*GROUPS, *LEGS])
+@pytest.mark.parametrize("name", [*GROUPS, *LEGS, *TETRADS])
 def test_reactions_take_no_power_but_that_of_what_moves_before_the_group(name):
     """With all that is before the group at rest, the loads take the power of the driver, and a group without one
     none."""
@@ -116,11 +146,7 @@ def test_reactions_take_no_power_but_that_of_what_moves_before_the_group(name):
         pins={pin: Motion(k.p) for pin, k in moving.pins.items()},
         links={link: Link(Motion(k.pin.p), k.u, 0.0, 0.0) for link, k in moving.links.items()},
     )
-    if name in GROUPS:
-        group = GROUPS[name].solve(MATH, 0.3, at, ())
-    else:
-        legs = [leg.at_position(k, at) for k, leg in enumerate(LEGS[name])]
-        group = SolvedTriad(MATH, legs, Pose(0.4, 0.4, 0.3))
+    group = placed(name, at, (0.4, 0.4, 0.3))
     loads = [(Vec2(*rng.uniform(-9, 9, 2)), rng.uniform(-9, 9)) for _ in group.links]
     power = sum(f.dot(k.pin.p1) + m * k.t1 for (f, m), k in zip(loads, group.links, strict=True))
     _, effort = group.reactions(loads)

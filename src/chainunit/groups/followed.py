@@ -17,10 +17,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from ..core.planar import Vec2
+from ..core.planar import Motion, Vec2
 from .block import minus_cofactors
 from .group import Group, SolvedGroup
-from .joints import LinkageInMotion
+from .joints import LinkageInMotion, Placed
 from .legs import LegAt
 
 SAMPLES = 20
@@ -31,7 +31,8 @@ MOST_MISFIT = 1e-10
 """Largest misfit of a leg that counts as closed, in parts of its length."""
 STEPS = 3
 """Steps of Newton's method from the series: three remove an error of 1e-3, as of a pose that moves sharply."""
-_SIZE = 2 * HARMONICS + 1
+TERMS = 2 * HARMONICS + 1
+"""Number of values in such a series; a group derives two more, the largest misfit and the least margin."""
 
 
 def corrected(
@@ -51,11 +52,35 @@ def corrected(
 
 
 class SolvedOnLegs(SolvedGroup):
-    """A solved group of plates on `legs`."""
+    """A solved group of plates on `legs`. Its `links` are the legs and then the plates. Its `margin` is the determinant
+    over the lengths of the rods and the sizes of the plates that turn: 0 is a dead position."""
 
     __slots__ = ("legs",)
 
-    legs: Sequence[LegAt]
+    def __init__(
+        self,
+        xp: Any,
+        legs: Sequence[LegAt],
+        spots: Sequence[Sequence[Vec2]],
+        plates: Sequence[tuple[Vec2 | Motion, Vec2]],
+        held: Sequence[Placed] = (),
+    ) -> None:
+        """
+        Parameters
+        ----------
+        xp : engine (see `chainunit.core.engines`)
+        spots : those at which each plate that turns is held [m]
+        plates : start and unit vector of each plate, see `SolvedGroup`
+        held : the outer joints of the plates
+        """
+        self.legs = legs
+        size = 1.0
+        for plate in spots:
+            size = size * xp.sqrt(sum((s - plate[k - 1]).squared() for k, s in enumerate(plate)))
+        for leg in legs:
+            size = size if leg.length is None else size * leg.length
+        joints = (*held, *(leg.outer for leg in legs), *(leg.inner for leg in legs))
+        super().__init__((*(leg.pose for leg in legs), *plates), joints, size=size)
 
 
 class FollowedGroup(Group):
@@ -138,30 +163,12 @@ class FollowedGroup(Group):
         return [*series, misfit, least]
 
 
-def count_derived(coordinates: int) -> int:
-    """The number of values that `derive` gives: the series of the coordinates, the largest misfit, the least
-    margin."""
-    return coordinates * _SIZE + 2
-
-
 def by_series(series: Sequence[Any], coordinates: int, cos: Any, sin: Any) -> list[Any]:
     """The coordinates that the series gives, from cosine and sine of the crank angle."""
-    sums = [series[k * _SIZE] for k in range(coordinates)]
+    sums = [series[k * TERMS] for k in range(coordinates)]
     c, s = cos, sin
     for n in range(1, HARMONICS + 1):
         for k in range(coordinates):
-            sums[k] = sums[k] + series[k * _SIZE + 2 * n - 1] * c + series[k * _SIZE + 2 * n] * s
+            sums[k] = sums[k] + series[k * TERMS + 2 * n - 1] * c + series[k * TERMS + 2 * n] * s
         c, s = c * cos - s * sin, s * cos + c * sin
     return sums
-
-
-def size_of(xp: Any, spots: Sequence[Vec2]) -> Any:
-    """The size of a plate by the `spots` at which it is held [m]."""
-    return xp.sqrt(sum((spot - spots[k - 1]).squared() for k, spot in enumerate(spots)))
-
-
-def lengths_of(legs: Sequence[LegAt], size: Any) -> Any:
-    """The lengths of the rods among the legs, times a size."""
-    for leg in legs:
-        size = size if leg.length is None else size * leg.length
-    return size

@@ -8,13 +8,13 @@ both coordinates. Their determinant vanishes if the lines of the legs meet on th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar
-from .followed import FollowedGroup, SolvedOnLegs, count_derived, lengths_of, size_of
+from .followed import TERMS, FollowedGroup, SolvedOnLegs
 from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
 from .legs import PLATE, Leg, LegAt
 
@@ -41,31 +41,30 @@ class Plate(NamedTuple):
         return linkage.pins[self.bar.pin] if self.rail is None else self.rail.at_position(linkage.links)
 
 
-class PlateAt(NamedTuple):
-    """A plate at one coordinate: its origin and the direction of its x axis, the pin or the rail that `holds` it, and
-    its coordinate."""
+class _PlateAt(NamedTuple):
+    """A plate at one coordinate: its origin and the direction of its x axis, whether it turns, and as a link its pose
+    and its outer joint."""
 
     origin: Vec2
     u: Vec2
-    holds: Motion | Link
-    x: Any
-
-    @classmethod
-    def of(cls, xp: Any, holds: Motion | Link, x: Any) -> PlateAt:
-        """The plate at the coordinate `x`."""
-        if isinstance(holds, Motion):
-            return cls(holds.p, Vec2(xp.cos(x), xp.sin(x)), holds, x)
-        return cls(holds.pin.p + holds.u * x, holds.u, holds, x)
+    turns: bool
+    pose: tuple[Vec2 | Motion, Vec2]
+    joint: Hinge | Guide
 
     def along(self, force: Vec2, moment: Any) -> Any:
         """What a wrench about its origin does along its coordinate."""
-        return moment if isinstance(self.holds, Motion) else force.dot(self.u)
+        return moment if self.turns else force.dot(self.u)
 
-    def joint(self, number: int) -> tuple[tuple[Vec2 | Motion, Vec2], Hinge | Guide]:
-        """As the link of this `number`, its pose and its outer joint."""
-        if isinstance(self.holds, Motion):
-            return (self.holds, self.u), Hinge(number, base=self.holds)
-        return (self.origin, self.u), Guide(number, self.u, self.x, self.u * self.x, self.holds)
+
+def _plates_at(xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> Iterator[_PlateAt]:
+    for number, (base, place) in enumerate(zip(placed, x, strict=True), PLATE - 1):
+        if isinstance(base, Motion):
+            u = Vec2(xp.cos(place), xp.sin(place))
+            yield _PlateAt(base.p, u, True, (base, u), Hinge(number, base=base))
+        else:
+            d, way = base.u, base.u * place
+            origin = base.pin.p + way
+            yield _PlateAt(origin, d, False, (origin, d), Guide(number, d, place, way, base))
 
 
 class _FirstPlate(NamedTuple):
@@ -81,18 +80,14 @@ class Tetrad(FollowedGroup):
     near those of its assembly mode, see `FollowedGroup`."""
 
     kind: ClassVar[str] = "tetrad"
-    derived_count: ClassVar[int] = count_derived(2)
+    derived_count: ClassVar[int] = 2 * TERMS + 2
 
+    name: str
     plates: tuple[Plate, Plate]
     legs: tuple[Leg, Leg]
     assembly: tuple[Any, Any]
     start: float = 0.0
     turns: Sequence[float] = ()
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        """The name of its first plate."""
-        return self.plates[0].bar.name
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -102,63 +97,34 @@ class Tetrad(FollowedGroup):
     @property
     def joints(self) -> tuple[JointData, ...]:
         first, second = self.plates
-        outer, inner = zip(*(leg.joints(second.bar.name) for leg in self.legs), strict=True)
-        between = (joint._replace(by=first.bar.name) for joint in outer)
-        return first.joint, second.joint, *between, *inner
+        near, far = zip(*(leg.joints(second.bar.name) for leg in self.legs), strict=True)
+        return first.joint, second.joint, *(joint._replace(by=first.bar.name) for joint in near), *far
 
-    def at_position(self, linkage: LinkageInMotion) -> tuple[Motion | Link, ...]:
+    def at_position(self, linkage: LinkageInMotion) -> list[Motion | Link]:
         """What holds the plates."""
-        return tuple(plate.at_position(linkage) for plate in self.plates)
+        return [plate.at_position(linkage) for plate in self.plates]
 
     def legs_at(self, xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> list[LegAt]:
         """See `FollowedGroup`."""
-        return self._legs(*(PlateAt.of(xp, holds, place) for holds, place in zip(placed, x, strict=True)))
+        return self._legs(*_plates_at(xp, placed, x))
 
-    def _legs(self, first: PlateAt, second: PlateAt) -> list[LegAt]:
+    def _legs(self, first: _PlateAt, second: _PlateAt) -> list[LegAt]:
         """The legs between the plates, with their rows."""
         data, link, legs = self.plates[0], Link(Motion(first.origin), first.u, 0.0, 0.0), []
         pins = {name: link.beside(arm.x, arm.y) for name, arm in data.pins.items()}
         for k, leg in enumerate(self.legs):
-            placed = leg.at_position(k, _FirstPlate(pins, {data.bar.name: link}))(second.origin, second.u)
-            x, y, moment = placed.row
+            at = leg.at_position(k, _FirstPlate(pins, {data.bar.name: link}))(second.origin, second.u)
+            x, y, moment = at.row
             force = Vec2(x, y)
             on_first = first.along(force, moment + (second.origin - first.origin).cross(force))
-            legs.append(
-                placed.between(first.origin, PLATE - 1, (-on_first, second.along(force, moment)))
-            )
+            legs.append(at.between(first.origin, PLATE - 1, (-on_first, second.along(force, moment))))
         return legs
 
-    def solved(self, xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> SolvedTetrad:
+    def solved(self, xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> SolvedOnLegs:
         """See `FollowedGroup`."""
-        first, second = (PlateAt.of(xp, holds, place) for holds, place in zip(placed, x, strict=True))
-        return SolvedTetrad(xp, (first, second), self._legs(first, second))
-
-
-class SolvedTetrad(SolvedOnLegs):
-    """A solved tetrad with its `legs`. Its `links` are the legs and then the plates; its `margin` is the determinant
-    over the lengths of the rods and the sizes of the plates that turn: 0 is a dead position."""
-
-    __slots__ = ()
-
-    def __init__(self, xp: Any, plates: tuple[PlateAt, PlateAt], legs: Sequence[LegAt]) -> None:
-        """
-        Parameters
-        ----------
-        xp : engine (see `chainunit.core.engines`)
-        """
-        self.legs = legs
-        first, second = plates
-        size = lengths_of(legs, 1.0)
-        for plate, spots in (
-            (first, [start - first.origin for start, _ in (leg.pose for leg in legs)]),
-            (second, [leg.spot for leg in legs]),
-        ):
-            if isinstance(plate.holds, Motion):
-                size = size * size_of(xp, [ZERO, *spots])
-        held = [plate.joint(PLATE - 1 + k) for k, plate in enumerate(plates)]
-        joints = (
-            *(joint for _, joint in held),
-            *(leg.outer for leg in legs),
-            *(leg.inner for leg in legs),
-        )
-        super().__init__((*(leg.pose for leg in legs), *(pose for pose, _ in held)), joints, size=size)
+        first, second = plates = [*_plates_at(xp, placed, x)]
+        legs = self._legs(first, second)
+        ends = [leg.pose[0] - first.origin for leg in legs], [leg.spot for leg in legs]
+        spots = [[ZERO, *end] for plate, end in zip(plates, ends, strict=True) if plate.turns]
+        held = [plate.joint for plate in plates]
+        return SolvedOnLegs(xp, legs, spots, [plate.pose for plate in plates], held)

@@ -29,7 +29,7 @@ from ..core.engines import MATH
 from ..core.model import Requirement
 from ..core.planar import Motion, Vec2
 from .body import Bar, Mass
-from .followed import MOST_MISFIT, FollowedGroup, SolvedOnLegs, corrected, count_derived, lengths_of, size_of
+from .followed import MOST_MISFIT, TERMS, FollowedGroup, SolvedOnLegs, corrected
 from .joints import JointData, LinkageInMotion
 from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
@@ -54,13 +54,20 @@ def correct_pose(xp: Any, legs: Sequence[PlacedLeg], near: Sequence[Any], steps:
     return Pose(*corrected(partial(legs_at, xp, legs), near, steps))
 
 
+def solved_triad(xp: Any, placed: Sequence[PlacedLeg], pose: Sequence[Any]) -> SolvedOnLegs:
+    """The triad on these legs at a pose of the ternary link; its `pins` are in the order of the legs."""
+    legs, (x, y, theta) = legs_at(xp, placed, pose), pose
+    ternary = Vec2(x, y), Vec2(xp.cos(theta), xp.sin(theta))
+    return SolvedOnLegs(xp, legs, [[leg.spot for leg in legs]], [ternary])
+
+
 @dataclass
 class Triad(FollowedGroup):
     """A triad as data: the ternary link with its `mass`, three legs, and further points on the ternary link; its
     coordinates are the pose, see `FollowedGroup`."""
 
     kind: ClassVar[str] = "triad"
-    derived_count: ClassVar[int] = count_derived(3)
+    derived_count: ClassVar[int] = 3 * TERMS + 2
 
     name: str
     mass: Mass
@@ -88,9 +95,9 @@ class Triad(FollowedGroup):
         """See `FollowedGroup`."""
         return legs_at(xp, placed, x)
 
-    def solved(self, xp: Any, placed: Sequence[PlacedLeg], x: Sequence[Any]) -> SolvedTriad:
+    def solved(self, xp: Any, placed: Sequence[PlacedLeg], x: Sequence[Any]) -> SolvedOnLegs:
         """See `FollowedGroup`."""
-        return SolvedTriad(xp, placed, Pose(*x))
+        return solved_triad(xp, placed, x)
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
         """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""
@@ -127,28 +134,6 @@ def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
     *_, misfit, least = derived
     yield misfit, -math.inf, MOST_MISFIT
     yield least, 1e-3, math.inf
-
-
-class SolvedTriad(SolvedOnLegs):
-    """A solved triad with its `legs`. Its `links` are the legs and then the ternary link (origin and x axis of its
-    frame); its `pins` are in the order of the legs; its `margin` is the determinant over the lengths of the rods and
-    the size of the ternary link: 0 is a dead position."""
-
-    __slots__ = ()
-
-    def __init__(self, xp: Any, placed: Sequence[PlacedLeg], pose: Pose) -> None:
-        """
-        Parameters
-        ----------
-        xp : engine (see `chainunit.core.engines`)
-        placed : the three legs, see `Leg.at_position`
-        pose : pose of the ternary link, see `correct_pose`
-        """
-        legs = self.legs = legs_at(xp, placed, pose)
-        size = lengths_of(legs, size_of(xp, [leg.spot for leg in legs]))
-        ternary = Vec2(pose.x, pose.y), Vec2(xp.cos(pose.theta), xp.sin(pose.theta))
-        joints = *(leg.outer for leg in legs), *(leg.inner for leg in legs)
-        super().__init__((*(leg.pose for leg in legs), ternary), joints, size=size)
 
 
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:

@@ -272,7 +272,8 @@ class LinkageParts:
             self._leg(leg, near, far, links[1])
             for leg, near, far in zip(links[2:], joints[2:4], joints[4:], strict=True)
         ]
-        return Tetrad((first, second), (one, other), (x1, x2), start, self.sides.get(links[0], ()))
+        turns = self.sides.get(links[0], ())
+        return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, turns)
 
     def _plate(self, link: str, outer: JointEntry, inner: Sequence[JointEntry]) -> tuple[Plate, Any]:
         """A plate of a tetrad, by its `outer` joint and those with the legs, and its rough coordinate."""
