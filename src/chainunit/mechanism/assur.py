@@ -268,7 +268,9 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
             if not outer[ternary] and all(
                 len(meeting) == 1 for meeting in (*pairs, *(outer[leg] for leg in legs))
             ):
-                return _on_legs(TRIAD, [ternary], legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs])
+                return _on_legs(
+                    TRIAD, [ternary], legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs]
+                )
         held = [link for link in part if len(outer[link]) == 1]
         legs = [link for link in part if not outer[link]]
         ends = [[j for j in inner if {j.on, j.by} == {plate, leg}] for plate in held for leg in legs]

@@ -286,7 +286,9 @@ class LinkageParts:
             bar, rail, guide = self._slider(link, outer, outer.at(link))
             coordinate = geometry.rough_way(outer, link)
         arms = {self.pin(link, j.at(link)): geometry.point(link, j.at(link)) for j in pins}
-        return Plate(bar, {pin: self.frames[link].coordinates(p) for pin, p in arms.items()}, rail, guide), coordinate
+        return Plate(
+            bar, {pin: self.frames[link].coordinates(p) for pin, p in arms.items()}, rail, guide
+        ), coordinate
 
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
         """A leg by its joints: a rod between two pins, a block on a line before it, or a slot in the plate at its
