@@ -1,14 +1,14 @@
 """A group without a closed form: its coordinates are followed once around the turn of the crank.
 
-Plates stand on legs (`chainunit.groups.legs`): the places of the plates are the coordinates of the group, and each leg
-gives an equation. Newton's method solves as many equations as there are coordinates; these rows are what is left of
-the matrix of the group after the legs are eliminated, and where their determinant vanishes is a dead position.
+Plates stand on legs (`chainunit.groups.legs`): the places of the plates are the coordinates of the group, and each
+leg gives an equation. Newton's method solves as many equations as there are coordinates; these rows are what is left
+of the matrix of the group after the legs are eliminated, and where their determinant vanishes is a dead position.
 
 In a linkage with one crank the coordinates are smooth periodic functions of the crank angle. `FollowedGroup.derive`
 follows them once around, from the mode to which `assembly` leads at the crank angle `start`, and keeps them as a
 Fourier series. At any angle the series gives coordinates that are nearly right, and Newton's method makes them exact.
-So they depend on the crank angle alone, independent of the step and the history. The branch cannot jump; a branch that
-ends within the turn has a misfit.
+So they depend on the crank angle alone, independent of the step and the history. The branch cannot jump; a branch
+that ends within the turn has a misfit.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ def corrected(
 
 
 class SolvedOnLegs(SolvedGroup):
-    """A solved group of plates on `legs`. Its `links` are the legs and then the plates. Its `margin` is the determinant
-    over the lengths of the rods and the sizes of the plates that turn: 0 is a dead position."""
+    """A solved group of plates on `legs`. Its `links` are the legs and then the plates; its `margin` is the
+    determinant over the lengths of the rods and the sizes of the plates that turn: 0 is a dead position."""
 
     __slots__ = ("legs",)
 

@@ -2,8 +2,8 @@
 
 A plate turns about a pin that moves in a known way, or slides along a rail: its angle, or its way, is a coordinate of
 the group. The legs go from the first plate to the second one, as those of a triad go from the links before it to the
-ternary link: with two pins, or with a pin and a slot in either plate. Each leg gives a row: what its wrench does along
-both coordinates. Their determinant vanishes if the lines of the legs meet on the line of the outer pins.
+ternary link: with two pins, or with a pin and a slot in either plate. Each leg gives a row: what its wrench does
+along both coordinates. Their determinant vanishes if the lines of the legs meet on the line of the outer pins.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from .legs import PLATE, Leg, LegAt
 
 
 class Plate(NamedTuple):
-    """A plate as data: its bar, which starts from the pin of its outer joint, and the places of its own `pins` [m]. One
-    that slides on a `rail` has a frame with the direction of the rail, which starts at the point that goes along it;
-    `guide` is the pin at which the force of the rail acts on it."""
+    """A plate as data: its bar, which starts from the pin of its outer joint, and the places of its own `pins` [m].
+    One that slides on a `rail` has a frame with the direction of the rail, which starts at the point that goes along
+    it; `guide` is the pin at which the force of the rail acts on it."""
 
     bar: Bar
     pins: Mapping[str, Vec2]

@@ -28,7 +28,8 @@ class FreeLinksError(InputError):
 
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
-    contain. `alone` is the kind of the group that a single link forms by it and a revolute joint."""
+    contain. `alone` is the kind of the group that a single link forms by it and a revolute joint. One that a driver
+    moves has `DRIVEN` equations."""
 
     name: str
     kind: str
@@ -49,14 +50,16 @@ class JointOf(NamedTuple):
 
 
 class AssurGroup(NamedTuple):
-    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, tetrad, or that of a single link), its links, and its joints
-    in the order of their roles.
+    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, tetrad, that of a single link, or of a driver between links),
+    its links, and its joints in the order of their roles.
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
     the joints are the outer ones of the legs, then their inner ones. Of a tetrad the two links with an outer joint
     stand first, then its legs; the joints are the outer ones, those of the legs with the first link, then with the
-    second. Of a single link the revolute one stands first.
+    second. Of a single link the revolute one stands first. Of a cylinder the links are barrel, rod and lever, of an
+    elbow the arms and the lever; the joints are those of the first link and the lever with links before, with that of
+    the second link with the lever between.
     """
 
     kind: str
@@ -67,7 +70,8 @@ class AssurGroup(NamedTuple):
 def decompose(links: Sequence[str], joints: Sequence[JointOf], drivers: Collection[str]) -> list[AssurGroup]:
     """The groups of the links that hang on the ground and on the `drivers`, in an order in which they can be solved.
 
-    `joints` are all but those of the drivers with the ground.
+    `joints` are all but those of the drivers with the ground; a driver between other links has one of `DRIVEN`
+    equations.
 
     Raises
     ------
@@ -278,6 +282,8 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
             near, far = ([pair[0] for pair in pairs] for pairs in (ends[:2], ends[2:]))
             group = _on_legs(TETRAD, held, legs, near, far)
             return group._replace(joints=(*(outer[plate][0] for plate in held), *group.joints))
+    if drive := next((j for j in joints if j.equations == DRIVEN and {*j.links} & {*part}), None):
+        return _driven(drive, part, [j for j in inner if j is not drive], outer)
     number, many = (
         len([j for j in joints if {*part} & {*j.links} and {*j.links} <= {*part} | placed]),
         len(part) > 1,
@@ -291,8 +297,51 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
     )
 
 
+def _driven(
+    drive: JointOf, part: Sequence[str], inner: Sequence[JointOf], outer: Mapping[str, Sequence[JointOf]]
+) -> AssurGroup:
+    """The group of a link that a driver turns against one before it, or of two links that it moves against each other,
+    with their lever.
+
+    Raises
+    ------
+    InputError
+        if it is neither.
+    """
+    turns = drive.kind == REVOLUTE
+    if len(part) == 1 and turns and [*outer[part[0]]] == [drive]:
+        return AssurGroup(DRIVER, (*part,), (drive,))
+    if len(part) == 3 and len(inner) == 1 and {drive.on, drive.by} < {*part}:
+        (lever,), c = {*part} - {drive.on, drive.by}, inner[0]
+        far = c.other_link(lever)
+        near = drive.other_link(far)
+        ends = [*outer[near], c, *outer[lever]]
+        if not outer[far] and [j.kind for j in ends] == [REVOLUTE] * 3:
+            p, q = ends[0], ends[2]
+            return AssurGroup(ELBOW if turns else CYLINDER, (near, far, lever), (p, c, q))
+    raise driven_refusal(drive, "of the ground or of a link that is moved before it")
+
+
+def driven_refusal(drive: JointOf, place: str) -> InputError:
+    """The refusal of two links that a driver moves against each other, if their outer pins are not at that place."""
+    moves, machine = ("along", "a cylinder") if drive.kind == PRISMATIC else ("against", "two arms")
+    return InputError(
+        f"the links {drive.by} and {drive.on}, which the driver {drive.name} moves {moves} each other, must be "
+        f"{machine}: one of them on a pin {place}, the other one on a pin of a lever, and the lever on a pin {place}",
+        key=drive.by,
+    )
+
+
 _LETTERS = {REVOLUTE: "R", PRISMATIC: "P"}
 DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
+CYLINDER = "cylinder"
+"""Kind of the group of a cylinder that is pinned at both ends, with the lever that it swings."""
+ELBOW = "elbow"
+"""Kind of the group of two arms with a motor in the pin between them, with the lever that they swing."""
+DRIVER = "driver"
+"""Kind of the group of a link that a driver besides the first one moves in the ground, or turns on a link before."""
+DRIVEN = 3
+"""Number of equations of a joint that a driver moves."""
 TRIAD, TETRAD = ON_LEGS = "triad", "tetrad"
 """Kinds of groups of which links stand on legs, without a closed form."""
 

@@ -17,7 +17,7 @@ from typing import Any
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
 from ...core.inputs import TOML, file_text
-from ...mechanism.assur import DYADS, FURTHER_DRIVERS, GROUND, ON_LEGS, PRISMATIC, REVOLUTE
+from ...mechanism.assur import CYLINDER, DYADS, ELBOW, FURTHER_DRIVERS, GROUND, ON_LEGS, PRISMATIC, REVOLUTE
 from ...mechanism.curves import TableCurve
 from ...mechanism.expressions import expression, value_of
 from ...mechanism.models import InverseMachine
@@ -42,7 +42,6 @@ from .names import model_name, name_fault, words_in
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
-from .structure import CYLINDER
 from .way import WHOLE
 
 TABLES = (
@@ -245,7 +244,7 @@ class _LinkageReader(LoadReader):
         if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
             self.fault("groups", f"is {shown(tables)}; must be tables [[groups]] with kind and links")
             return []
-        kinds = (*DYADS, *ON_LEGS, CYLINDER, *SINGLES)
+        kinds = (*DYADS, *ON_LEGS, CYLINDER, ELBOW, *SINGLES)
         for k, table in enumerate(tables, 1):
             key, kind, links = f"groups.{k}", table.get("kind", ""), table.get("links")
             self.keys(key, table, ("kind", "links"))
@@ -450,8 +449,16 @@ class _LinkageReader(LoadReader):
                 self.fault(f"{key}.{name}", f"is a table; a driver besides the first one is [drivers.{name}]")
             table = {name: entry for name, entry in table.items() if name not in further}
             self.keys(key, table, _DRIVER_KEYS)
-        if "joint" in table:
+        pins = {
+            j["name"]: j for j in joints if j["type"] == REVOLUTE and GROUND not in (j["on"][0], j["by"][0])
+        }
+        if "joint" in table and not is_among(table["joint"], pins):
             return self.slide(key, table, joints)
+        if "joint" in table:
+            joint = pins[table["joint"]]
+            if "link" in table:
+                self.fault(f"{key}.link", "follows from the joint; take one of both out")
+            return self.turning(key, table, joint["name"], joint["on"][0])
         link = table.get("link")
         links = [name for name in self.points if name != GROUND]
         if not is_among(link, links):
@@ -470,12 +477,18 @@ class _LinkageReader(LoadReader):
                 "the name of a point in [ground]",
             )
             return {}, None
+        return self.turning(key, table, pivots[0]["name"], str(link))
+
+    def turning(
+        self, key: str, table: Mapping[str, Any], joint: str, link: str
+    ) -> tuple[dict[str, Any], list[float] | None]:
+        """The driver that turns the link in the joint, and its range."""
         positive = table.get("positive", "counter-clockwise")
         if positive not in ("clockwise", "counter-clockwise"):
             self.fault(f"{key}.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
         zero = self.entry(f"{key}.zero", table.get("zero", 0.0), "rad")
         sense = -1.0 if positive == "clockwise" else 1.0
-        driver = {"joint": pivots[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}
+        driver = {"joint": joint, "link": link, "linear": False, "zero": zero, "sense": sense}
         if "range" not in table:
             return driver, None
         span = self.span(key, table["range"], "angle", "rad", _RANGES[0])
@@ -495,10 +508,10 @@ class _LinkageReader(LoadReader):
         sliding = {joint["name"]: joint for joint in joints if joint["type"] == PRISMATIC}
         name = table["joint"]
         if not is_among(name, sliding):
-            pin = ", which is a pin" * is_among(name, kinds)
+            pin = ", which is a pin of the ground: for that give `link`" * is_among(name, kinds)
             self.fault(
                 f"{key}.joint",
-                f"is {shown(name)}{pin}; must be a prismatic joint, a table "
+                f"is {shown(name)}{pin}; must be a pin of two links that move, or a prismatic joint, a table "
                 f"[joints.NAME] with `toward`: {', '.join(sliding) or 'there is none'}",
             )
             return {}, None
@@ -573,7 +586,11 @@ class _LinkageReader(LoadReader):
             if entry["linear"]:
                 pose.slides.append((entries[entry["joint"]][0], place))
             else:
-                pose.angles[entry["link"]] = number(entry["zero"]) + entry["sense"] * place
+                link, turn = entry["link"], number(entry["zero"]) + entry["sense"] * place
+                if (other := entries[entry["joint"]][0].other_link(link)) == GROUND:
+                    pose.angles[link] = turn
+                else:
+                    pose.turned.append((link, other, turn))
         self.refuse()
         with self.at("start"):
             return {"value": value, "poses": pose.complete()}

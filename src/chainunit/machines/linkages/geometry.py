@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 from ...core.errors import InputError
 from ...core.planar import ZERO, Vec2, mirrored, rotated
 from ...groups.body import Mass
-from ...mechanism.assur import GROUND
+from ...mechanism.assur import CYLINDER, ELBOW, GROUND
 from ...mechanism.expressions import value_of
 from .joint_kind import Entry, JointEntry
-from .structure import CYLINDER, LinkEntry, Structure
+from .structure import LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
-TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER)
+TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER, ELBOW)
 """Kinds of groups that can be assembled in two ways."""
 
 

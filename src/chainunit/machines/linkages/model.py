@@ -25,8 +25,8 @@ from ...core.model import About, FmuData, Part, Requirement
 from ...core.planar import ZERO
 from ...core.ports import ShaftMotion
 from ...core.quantities import Fields, Value, declared_class, fields_of, group, quantity, variable_of
-from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.followed import MOST_MISFIT
+from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...mechanism.assur import GROUND, ON_LEGS, PRISMATIC
 from ...mechanism.curves import TableCurve
 from ...mechanism.driven import StateOfDrivers

@@ -6,20 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from ...core.planar import Vec2
+from ...core.planar import Vec2, rotated
 from ...groups.body import Bar, Mass
-from ...groups.driver import Course, Crank, Cylinder, Driver, Ram
+from ...groups.driver import Course, Crank, Cylinder, Driver, Elbow, Ram
 from ...groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from ...groups.group import Group
 from ...groups.joints import Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
 from ...groups.tetrad import Plate, Tetrad
 from ...groups.triad import Pose, Triad
-from ...mechanism.assur import GROUND, REVOLUTE, TETRAD, TRIAD, AssurGroup
+from ...mechanism.assur import CYLINDER, DRIVER, ELBOW, GROUND, REVOLUTE, TETRAD, TRIAD, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry
 from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
-from .structure import CYLINDER, DRIVER, DriverEntry
+from .structure import DriverEntry
 
 
 class LinkageParts:
@@ -49,8 +49,8 @@ class LinkageParts:
         self._courses, first = courses, self.structure.driver
         groups = list(self.structure.groups)
         slide = self.structure.joints[first.joint]
-        cylinder = groups.pop(0) if first.linear and GROUND not in slide.links else None
-        self.driver = self._driver(first) if cylinder is None else self._cylinder(cylinder)
+        between = groups.pop(0) if GROUND not in slide.links else None
+        self.driver = self._driver(first) if between is None else self._between(between)
         self.groups: list[Group] = []
         for group in groups:
             self.groups.append(self._group(group))
@@ -131,8 +131,10 @@ class LinkageParts:
             zero = geometry.number(entry.zero)
             bar = self.hung(link, joint)
             end = next(iter(bar.points), bar.pin)
-            start = Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero))
-            return Crank(bar, end, start, entry.sense, course)
+            start, on = Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero)), joint.other_link(link)
+            if on == GROUND:
+                return Crank(bar, end, start, entry.sense, course)
+            return Crank(bar, end, self.frames[on].components(start), entry.sense, course, on)
         sign = 1.0 if joint.on[0] == link else -1.0
         along = geometry.direction(joint, link) * sign
         frame = LinkFrame(geometry.point(link, joint.at(link)), along)
@@ -140,16 +142,37 @@ class LinkageParts:
         bar = self.bar(link, frame)
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)), course)
 
-    def _cylinder(self, group: AssurGroup) -> Driver:
-        """The driver that is a cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
-        barrel, rod, lever = group.links
-        geometry = self.geometry
-        slide = next(
-            self.structure.joints[driver.joint]
-            for driver in self.structure.drivers
-            if self.structure.joints[driver.joint].links == {barrel, rod}
+    def _between(self, group: AssurGroup) -> Driver:
+        """The driver of two links that it moves against each other, which turn a lever: a cylinder or two arms."""
+        joints = self.structure.joints
+        entry = next(
+            entry for entry in self.structure.drivers if joints[entry.joint].links == {*group.links[:2]}
         )
-        p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
+        build = self._cylinder if group.kind == CYLINDER else self._elbow
+        return build(
+            entry, joints[entry.joint], *group.links, *(joints[joint.name] for joint in group.joints)
+        )
+
+    def _elbow(
+        self, entry: DriverEntry, motor: JointEntry, near: str, far: str, lever: str, *ends: JointEntry
+    ) -> Driver:
+        """Two arms with a motor in their pin, and the lever that they turn."""
+        geometry, (p, c, q) = self.geometry, ends
+        inner, joint = self._inner(c, far, lever), self._inner(motor, far, near)
+        bar, swung = self._rod(near, p, motor), self._rod(lever, q, c)
+        frame, length = geometry.span(far, motor.at(far), c.at(far))
+        arm = self.bar(far, frame, joint, length)
+        # the angle of the far arm less that of the near one
+        turn, zero = (1.0 if entry.link == far else -1.0), geometry.number(entry.zero)
+        start = rotated(frame.axis, Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero) * turn))
+        start, course = self.frames[near].components(start), self._courses.get(motor.name)
+        return Elbow(bar, joint, arm, inner, swung, start, turn * entry.sense, self.sides[near], course)
+
+    def _cylinder(
+        self, entry: DriverEntry, slide: JointEntry, barrel: str, rod: str, lever: str, *ends: JointEntry
+    ) -> Driver:
+        """A cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
+        geometry, (p, c, q) = self.geometry, ends
         inner = self._inner(c, rod, lever)
         # from the barrel to the rod
         in_barrel, in_rod = (
@@ -175,8 +198,8 @@ class LinkageParts:
         if group.kind == DRIVER:
             joint = joints[0].name
             return self._driver(next(entry for entry in self.structure.further if entry.joint == joint))
-        if group.kind == CYLINDER:
-            return self._cylinder(group)
+        if group.kind in (CYLINDER, ELBOW):
+            return self._between(group)
         if group.kind == TRIAD:
             return self._triad(group.links[0], group.links[1:], joints[:3], joints[3:])
         if group.kind == TETRAD:

@@ -1,0 +1,143 @@
+"""Machines with groups of class IV, and with drivers between two links that move, as texts of linkage files."""
+
+from __future__ import annotations
+
+BODY = "mass = {0}\ninertia = {1}\ncentroid = [{2}, {3}]\n"
+
+STEPHENSON = """
+[ground]
+O = [0.9, 0.1]
+P = [0, 0]
+[driver]
+link = "crank"
+{driver}
+[links.crank]
+points = {{ O = [0, 0], A = [0.1, 0] }}
+mass = 3
+inertia = 0.02
+centroid = [0.03, 0.01]
+[links.one]
+points = {{ P = [0, 0], B = [-0.1, 0.4], D = [0.3, 0.2], tool = [0.2, 0.6] }}
+mass = 5
+inertia = 0.3
+centroid = [0.1, 0.2]
+[links.two]
+points = {{ A = [0, 0], C = [-0.2, 0.5], E = [-0.1, -0.4] }}
+mass = 4
+inertia = 0.2
+centroid = [-0.1, 0.1]
+masses = {{ E = 1.5 }}
+[links.upper]
+points = {{ B = [0, 0], C = [0.92, 0] }}
+mass = 2
+inertia = 0.1
+centroid = [0.4, 0.03]
+[links.lower]
+points = {{ D = [0, 0], E = [0.78, 0] }}
+mass = 1.5
+inertia = 0.08
+centroid = [0.4, 0.0]
+[inputs]
+drag = "30 N s/m"
+[loads.tool]
+on = "one.tool"
+force = ["-20 - drag * vx", "-100"]
+[loads.feder]
+type = "spring"
+on = "two.C"
+by = "ground.P"
+stiffness = "800 N/m"
+length = "0.6 m"
+damping = "20 N s/m"
+[start]
+phi = "{start}"
+points = {{ B = [-0.1, 0.4], D = [0.3, 0.2], C = [0.8, 0.6], E = [0.9, -0.3] }}
+"""
+SLOTS = """
+[ground]
+O = [0.05, 0.1]
+A = [1.0, 0.1]
+A9 = [1.5, -0.5]
+[driver]
+link = "crank"
+[links.crank]
+points = { O = [0, 0], P = [-0.05, -0.1] }
+mass = 3
+inertia = 0.02
+centroid = [0.03, 0.01]
+[links.one]
+points = { P = [0, 0], B = [-0.1, 0.4], T = [0.8, 0.6], D = [0.3, 0.2] }
+mass = 5
+inertia = 0.3
+centroid = [0.1, 0.2]
+[links.two]
+points = { A1 = [0, 0], C = [-0.2, 0.5], S = [-0.1, -0.4], S9 = [-0.7, 0.1] }
+mass = 4
+inertia = 0.2
+centroid = [-0.1, 0.1]
+[links.block]
+points = { C = [0, 0] }
+mass = 0.7
+inertia = 0.01
+centroid = [0.02, 0.01]
+[links.rod]
+points = { D = [0, 0] }
+mass = 0.6
+inertia = 0.02
+centroid = [0.03, 0.0]
+[joints.rail]
+on = "two.A1"
+by = "ground.A"
+toward = "A9"
+[joints.upper]
+on = "block.C"
+by = "one.B"
+toward = "T"
+[joints.lower]
+on = "rod.D"
+by = "two.S"
+toward = "S9"
+[loads.push]
+on = "two.C"
+force = [40, "-60"]
+[start]
+poses = { one = [0, 0, 0], two = [1.0, 0.1, 0] }
+"""
+TURNING = """
+[ground]
+O = [0, 0]
+Q = [{q}, 0]
+[driver]
+link = "crank"
+positive = "clockwise"
+zero = "90 deg"
+[links.crank]
+points = {{ O = [0, 0], A = [0.30, 0.05] }}
+mass = 3
+inertia = 0.05
+centroid = [0.1, 0.02]
+[links.one]
+points = {{ A = [0, 0], B = [-0.3, 0.45], D = [0.25, 0.5] }}
+mass = 4
+inertia = 0.12
+centroid = [0.0, 0.3]
+[links.two]
+points = {{ Q = [0, 0], C = [{c}], E = [{e}], W = [0.1, -0.2] }}
+mass = 5
+inertia = 0.2
+centroid = [0.05, 0.1]
+[links.upper]
+points = {{ B = [0, 0], C = [0.6, 0] }}
+mass = 1
+inertia = 0.04
+centroid = [0.3, 0]
+[links.lower]
+points = {{ D = [0, 0], E = [0.6, 0] }}
+mass = 1
+inertia = 0.04
+centroid = [0.3, 0]
+[start]
+phi = "0 deg"
+points = {{ C = [{cw}], E = [{ew}] }}
+angles = {{ one = "0 deg", two = "0 deg" }}
+"""
