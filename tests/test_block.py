@@ -16,7 +16,7 @@ from chainunit.groups.body import Bar
 from chainunit.groups.driver import Crank, Cylinder, Elbow, Ram
 from chainunit.groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from chainunit.groups.group import SolvedGroup
-from chainunit.groups.joints import STEADY, UNKNOWNS, DrivenHinge, Hinge, Placed, Rail
+from chainunit.groups.joints import STEADY, UNKNOWNS, DrivenHinge, GuideData, Hinge, HingeData, Placed, Rail
 from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
 from chainunit.groups.tetrad import Plate, Tetrad
 from chainunit.groups.triad import Pose, solved_triad
@@ -59,17 +59,29 @@ SEATS = {"A": Vec2(0.2, 0.5), "B": Vec2(-0.1, 0.6)}
 RODS = (RodLeg(Bar("a", "A", 0.7), "C", Vec2(-0.2, 0.5)), RodLeg(Bar("b", "B", 0.6), "D", Vec2(0.3, 0.4)))
 TETRADS = {
     "tetrad": Tetrad(
-        "f", (Plate(Bar("f", "P", None), SEATS), Plate(Bar("s", "Q", None), {})), RODS, (0.2, -0.3)
+        "f",
+        (
+            Plate(Bar("f", "P", None), HingeData("P", "f"), SEATS),
+            Plate(Bar("s", "Q", None), HingeData("Q", "s"), {}),
+        ),
+        RODS,
+        (0.2, -0.3),
     ),
     "tetrad on rails": Tetrad(
         "f",
-        (Plate(Bar("f", "", None), SEATS, RAIL, "X"), Plate(Bar("s", "", None), {}, CROSS, "Y")),
+        (
+            Plate(Bar("f", "", None), GuideData("X", "f", RAIL), SEATS),
+            Plate(Bar("s", "", None), GuideData("Y", "s", CROSS), {}),
+        ),
         RODS,
         (0.2, 0.6),
     ),
     "tetrad with slots": Tetrad(
         "f",
-        (Plate(Bar("f", "P", None), SEATS), Plate(Bar("s", "", None), {}, RAIL, "Y")),
+        (
+            Plate(Bar("f", "P", None), HingeData("P", "f"), SEATS),
+            Plate(Bar("s", "", None), GuideData("Y", "s", RAIL), {}),
+        ),
         (
             BlockLeg(Bar("a", "", None), "C", Vec2(-0.2, 0.5), Rail("f", Vec2(0.1, 0.2), unit(0.7)), "C"),
             SlotLeg(Bar("b", "B", None), Vec2(0.3, 0.4), unit(2.0), "B"),
@@ -222,7 +234,7 @@ def test_a_joint_is_its_rows():
             return next(multipliers), None
 
     rng, at = np.random.default_rng(2), before(np.random.default_rng(1))
-    joints = [DrivenHinge(1, STEADY, 0, base=at.pins["P"]), Hinge(1, base=at.pins["Q"]), Ratio()]
+    joints = [DrivenHinge(0, 1, STEADY, None, None, ZERO, at.pins["P"]), Hinge(1, base=at.pins["Q"]), Ratio()]
     poses = [(at.pins["P"], unit(0.0)), (at.pins["Q"], unit(1.0))]
     group = SolvedGroup(poses, joints)
     assert [k.t1 for k in group.links] == [1.0, pytest.approx(1.0 / RATIO)]

@@ -44,8 +44,8 @@ class Driver(Group):
     @property
     def inertia(self) -> Any:
         """The least inertia that it reflects by itself: of a crank about its bearing [kg m2], of a ram or of the rod
-        of a cylinder, which moves at the speed of the way at least, its mass [kg]."""
-        raise NotImplementedError
+        of a cylinder, which moves at the speed of the way at least, its mass [kg]; 0 if none is sure."""
+        return 0.0
 
 
 @dataclass
@@ -88,7 +88,7 @@ class Crank(Driver):
         u = Vec2(start.x * c - start.y * s, start.y * c + start.x * s)
         carrier = linkage.links[self.on] if self.on else None
         u = u if carrier is None else rotated(u, carrier.u)
-        joint = DrivenHinge(int(self.sense), rates, 0, base=bearing, carrier=carrier)
+        joint = DrivenHinge(0, int(self.sense), rates, carrier, None, ZERO, bearing)
         ends = [] if self.bar.length is None else [(0, u * self.bar.length)]
         return SolvedGroup([(bearing, u)], [joint], ends=ends, course=rates)
 
@@ -189,8 +189,8 @@ class Elbow(Driver):
     """Two arms with a motor in the pin between them, and a lever, as data: the arm P-M (`bar`), the arm M-C and the
     lever Q-C swing as barrel, rod and lever of a `Cylinder` do. The frames of the arms start at P and at M.
 
-    `start` is the direction of the second arm in the frame of the first one at the place 0, a unit vector, which turns
-    by `sense` with the place. `side` and the margin are as of a `Cylinder`, by the line P-C.
+    `start` is the direction of the second arm in the frame of the first one at the place 0, a unit vector; `sense` is
+    as of a `Crank`. `side` and the margin are as of a `Cylinder`, by the line P-C.
     """
 
     bar: Bar
@@ -213,11 +213,6 @@ class Elbow(Driver):
             HingeData(lever.pin, lever.name),
         )
 
-    @property
-    def inertia(self) -> Any:
-        """None is sure: both arms may turn against each other about their centroids."""
-        return 0.0
-
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The arms at the place `q` of the motor, which gives the length of the side P-C of a triangle."""
         p, o = linkage.pins[self.bar.pin], linkage.pins[self.lever.pin]
@@ -230,7 +225,7 @@ class Elbow(Driver):
         to_motor, u = d * self.bar.length, rotated(turned, d)
         joints = (
             Hinge(0, base=p),
-            DrivenHinge(int(self.sense), rates, 1, ZERO, 0, to_motor),
+            DrivenHinge(1, int(self.sense), rates, None, 0, to_motor),
             Hinge(1, u * self.arm.length, 2, r),
             Hinge(2, base=o),
         )

@@ -298,22 +298,16 @@ def _bent(e: Vec2, arm: Vec2, rates: Rates, link: int, sign: float) -> Vec2:
 
 
 class DrivenHinge(Hinge):
-    """A hinge with a motor: the angle of its link changes by `sense`, 1 or -1, with the place of the driver, which has
-    the derivatives `course` by q. It counts from that of the other link: of one of the group, or of a `carrier` before
-    it; None for the ground."""
+    """A hinge with a motor: the angle of its link, from that of the other one, changes by `sense`, 1 or -1, with the
+    place of the driver, which has the derivatives `course` by q. The other one is `by`, or a `carrier` before the
+    group, None for the ground."""
 
     __slots__ = ("_carrier", "_course", "_sense")
 
     def __init__(
-        self,
-        sense: int,
-        course: Sequence[Any],
-        link: int,
-        *hinge: Any,
-        carrier: Link | None = None,
-        **more: Any,
+        self, link: int, sense: int, course: Sequence[Any], carrier: Link | None, *held: Any
     ) -> None:
-        super().__init__(link, *hinge, **more)
+        super().__init__(link, ZERO, *held)
         self._sense, self._course, self._carrier = sense, course, carrier
 
     def rows(self) -> list[Row]:

@@ -34,7 +34,7 @@ class LegAt(NamedTuple):
     inner: Hinge | Guide
 
     def between(self, origin: Vec2, other: int, row: Sequence[Any]) -> LegAt:
-        """The leg from the link `other` of its group, at `origin`, with this row, in place of one from a link before."""
+        """The leg with this row from the link `other` of its group, at `origin`, in place of a link before that."""
         start, d = self.pose
         start = start.p if isinstance(start, Motion) else start
         return self._replace(row=row, pose=(start, d), outer=self.outer.held_by(other, start - origin))

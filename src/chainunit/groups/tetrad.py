@@ -20,25 +20,17 @@ from .legs import PLATE, Leg, LegAt
 
 
 class Plate(NamedTuple):
-    """A plate as data: its bar, which starts from the pin of its outer joint, and the places of its own `pins` [m].
-    One that slides on a `rail` has a frame with the direction of the rail, which starts at the point that goes along
-    it; `guide` is the pin at which the force of the rail acts on it."""
+    """A plate as data: its bar, its outer joint, and the places of its own `pins` [m]. Its frame starts at the outer
+    pin; that of one that slides starts at the point that goes along the rail, and has its direction."""
 
     bar: Bar
+    joint: HingeData | GuideData
     pins: Mapping[str, Vec2]
-    rail: Rail | None = None
-    guide: str = ""
-
-    @property
-    def joint(self) -> JointData:
-        """Its outer joint."""
-        if self.rail is None:
-            return HingeData(self.bar.pin, self.bar.name)
-        return GuideData(self.guide, self.bar.name, self.rail)
 
     def at_position(self, linkage: LinkageInMotion) -> Motion | Link:
         """Its outer pin, or its rail, with the linkage `linkage` before it."""
-        return linkage.pins[self.bar.pin] if self.rail is None else self.rail.at_position(linkage.links)
+        rail = self.joint.by
+        return rail.at_position(linkage.links) if isinstance(rail, Rail) else linkage.pins[self.joint.pin]
 
 
 class _PlateAt(NamedTuple):

@@ -91,13 +91,7 @@ class Triad(FollowedGroup):
         """The legs, with the linkage `linkage` before them, for any pose of the ternary link."""
         return tuple(leg.at_position(k, linkage) for k, leg in enumerate(self.legs))
 
-    def legs_at(self, xp: Any, placed: Sequence[PlacedLeg], x: Sequence[Any]) -> list[LegAt]:
-        """See `FollowedGroup`."""
-        return legs_at(xp, placed, x)
-
-    def solved(self, xp: Any, placed: Sequence[PlacedLeg], x: Sequence[Any]) -> SolvedOnLegs:
-        """See `FollowedGroup`."""
-        return solved_triad(xp, placed, x)
+    legs_at, solved = staticmethod(legs_at), staticmethod(solved_triad)
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
         """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""

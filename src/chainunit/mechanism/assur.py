@@ -50,16 +50,15 @@ class JointOf(NamedTuple):
 
 
 class AssurGroup(NamedTuple):
-    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, tetrad, that of a single link, or of a driver between links),
-    its links, and its joints in the order of their roles.
+    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, tetrad, that of a single link or a driver), its links, and
+    its joints in the order of their roles.
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
     the joints are the outer ones of the legs, then their inner ones. Of a tetrad the two links with an outer joint
     stand first, then its legs; the joints are the outer ones, those of the legs with the first link, then with the
-    second. Of a single link the revolute one stands first. Of a cylinder the links are barrel, rod and lever, of an
-    elbow the arms and the lever; the joints are those of the first link and the lever with links before, with that of
-    the second link with the lever between.
+    second. Of a single link the revolute one stands first. Of a driver between two links these stand first, then the
+    lever; the joints are as of a dyad, and that of the driver is the last one.
     """
 
     kind: str
@@ -300,7 +299,7 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
 def _driven(
     drive: JointOf, part: Sequence[str], inner: Sequence[JointOf], outer: Mapping[str, Sequence[JointOf]]
 ) -> AssurGroup:
-    """The group of a link that a driver turns against one before it, or of two links that it moves against each other,
+    """The group of a link that a driver turns on one before it, or of two links that it moves against each other,
     with their lever.
 
     Raises
@@ -308,38 +307,40 @@ def _driven(
     InputError
         if it is neither.
     """
-    turns = drive.kind == REVOLUTE
-    if len(part) == 1 and turns and [*outer[part[0]]] == [drive]:
+    if outer[part[0]] == [drive] and drive.kind == REVOLUTE:
         return AssurGroup(DRIVER, (*part,), (drive,))
     if len(part) == 3 and len(inner) == 1 and {drive.on, drive.by} < {*part}:
         (lever,), c = {*part} - {drive.on, drive.by}, inner[0]
         far = c.other_link(lever)
         near = drive.other_link(far)
-        ends = [*outer[near], c, *outer[lever]]
-        if not outer[far] and [j.kind for j in ends] == [REVOLUTE] * 3:
-            p, q = ends[0], ends[2]
-            return AssurGroup(ELBOW if turns else CYLINDER, (near, far, lever), (p, c, q))
+        ends = *outer[near], c, *outer[lever]
+        if not outer[far] and [joint.kind for joint in ends] == [REVOLUTE] * 3:
+            kind = ELBOW if drive.kind == REVOLUTE else CYLINDER
+            return AssurGroup(kind, (near, far, lever), (*ends, drive))
     raise driven_refusal(drive, "of the ground or of a link that is moved before it")
 
 
 def driven_refusal(drive: JointOf, place: str) -> InputError:
     """The refusal of two links that a driver moves against each other, if their outer pins are not at that place."""
-    moves, machine = ("along", "a cylinder") if drive.kind == PRISMATIC else ("against", "two arms")
+    moves, machine, hint = "along", "a cylinder", ""
+    if drive.kind == REVOLUTE:
+        moves, machine = "against", "two arms"
+        hint = (
+            "; a motor on a link that another driver moves is no [driver] but [drivers.NAME] beside that one"
+        )
     return InputError(
         f"the links {drive.by} and {drive.on}, which the driver {drive.name} moves {moves} each other, must be "
-        f"{machine}: one of them on a pin {place}, the other one on a pin of a lever, and the lever on a pin {place}",
+        f"{machine}: one of them on a pin {place}, the other one on a pin of a lever, and the lever on a pin {place}"
+        f"{hint}",
         key=drive.by,
     )
 
 
 _LETTERS = {REVOLUTE: "R", PRISMATIC: "P"}
 DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
-CYLINDER = "cylinder"
-"""Kind of the group of a cylinder that is pinned at both ends, with the lever that it swings."""
-ELBOW = "elbow"
-"""Kind of the group of two arms with a motor in the pin between them, with the lever that they swing."""
-DRIVER = "driver"
-"""Kind of the group of a link that a driver besides the first one moves in the ground, or turns on a link before."""
+DRIVER, CYLINDER, ELBOW = DRIVES = "driver", "cylinder", "elbow"
+"""Kinds of the groups of a link that a driver besides the first one moves in the ground, or turns on a link before;
+of a cylinder that is pinned at both ends, and of two arms with a motor between, with the lever that they swing."""
 DRIVEN = 3
 """Number of equations of a joint that a driver moves."""
 TRIAD, TETRAD = ON_LEGS = "triad", "tetrad"

@@ -118,9 +118,9 @@ class LinkGeometry:
 
     def rough_way(self, joint: JointEntry, link: str) -> Any:
         """The way of a link along the line in the link on the other side, in the rough pose of the start [m]."""
-        (by, start), other = joint.by, joint.other_link(link)
-        line = self.rough_place(by, joint.toward) - self.rough_place(by, start)
-        way = self.rough_place(link, joint.at(link)) - self.rough_place(other, joint.at(other))
+        (by, start), other, place = joint.by, joint.other_link(link), self.rough_place
+        line = place(by, joint.toward) - place(by, start)
+        way = place(link, joint.at(link)) - place(other, joint.at(other))
         return way.dot(line) / self.xp.sqrt(line.squared())
 
 
@@ -144,7 +144,7 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
         if group.kind not in TWO_WAYS:
             continue
         first, last = group.links[0], group.links[-1]
-        outer, inner, other = (structure.joints[joint.name] for joint in group.joints)
+        outer, inner, other = (structure.joints[joint.name] for joint in group.joints[:3])
         start = place(outer.other_link(first), outer.at(outer.other_link(first)))
         if group.kind == "RRP":
             value = (place(last, inner.at(last)) - start).dot(line(other))

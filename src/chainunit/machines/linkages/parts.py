@@ -11,7 +11,7 @@ from ...groups.body import Bar, Mass
 from ...groups.driver import Course, Crank, Cylinder, Driver, Elbow, Ram
 from ...groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from ...groups.group import Group
-from ...groups.joints import Rail
+from ...groups.joints import GuideData, HingeData, Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
 from ...groups.tetrad import Plate, Tetrad
 from ...groups.triad import Pose, Triad
@@ -49,8 +49,8 @@ class LinkageParts:
         self._courses, first = courses, self.structure.driver
         groups = list(self.structure.groups)
         slide = self.structure.joints[first.joint]
-        between = groups.pop(0) if GROUND not in slide.links else None
-        self.driver = self._driver(first) if between is None else self._between(between)
+        cylinder = groups.pop(0) if GROUND not in slide.links else None
+        self.driver = self._driver(first, first.link) if cylinder is None else self._between(cylinder)
         self.groups: list[Group] = []
         for group in groups:
             self.groups.append(self._group(group))
@@ -123,18 +123,15 @@ class LinkageParts:
 
     # the driver and the groups
 
-    def _driver(self, entry: DriverEntry) -> Driver:
-        """The driver: a crank about its pin, or a ram on its line in the ground."""
+    def _driver(self, entry: DriverEntry, link: str) -> Driver:
+        """The driver of a link: a crank about its pin, or a ram on its line in the ground."""
         geometry, course = self.geometry, self._courses.get(entry.joint)
-        joint, link = self.structure.joints[entry.joint], entry.link
+        joint = self.structure.joints[entry.joint]
         if not entry.linear:
-            zero = geometry.number(entry.zero)
-            bar = self.hung(link, joint)
+            bar, on = self.hung(link, joint), joint.other_link(link)
             end = next(iter(bar.points), bar.pin)
-            start, on = Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero)), joint.other_link(link)
-            if on == GROUND:
-                return Crank(bar, end, start, entry.sense, course)
-            return Crank(bar, end, self.frames[on].components(start), entry.sense, course, on)
+            start, sense = self._turn(entry, link, on, self.frames[link])
+            return Crank(bar, end, start, sense, course, None if on == GROUND else on)
         sign = 1.0 if joint.on[0] == link else -1.0
         along = geometry.direction(joint, link) * sign
         frame = LinkFrame(geometry.point(link, joint.at(link)), along)
@@ -142,38 +139,39 @@ class LinkageParts:
         bar = self.bar(link, frame)
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)), course)
 
+    def _turn(self, entry: DriverEntry, link: str, on: str, frame: LinkFrame) -> tuple[Vec2, float]:
+        """The direction of a link's frame in that of the link that it turns on, at the place 0 of the driver, and its
+        sense."""
+        zero, sense = self.geometry.number(entry.zero), 1.0 if link == entry.link else -1.0
+        start = Vec2(self.geometry.xp.cos(zero), self.geometry.xp.sin(zero) * sense)
+        return self.frames[on].components(rotated(frame.axis, start)), sense * entry.sense
+
     def _between(self, group: AssurGroup) -> Driver:
         """The driver of two links that it moves against each other, which turn a lever: a cylinder or two arms."""
-        joints = self.structure.joints
-        entry = next(
-            entry for entry in self.structure.drivers if joints[entry.joint].links == {*group.links[:2]}
-        )
-        build = self._cylinder if group.kind == CYLINDER else self._elbow
-        return build(
-            entry, joints[entry.joint], *group.links, *(joints[joint.name] for joint in group.joints)
-        )
-
-    def _elbow(
-        self, entry: DriverEntry, motor: JointEntry, near: str, far: str, lever: str, *ends: JointEntry
-    ) -> Driver:
-        """Two arms with a motor in their pin, and the lever that they turn."""
-        geometry, (p, c, q) = self.geometry, ends
-        inner, joint = self._inner(c, far, lever), self._inner(motor, far, near)
-        bar, swung = self._rod(near, p, motor), self._rod(lever, q, c)
-        frame, length = geometry.span(far, motor.at(far), c.at(far))
+        p, c, q, drive = (self.structure.joints[joint.name] for joint in group.joints)
+        near, far, lever = group.links
+        if group.kind == CYLINDER:
+            return self._cylinder(near, far, lever, p, c, q, drive)
+        inner, joint = self._inner(c, far, lever), self._inner(drive, far, near)
+        bar, swung = self._rod(near, p, drive), self._rod(lever, q, c)
+        frame, length = self.geometry.span(far, drive.at(far), c.at(far))
         arm = self.bar(far, frame, joint, length)
-        # the angle of the far arm less that of the near one
-        turn, zero = (1.0 if entry.link == far else -1.0), geometry.number(entry.zero)
-        start = rotated(frame.axis, Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero) * turn))
-        start, course = self.frames[near].components(start), self._courses.get(motor.name)
-        return Elbow(bar, joint, arm, inner, swung, start, turn * entry.sense, self.sides[near], course)
+        entry = next(entry for entry in self.structure.drivers if entry.joint == drive.name)
+        turn, course = self._turn(entry, far, near, frame), self._courses.get(drive.name)
+        return Elbow(bar, joint, arm, inner, swung, *turn, self.sides[near], course)
 
     def _cylinder(
-        self, entry: DriverEntry, slide: JointEntry, barrel: str, rod: str, lever: str, *ends: JointEntry
+        self,
+        barrel: str,
+        rod: str,
+        lever: str,
+        p: JointEntry,
+        c: JointEntry,
+        q: JointEntry,
+        slide: JointEntry,
     ) -> Driver:
         """A cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
-        geometry, (p, c, q) = self.geometry, ends
-        inner = self._inner(c, rod, lever)
+        geometry, inner = self.geometry, self._inner(c, rod, lever)
         # from the barrel to the rod
         in_barrel, in_rod = (
             -line if slide.on[0] == barrel else line
@@ -196,8 +194,8 @@ class LinkageParts:
         """The group of that kind with the numbers of its links."""
         joints = [self.structure.joints[j.name] for j in group.joints]
         if group.kind == DRIVER:
-            joint = joints[0].name
-            return self._driver(next(entry for entry in self.structure.further if entry.joint == joint))
+            entry = next(entry for entry in self.structure.further if entry.joint == joints[0].name)
+            return self._driver(entry, group.links[0])
         if group.kind in (CYLINDER, ELBOW):
             return self._between(group)
         if group.kind == TRIAD:
@@ -289,12 +287,9 @@ class LinkageParts:
     def _tetrad(self, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
         """Two links, each on its outer joint, with two legs between them; they carry the pins of the legs."""
         start = self.structure.start
-        held = zip(links[:2], joints[:2], (joints[2:4], joints[4:]), strict=True)
-        (first, x1), (second, x2) = [self._plate(*plate) for plate in held]
-        one, other = [
-            self._leg(leg, near, far, links[1])
-            for leg, near, far in zip(links[2:], joints[2:4], joints[4:], strict=True)
-        ]
+        first, x1 = self._plate(links[0], joints[0], joints[2:4])
+        second, x2 = self._plate(links[1], joints[1], joints[4:])
+        one, other = (self._leg(links[k], joints[k], joints[k + 2], links[1]) for k in (2, 3))
         turns = self.sides.get(links[0], ())
         return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, turns)
 
@@ -302,16 +297,15 @@ class LinkageParts:
         """A plate of a tetrad, by its `outer` joint and those with the legs, and its rough coordinate."""
         geometry, pins = self.geometry, [joint for joint in inner if joint.kind == REVOLUTE]
         self._carriers |= {self.pin(link, joint.at(link)): link for joint in pins}
-        rail, guide, coordinate = None, "", self.structure.poses[link][2]
+        held: HingeData | GuideData
         if outer.kind == REVOLUTE:
-            bar = self.hung(link, outer)
+            bar, x = self.hung(link, outer), self.structure.poses[link][2]
+            held = HingeData(bar.pin, link)
         else:
-            bar, rail, guide = self._slider(link, outer, outer.at(link))
-            coordinate = geometry.rough_way(outer, link)
-        arms = {self.pin(link, j.at(link)): geometry.point(link, j.at(link)) for j in pins}
-        return Plate(
-            bar, {pin: self.frames[link].coordinates(p) for pin, p in arms.items()}, rail, guide
-        ), coordinate
+            (bar, rail, guide), x = self._slider(link, outer, outer.at(link)), geometry.rough_way(outer, link)
+            held = GuideData(guide, link, rail)
+        arms = ((self.pin(link, j.at(link)), geometry.point(link, j.at(link))) for j in pins)
+        return Plate(bar, held, {pin: self.frames[link].coordinates(arm) for pin, arm in arms}), x
 
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
         """A leg by its joints: a rod between two pins, a block on a line before it, or a slot in the plate at its

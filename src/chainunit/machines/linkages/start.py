@@ -32,8 +32,6 @@ class StartPose:
         self.points, self.joints = points, joints
         self.slides: list[tuple[JointEntry, float]] = []
         """the joints in which drivers slide, each with its way there [m]"""
-        self.turned: list[tuple[str, str, float]] = []
-        """the links that drivers turn, each with the link that its angle counts from, and the angle [rad]"""
         self.poses: dict[str, tuple[complex, float]] = {GROUND: (0j, 0.0)}
         """the origin of the frame of a link, and its angle [rad]"""
         self.places: dict[LinkPoint, complex] = {}
@@ -76,14 +74,14 @@ class StartPose:
                 for name, point in points.items():
                     self.places.setdefault((link, name), origin + rect(1.0, angle) * point)
         self._slid()
-        slides = ((j.on[0], j.by[0], turn) for j, turn in self.joints if j.kind == PRISMATIC)
-        for on, by, turn in (*self.turned, *slides):
-            if by in self.angles:
-                self.angles.setdefault(on, self.angles[by] + turn)
-            if on in self.angles:
-                self.angles.setdefault(by, self.angles[on] - turn)
-        for joint, _ in self.joints:
-            if joint.kind == REVOLUTE:
+        for joint, turn in self.joints:
+            (on, _), (by, _) = joint.on, joint.by
+            if joint.kind == PRISMATIC:
+                if by in self.angles:
+                    self.angles.setdefault(on, self.angles[by] + turn)
+                if on in self.angles:
+                    self.angles.setdefault(by, self.angles[on] - turn)
+            elif joint.kind == REVOLUTE:
                 for one, other in ((joint.on, joint.by), (joint.by, joint.on)):
                     if one in self.places:
                         self.places.setdefault(other, self.places[one])

@@ -9,10 +9,9 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...mechanism.assur import (
-    CYLINDER,
     DRIVEN,
     DRIVER,
-    ELBOW,
+    DRIVES,
     GROUND,
     ON_LEGS,
     PRISMATIC,
@@ -86,24 +85,24 @@ def groups_of(
         if the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
     by_name, (driver, *_) = {joint.name: joint for joint in joints}, drivers
-    first, *others = (by_name[entry.joint] for entry in drivers)
+    first = in_decomposition(by_name[driver.joint])
     grounded = {entry.joint: entry.link for entry in drivers if GROUND in by_name[entry.joint].links}
+    driven = {entry.joint for entry in drivers}
     seen = [in_decomposition(joint) for joint in joints if joint.name not in grounded]
-    driven = {joint.name for joint in (first, *others)}
     seen = [joint._replace(equations=DRIVEN) if joint.name in driven else joint for joint in seen]
     groups = decompose(links, seen, [*grounded.values()])
-    alone = [
-        AssurGroup(DRIVER, (grounded[joint.name],), (in_decomposition(joint),))
-        for joint in others
-        if joint.name in grounded
-    ]
     if first.name not in grounded:
-        k, group = next((k, group) for k, group in enumerate(groups) if driver.link in group.links)
-        if group.kind == DRIVER or not all(GROUND in (j.on, j.by) for j in group.joints[::2]):
-            raise driven_refusal(in_decomposition(first), "of the ground")
-        groups.insert(0, groups.pop(k))
+        group = next(group for group in groups if group.joints[-1].name == first.name)
+        if group.kind == DRIVER or not all(GROUND in joint.links for joint in group.joints[:3:2]):
+            raise driven_refusal(first, "of the ground")
+        groups.remove(group)
+        groups.insert(0, group)
     k = int(first.name not in grounded)
-    groups[k:k] = alone
+    groups[k:k] = [
+        AssurGroup(DRIVER, (link,), (in_decomposition(by_name[name]),))
+        for name, link in grounded.items()
+        if name != first.name
+    ]
     followed = next((group for group in groups if group.kind in ON_LEGS), None)
     if followed is not None and any(entry.is_free for entry in drivers):
         kind = followed.kind
@@ -179,9 +178,9 @@ class Structure:
         driver, ground, start = DriverEntry(**data["driver"]), data["ground"], data["start"]
         others = [DriverEntry(**entry) for entry in data.get("drivers", ())]
         groups = groups_of([*links], [*joints.values()], [driver, *others])
-        driven = [group.links for group in groups if group.kind in (DRIVER, CYLINDER, ELBOW)]
+        driven = [group.joints[-1].name for group in groups if group.kind in DRIVES]
         # in the order of their groups
-        further = sorted(others, key=lambda entry: next(k for k, g in enumerate(driven) if entry.link in g))
+        further = sorted(others, key=lambda entry: driven.index(entry.joint))
         # points by link that stay apart from others in the same pin: of loads, and of joints between groups
         loaded = (load[key] for load in data["loads"] for key in ("on", "by") if key in load)
         marked = {tuple(end) for end in loaded if len(end) == 2}
