@@ -68,10 +68,8 @@ class SolvedOnLegs(SolvedGroup):
         """
         Parameters
         ----------
-        xp : engine (see `chainunit.core.engines`)
         spots : those at which each plate that turns is held [m]
-        plates : start and unit vector of each plate, see `SolvedGroup`
-        held : the outer joints of the plates
+        plates, held : start and unit vector of each plate, see `SolvedGroup`, and the outer joints of the plates
         """
         self.legs = legs
         size = 1.0

@@ -116,7 +116,8 @@ class Tetrad(FollowedGroup):
         """See `FollowedGroup`."""
         first, second = plates = [*_plates_at(xp, placed, x)]
         legs = self._legs(first, second)
-        ends = [leg.pose[0] - first.origin for leg in legs], [leg.spot for leg in legs]
+        starts = [start for start, _ in (leg.pose for leg in legs) if isinstance(start, Vec2)]
+        ends = [start - first.origin for start in starts], [leg.spot for leg in legs]
         spots = [[ZERO, *end] for plate, end in zip(plates, ends, strict=True) if plate.turns]
         held = [plate.joint for plate in plates]
         return SolvedOnLegs(xp, legs, spots, [plate.pose for plate in plates], held)

@@ -91,7 +91,7 @@ class Triad(FollowedGroup):
         """The legs, with the linkage `linkage` before them, for any pose of the ternary link."""
         return tuple(leg.at_position(k, linkage) for k, leg in enumerate(self.legs))
 
-    legs_at, solved = staticmethod(legs_at), staticmethod(solved_triad)
+    legs_at, solved = staticmethod(legs_at), staticmethod(solved_triad)  # type: ignore[assignment]
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
         """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""

@@ -29,7 +29,7 @@ class FreeLinksError(InputError):
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
     contain. `alone` is the kind of the group that a single link forms by it and a revolute joint. One that a driver
-    moves has `DRIVEN` equations."""
+    moves has 3 equations."""
 
     name: str
     kind: str
@@ -66,11 +66,11 @@ class AssurGroup(NamedTuple):
     joints: tuple[JointOf, ...]
 
 
-def decompose(links: Sequence[str], joints: Sequence[JointOf], drivers: Collection[str]) -> list[AssurGroup]:
-    """The groups of the links that hang on the ground and on the `drivers`, in an order in which they can be solved.
-
-    `joints` are all but those of the drivers with the ground; a driver between other links has one of `DRIVEN`
-    equations.
+def decompose(
+    links: Sequence[str], joints: Sequence[JointOf], drivers: Mapping[str, str]
+) -> list[AssurGroup]:
+    """The groups of the links, in an order in which they can be solved; `drivers` are the links that drivers move, by
+    joint. The first one moves its link in the ground, or is the first group; a further one is a group, too.
 
     Raises
     ------
@@ -78,16 +78,28 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], drivers: Collecti
         for a linkage with too many or too few degrees of freedom, or with a group of a class that is not covered, in
         one line that names the links and the joints.
     """
-    unknown = [link for link in links if link not in drivers]
+    by_name, first = {joint.name: joint for joint in joints}, next(iter(drivers))
+    grounded = {name: link for name, link in drivers.items() if GROUND in by_name[name].links}
+    alone = [
+        AssurGroup(DRIVER, (link,), (by_name[name],)) for name, link in grounded.items() if name != first
+    ]
+    joints = [
+        j._replace(equations=_DRIVEN) if j.name in drivers else j for j in joints if j.name not in grounded
+    ]
+    unknown = [link for link in links if link not in grounded.values()]
     matched = _matching(dict.fromkeys(unknown, 3), joints)
     free = {link: 3 - sum(1 for matched_link in matched.values() if matched_link == link) for link in unknown}
     if any(free.values()):
         raise _freedoms(unknown, joints, matched, free)
-    groups, placed = [], {GROUND, *drivers}
+    groups, placed = [], {GROUND, *grounded.values()}
     for part in _strong_parts(_dependences(unknown, joints, matched)):
         groups.append(_classified(tuple(part), joints, placed))
         placed |= {*part}
-    return groups
+    leading = [group for group in groups if group.joints[-1].name == first]
+    for group in leading:
+        if group.kind == DRIVER or not all(GROUND in joint.links for joint in group.joints[:3:2]):
+            raise _unpinned(group.joints[-1], "of the ground")
+    return [*leading, *alone, *(group for group in groups if group not in leading)]
 
 
 def in_order_of_motion(
@@ -281,7 +293,7 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
             near, far = ([pair[0] for pair in pairs] for pairs in (ends[:2], ends[2:]))
             group = _on_legs(TETRAD, held, legs, near, far)
             return group._replace(joints=(*(outer[plate][0] for plate in held), *group.joints))
-    if drive := next((j for j in joints if j.equations == DRIVEN and {*j.links} & {*part}), None):
+    if drive := next((j for j in joints if j.equations == _DRIVEN and {*j.links} & {*part}), None):
         return _driven(drive, part, [j for j in inner if j is not drive], outer)
     number, many = (
         len([j for j in joints if {*part} & {*j.links} and {*j.links} <= {*part} | placed]),
@@ -317,10 +329,10 @@ def _driven(
         if not outer[far] and [joint.kind for joint in ends] == [REVOLUTE] * 3:
             kind = ELBOW if drive.kind == REVOLUTE else CYLINDER
             return AssurGroup(kind, (near, far, lever), (*ends, drive))
-    raise driven_refusal(drive, "of the ground or of a link that is moved before it")
+    raise _unpinned(drive, "of the ground or of a link that is moved before it")
 
 
-def driven_refusal(drive: JointOf, place: str) -> InputError:
+def _unpinned(drive: JointOf, place: str) -> InputError:
     """The refusal of two links that a driver moves against each other, if their outer pins are not at that place."""
     moves, machine, hint = "along", "a cylinder", ""
     if drive.kind == REVOLUTE:
@@ -341,7 +353,7 @@ DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
 DRIVER, CYLINDER, ELBOW = DRIVES = "driver", "cylinder", "elbow"
 """Kinds of the groups of a link that a driver besides the first one moves in the ground, or turns on a link before;
 of a cylinder that is pinned at both ends, and of two arms with a motor between, with the lever that they swing."""
-DRIVEN = 3
+_DRIVEN = 3
 """Number of equations of a joint that a driver moves."""
 TRIAD, TETRAD = ON_LEGS = "triad", "tetrad"
 """Kinds of groups of which links stand on legs, without a closed form."""

@@ -289,7 +289,7 @@ def lesser(xp: Any, a: Any, b: Any) -> Any:
 # groups without a closed form
 
 
-def turns_of_followed(linkage: Linkage) -> dict[str, Sequence[float]]:
+def turns_of_followed(linkage: Linkage) -> dict[str, tuple[float, ...]]:
     """How often the coordinates of each triad and tetrad turn in a turn of the crank, by name; the groups of the
     linkage have them from here on. Those from the first one on that does not close have none."""
     turns = {}

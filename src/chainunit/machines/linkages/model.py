@@ -182,7 +182,7 @@ class LinkageDescription(LinkageOutputs):
         self.Inputs = declared_class("Inputs", (motion,), [*inputs, *self.further.inputs()])
         p, u = self.Parameters(), self.Inputs()
         geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
-        self.sides = start_sides(geometry)
+        self.sides: dict[str, Any] = dict(start_sides(geometry))
         self.at_start = self._loaded(self._parts(geometry, u), p)
         self.sides |= turns_of_followed(self.at_start)
         self.followed = self._followed(self.at_start)
@@ -376,6 +376,8 @@ class LinkageDescription(LinkageOutputs):
         degrees = round(math.degrees(self.at_start.parts.geometry.number(driver.zero)), 6)
         named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
         way = "counter-clockwise" if driver.sense > 0.0 else "clockwise"
+        if (on := self.structure.joints[driver.joint].other_link(driver.link)) != GROUND:
+            return f"from {degrees:g} deg to the x axis of {on}, {way}"
         return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
 
     def _followed(self, linkage: DescribedLinkage) -> FollowedLinkage:

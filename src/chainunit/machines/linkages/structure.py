@@ -8,18 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import InputError
-from ...mechanism.assur import (
-    DRIVEN,
-    DRIVER,
-    DRIVES,
-    GROUND,
-    ON_LEGS,
-    PRISMATIC,
-    REVOLUTE,
-    AssurGroup,
-    decompose,
-    driven_refusal,
-)
+from ...mechanism.assur import DRIVES, GROUND, ON_LEGS, PRISMATIC, REVOLUTE, AssurGroup, decompose
 from .joint_kind import Entry, JointEntry
 from .joint_kinds import SINGLES, in_decomposition
 from .names import LinkPoint, connected, owners_of
@@ -84,25 +73,8 @@ def groups_of(
     InputError
         if the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
-    by_name, (driver, *_) = {joint.name: joint for joint in joints}, drivers
-    first = in_decomposition(by_name[driver.joint])
-    grounded = {entry.joint: entry.link for entry in drivers if GROUND in by_name[entry.joint].links}
-    driven = {entry.joint for entry in drivers}
-    seen = [in_decomposition(joint) for joint in joints if joint.name not in grounded]
-    seen = [joint._replace(equations=DRIVEN) if joint.name in driven else joint for joint in seen]
-    groups = decompose(links, seen, [*grounded.values()])
-    if first.name not in grounded:
-        group = next(group for group in groups if group.joints[-1].name == first.name)
-        if group.kind == DRIVER or not all(GROUND in joint.links for joint in group.joints[:3:2]):
-            raise driven_refusal(first, "of the ground")
-        groups.remove(group)
-        groups.insert(0, group)
-    k = int(first.name not in grounded)
-    groups[k:k] = [
-        AssurGroup(DRIVER, (link,), (in_decomposition(by_name[name]),))
-        for name, link in grounded.items()
-        if name != first.name
-    ]
+    moved, driver = {entry.joint: entry.link for entry in drivers}, drivers[0]
+    groups = decompose(links, [in_decomposition(joint) for joint in joints], moved)
     followed = next((group for group in groups if group.kind in ON_LEGS), None)
     if followed is not None and any(entry.is_free for entry in drivers):
         kind = followed.kind
