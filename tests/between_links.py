@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
-BODY = "mass = {0}\ninertia = {1}\ncentroid = [{2}, {3}]\n"
-
 STEPHENSON = """
 [ground]
 O = [0.9, 0.1]
 P = [0, 0]
 [driver]
 link = "crank"
-{driver}
 [links.crank]
-points = {{ O = [0, 0], A = [0.1, 0] }}
+points = { O = [0, 0], A = [0.1, 0] }
 mass = 3
 inertia = 0.02
 centroid = [0.03, 0.01]
 [links.one]
-points = {{ P = [0, 0], B = [-0.1, 0.4], D = [0.3, 0.2], tool = [0.2, 0.6] }}
+points = { P = [0, 0], B = [-0.1, 0.4], D = [0.3, 0.2], tool = [0.2, 0.6] }
 mass = 5
 inertia = 0.3
 centroid = [0.1, 0.2]
 [links.two]
-points = {{ A = [0, 0], C = [-0.2, 0.5], E = [-0.1, -0.4] }}
+points = { A = [0, 0], C = [-0.2, 0.5], E = [-0.1, -0.4] }
 mass = 4
 inertia = 0.2
 centroid = [-0.1, 0.1]
-masses = {{ E = 1.5 }}
+masses = { E = 1.5 }
 [links.upper]
-points = {{ B = [0, 0], C = [0.92, 0] }}
+points = { B = [0, 0], C = [0.92, 0] }
 mass = 2
 inertia = 0.1
 centroid = [0.4, 0.03]
 [links.lower]
-points = {{ D = [0, 0], E = [0.78, 0] }}
+points = { D = [0, 0], E = [0.78, 0] }
 mass = 1.5
 inertia = 0.08
 centroid = [0.4, 0.0]
@@ -42,7 +39,7 @@ drag = "30 N s/m"
 [loads.tool]
 on = "one.tool"
 force = ["-20 - drag * vx", "-100"]
-[loads.feder]
+[loads.spring]
 type = "spring"
 on = "two.C"
 by = "ground.P"
@@ -50,8 +47,7 @@ stiffness = "800 N/m"
 length = "0.6 m"
 damping = "20 N s/m"
 [start]
-phi = "{start}"
-points = {{ B = [-0.1, 0.4], D = [0.3, 0.2], C = [0.8, 0.6], E = [0.9, -0.3] }}
+points = { B = [-0.1, 0.4], D = [0.3, 0.2], C = [0.8, 0.6], E = [0.9, -0.3] }
 """
 SLOTS = """
 [ground]
@@ -106,38 +102,163 @@ poses = { one = [0, 0, 0], two = [1.0, 0.1, 0] }
 TURNING = """
 [ground]
 O = [0, 0]
-Q = [{q}, 0]
+Q = [0.04, 0]
 [driver]
 link = "crank"
 positive = "clockwise"
 zero = "90 deg"
 [links.crank]
-points = {{ O = [0, 0], A = [0.30, 0.05] }}
+points = { O = [0, 0], A = [0.30, 0.05] }
 mass = 3
 inertia = 0.05
 centroid = [0.1, 0.02]
 [links.one]
-points = {{ A = [0, 0], B = [-0.3, 0.45], D = [0.25, 0.5] }}
+points = { A = [0, 0], B = [-0.3, 0.45], D = [0.25, 0.5] }
 mass = 4
 inertia = 0.12
 centroid = [0.0, 0.3]
 [links.two]
-points = {{ Q = [0, 0], C = [{c}], E = [{e}], W = [0.1, -0.2] }}
+points = { Q = [0, 0], C = [0.26, 0.1], E = [0.51, 0.35], W = [0.1, -0.2] }
 mass = 5
 inertia = 0.2
 centroid = [0.05, 0.1]
 [links.upper]
-points = {{ B = [0, 0], C = [0.6, 0] }}
+points = { B = [0, 0], C = [0.9192, 0] }
 mass = 1
 inertia = 0.04
 centroid = [0.3, 0]
 [links.lower]
-points = {{ D = [0, 0], E = [0.6, 0] }}
+points = { D = [0, 0], E = [0.57, 0] }
 mass = 1
 inertia = 0.04
 centroid = [0.3, 0]
+[loads.brake]
+type = "torque"
+on = "two"
+torque = "12"
 [start]
-phi = "0 deg"
-points = {{ C = [{cw}], E = [{ew}] }}
-angles = {{ one = "0 deg", two = "0 deg" }}
+points = { B = [-0.35, 0.75], C = [0.3, 0.1], D = [0.2, 0.8], E = [0.55, 0.35] }
+"""
+ROBOT = """
+[ground]
+O = [0, 0]
+[driver]
+link = "boom"
+range = ["10 deg", "100 deg"]
+[drivers.elbow]
+joint = "B"
+{law}
+[links.boom]
+points = {{ O = [0, 0], B = [0.8, 0.1] }}
+mass = 12
+inertia = 0.6
+centroid = [0.4, 0.02]
+[links.fore]
+points = {{ B = [0, 0], tool = [0.6, 0.05] }}
+mass = 6
+inertia = 0.2
+centroid = [0.25, 0.01]
+masses = {{ tool = 5 }}
+[loads.push]
+on = "fore.tool"
+force = ["-30", "20"]
+[start]
+phi = "40 deg"
+"""
+EXCITER = """
+[ground]
+O = [0, 0]
+Q = [1.0, 0.2]
+[driver]
+link = "crank"
+[drivers.exciter]
+joint = "M"
+phi = "3 * phi + 30 deg"
+by = "motor"
+positive = "clockwise"
+[links.crank]
+points = { O = [0, 0], A = [0.2, 0] }
+mass = 3
+inertia = 0.05
+centroid = [0.1, 0.02]
+[links.coupler]
+points = { A = [0, 0], B = [0.9, 0], M = [0.5, 0.2] }
+mass = 6
+inertia = 0.4
+centroid = [0.45, 0.05]
+[links.rocker]
+points = { Q = [0, 0], B = [0.7, 0] }
+mass = 4
+inertia = 0.2
+centroid = [0.3, 0.0]
+[links.unbalance]
+points = { M = [0, 0], W = [0.05, 0] }
+mass = 2
+inertia = 0.004
+centroid = [0.04, 0]
+[start]
+points = { B = [1.0, 0.9] }
+"""
+FOUR_BAR = """
+[ground]
+O = [0, 0]
+Q = [1.0, 0.2]
+[driver]
+joint = "A"
+zero = "-40 deg"
+[links.crank]
+points = { O = [0, 0], A = [0.2, 0.03] }
+mass = 3
+inertia = 0.05
+centroid = [0.1, 0.02]
+[links.coupler]
+points = { A = [0.1, 0.0], B = [0.9, 0.2] }
+mass = 6
+inertia = 0.4
+centroid = [0.45, 0.05]
+[links.rocker]
+points = { Q = [0, 0], B = [0.7, 0] }
+mass = 4
+inertia = 0.2
+centroid = [0.3, 0.0]
+[loads.push]
+on = "rocker.B"
+force = [-30, "20"]
+[start]
+points = { B = [1.0, 0.9] , A = [0.2, 0.0]}
+"""
+FIVE_BAR = """
+[ground]
+A = [0, 0]
+E = [1.2, 0]
+[driver]
+link = "left"
+[drivers.other]
+joint = "C"
+{law}
+[links.left]
+points = {{ A = [0, 0], B = [0.2, 0] }}
+mass = 3
+inertia = 0.1
+centroid = [0.15, 0.02]
+[links.lower]
+points = {{ B = [0, 0], C = [0.8, 0], tool = [1.2, 0.1] }}
+mass = 2
+inertia = 0.2
+centroid = [0.5, 0.0]
+[links.right]
+points = {{ E = [0, 0], D = [0.6, 0] }}
+mass = 2.5
+inertia = 0.08
+centroid = [0.2, 0.01]
+[links.upper]
+points = {{ D = [0, 0], C = [0.7, 0] }}
+mass = 1
+inertia = 0.15
+centroid = [0.5, 0.1]
+[loads.tool]
+on = "lower.tool"
+force = [-20, "-100"]
+[start]
+points = {{ C = [0.8, 0.6], D = [1.3, 0.5] }}
 """
