@@ -9,16 +9,17 @@ import between_links as texts
 import fmpy
 import numpy as np
 import pytest
+from drawings import DENSITY, Drawing
 from javascript_hosts import node
 from live_pages import in_node
 from multibody import Multibody
 
 from chainunit import GeometryError, InputError
-from chainunit.core.engines import MATH
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of, linkage_from
+from chainunit.machines.linkages.imports.source import imported
 from chainunit.machines.machine import Machine
 from chainunit.reading.tables import toml
 from chainunit.report.drawing import drawing
@@ -71,7 +72,11 @@ def motion(machine, name, seed):
         return np.array([[place], [w], [a]])
     low, high = further[0].span
     return np.array(
-        [[place, low + (high - low) * rng.uniform(0.1, 0.9)], [w, rng.uniform(-3, 3)], [a, rng.uniform(-9, 9)]]
+        [
+            [place, low + (high - low) * rng.uniform(0.1, 0.9)],
+            [w, rng.uniform(-3, 3)],
+            [a, rng.uniform(-9, 9)],
+        ]
     )
 
 
@@ -175,7 +180,9 @@ def test_fmus(name, make, tmp_path):
 
 @node
 @pytest.mark.second
-@pytest.mark.parametrize("name", ["tetrad that turns", "exciter on a coupler", "motor between crank and coupler"])
+@pytest.mark.parametrize(
+    "name", ["tetrad that turns", "exciter on a coupler", "motor between crank and coupler"]
+)
 def test_the_live_page(name):
     """Its turn is that of Python."""
     machine, _ = machine_of(name)
@@ -205,10 +212,134 @@ def test_the_report(name, words):
     data = linkage_data(findings, "machine.toml", ())
     assert data.degrees_of_freedom == (2 if name in FREE else 1)
     assert findings.turn.energy_gap < 1e-12
-    low, high = machine.model.span
-    places = np.linspace(low, high, 2001)
-    feed = machine.model.feed_layout.by_name(machine.model.Feed())
-    out = machine.evaluate({"phi": places, "w": np.full_like(places, 4.0), **feed})
-    if machine.model.turns:
-        assert findings.turn.peak == pytest.approx(np.max(np.abs(out["tau"])), rel=1e-4)
+    assert words.count("(") == len(data.groups)
     assert drawing(machine).count("<polygon") + drawing(machine).count("<polyline") >= 3
+
+
+BRANCHES = {
+    "first": "points = { B = [-0.1, 0.4], D = [0.3, 0.2], C = [0.8, 0.6], E = [0.9, -0.3] }",
+    "second": "angles = { one = -2.0, two = -0.2, upper = 0.9, lower = 0.1 }",
+}
+
+
+def test_the_start_chooses_the_branch_and_it_is_followed():
+    """Both modes of a tetrad, all the way round, as Newton's method on all joints follows them in small steps."""
+    head, machines = texts.STEPHENSON.partition("[start]")[0], []
+    for start in BRANCHES.values():
+        data = toml(f"{head}[start]\n{start}\n")
+        machine, body = Machine(linkage_from(data, "machine")[0]), Multibody(description_of(data, "machine"))
+        places = np.linspace(0.0, 2.0 * math.pi, 73)
+        out, pose = machine.evaluate({"phi": places}), body.closed(0.0, body.rough)
+        for k, q in enumerate(places):
+            pose = body.closed(q, pose)
+            for name in ("one", "two"):
+                gap = out[f"{name}.angle"][k] - pose[body.columns(name)][2]
+                assert math.remainder(gap, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-12), (k, name)
+        machines.append(out["one.angle"])
+    assert np.min(np.abs(machines[0] - machines[1])) > 1.0
+
+
+def test_plates_that_turn_with_the_crank():
+    machine, _ = machine_of("tetrad that turns")
+    out = machine.evaluate({"phi": np.linspace(0.0, 2.0 * math.pi, 145)})
+    for name in ("one", "two"):
+        angle = out[f"{name}.angle"]
+        assert angle[-1] - angle[0] == pytest.approx(-2.0 * math.pi, abs=1e-12)
+        assert np.max(np.abs(np.diff(angle))) < 0.1 and np.ptp(np.diff(angle)) > 1e-3
+
+
+@pytest.mark.parametrize("form", ["linkage2", "pmks", "pyslvs"])
+def test_a_drawing_with_a_group_of_class_iv(form, tmp_path):
+    """Of another program: it comes over with no hand on it."""
+    drawn = Drawing()
+    places = {
+        "O": (90, 10),
+        "A": (100, 10),
+        "P": (0, 0),
+        "B": (-10, 40),
+        "D": (30, 20),
+        "C": (80, 60),
+        "E": (90, -30),
+    }
+    for name, place in places.items():
+        drawn.pin(name, place)
+    drawn.links = {
+        "crank": ["O", "A"], "one": ["P", "B", "D"], "two": ["A", "C", "E"], "upper": ["B", "C"], "lower": ["D", "E"]
+    }  # fmt: skip
+    drawn.fixed = ["O", "P"]
+    drawn.masses = {name: (900.0, 800.0, places[pins[0]]) for name, pins in drawn.links.items()}
+    text, scale, pins, links = getattr(drawn, form)()
+    file = tmp_path / f"drawing.{form}"
+    file.write_text(text, "utf-8")
+    source = text if form == "pmks" else str(file)
+    machine = Machine(imported(source, density=f"{DENSITY} kg/m").machine()[0])
+    kinds = [group.kind for group in machine.model.described_by.structure.groups]
+    assert kinds == ["tetrad"]
+    body = Multibody(drawn.description(scale, form == "linkage2", form == "pmks"))
+    for q in (0.0, 2.7, -1.9):
+        out = machine.evaluate({"phi": q, "w": 3.0, "a": -7.0})
+        want = body.solution(body.followed(q), q, 3.0, -7.0)
+        assert float(out["tau"]) == pytest.approx(want["tau"], rel=1e-11, abs=1e-12), q
+        for link, names in drawn.links.items():
+            for pin in names:
+                place = float(out[f"{links[link]}.{pins[pin]}.y"])
+                assert place == pytest.approx(want[f"{link}.{pin}.y"], abs=1e-11), (q, link, pin)
+
+
+def refused(text, *changes):
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    with pytest.raises((InputError, GeometryError)) as caught:
+        linkage_from(toml(text), "machine")
+    return str(caught.value)
+
+
+def test_refusals_of_tetrads():
+    text = texts.STEPHENSON
+    for changes, words in (
+        ([("A = [0.1, 0]", "A = [0.5, 0]")], "links.one: the tetrad of one does not close all the way round"),
+        ([("C = [0.92, 0]", "C = [2.6, 0]")], "links.one: the tetrad of one does not close all the way round"),
+        (
+            [('link = "crank"', 'link = "crank"\nrange = ["0 deg", "40 deg"]')],
+            "the links one, two, upper, lower form a tetrad, and the driver swings: a tetrad needs a driver that",
+        ),
+        (
+            [("[links.one]", '[links.fan]\npoints = { P = [0, 0] }\n[drivers.fan]\nlink = "fan"\nrange = [0, 1]\n'
+              "[links.one]")],
+            "form a tetrad, and two drivers are inputs: a tetrad needs one",
+        ),
+    ):  # fmt: skip
+        assert words in refused(text, *changes), words
+
+
+def test_other_lengths_that_do_not_close_are_refused():
+    text = texts.STEPHENSON.replace("C = [0.92, 0]", 'C = ["rod", 0]') + "[parameters]\nrod = 0.92\n"
+    model = linkage_from(toml(text), "machine")[0]
+    assert Machine(model, rod=0.9).evaluate({"phi": 1.0})["margin"] > 0.3
+    with pytest.raises(GeometryError, match="tetrad of one does not close"):
+        Machine(model, rod=2.6)
+
+
+def test_refusals_of_drivers_between_links():
+    robot = texts.ROBOT.format(law='range = ["-120 deg", "-10 deg"]')
+    first = ('[driver]\nlink = "boom"\nrange = ["10 deg", "100 deg"]\n[drivers.elbow]\njoint = "B"',
+             '[driver]\njoint = "B"\nrange = ["10 deg", "100 deg"]\n[drivers.arm]\nlink = "boom"')  # fmt: skip
+    assert "no [driver] but [drivers.NAME] beside that one" in refused(robot, first)
+    assert 'drivers.elbow.joint: is "O", which is a pin of the ground' in refused(
+        robot, ('joint = "B"', 'joint = "O"')
+    )
+    assert "two links that move: B" in refused(robot, ('joint = "B"', 'joint = "O"'))
+    assert "drivers.elbow.link: follows from the joint" in refused(
+        robot, ('joint = "B"', 'joint = "B"\nlink = "fore"')
+    )
+    four = refused(texts.FOUR_BAR, ('joint = "A"', 'joint = "B"'))
+    assert "cannot close" in four or "dead position" in four
+    slide = '[joints.pull]\non = "fore.B"\nby = "boom.O"\ntoward = "B"\n[loads.push]'
+    text = refused(
+        robot,
+        ('joint = "B"', 'joint = "pull"'),
+        ('["-120 deg", "-10 deg"]', "[0.1, 0.2]"),
+        ("[loads.push]", slide),
+    )
+    assert "links.fore: " in text and "more than once" in text
