@@ -15,6 +15,7 @@ from live_pages import in_node
 from multibody import Multibody
 
 from chainunit import GeometryError, InputError
+from chainunit.core.engines import MATH
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
@@ -343,3 +344,23 @@ def test_refusals_of_drivers_between_links():
         ("[loads.push]", slide),
     )
     assert "links.fore: " in text and "more than once" in text
+
+
+@pytest.mark.parametrize(
+    "name", ["motor between crank and coupler", "Stephenson's second chain", "arm on an arm, by a gear"]
+)
+def test_the_direct_model_gives_back_the_motion(name):
+    """Also its requirements hold: the inertia of the driver is no more than the machine reflects anywhere."""
+    machine, _ = machine_of(name, FRICTION)
+    start = inputs(machine, name, motion(machine, name, 4))
+    want, direct = machine.evaluate(start), machine.model.direct()
+    p = direct.with_derived(MATH, direct.Parameters(phi_start=start["phi"], w_start=start["w"]))
+    more = {"drag": start["drag"]} if "drag" in start else {}
+    u = direct.input_layout.from_names({"tau": float(want["tau"]), **more})
+    (part,) = direct.evaluate(MATH, p, u, direct.begin(p, u))
+    out = direct.parts[0].layout.by_name(part)
+    assert out["a"] == pytest.approx(start["a"], rel=1e-9)
+    direct.check(p)
+    low, high = machine.model.span
+    reflected = machine.evaluate({"phi": np.linspace(low, high, 181)})["J"]
+    assert 0.0 < machine.model.described_by.at_start.driver.inertia <= np.min(reflected)

@@ -44,8 +44,17 @@ class Driver(Group):
     @property
     def inertia(self) -> Any:
         """The least inertia that it reflects by itself: of a crank about its bearing [kg m2], of a ram or of the rod
-        of a cylinder, which moves at the speed of the way at least, its mass [kg]; 0 if none is sure."""
+        of a cylinder, which moves at the speed of the way at least, its mass [kg]."""
+        raise NotImplementedError
+
+
+def _inertia_about_start(mass: Any) -> Any:
+    """Inertia of a body about the pin from which its link starts [kg m2]."""
+    if mass is None:
         return 0.0
+    beside = mass.t if isinstance(mass, Mass) else None
+    arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
+    return mass.I + mass.m * arm2
 
 
 @dataclass
@@ -73,12 +82,7 @@ class Crank(Driver):
     @property
     def inertia(self) -> Any:
         """Inertia of the crank alone about its bearing [kg m2]."""
-        mass = self.bar.mass
-        if mass is None:
-            return 0.0
-        beside = mass.t if isinstance(mass, Mass) else None
-        arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
-        return mass.I + mass.m * arm2
+        return _inertia_about_start(self.bar.mass)
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The crank at the coordinate `q`."""
@@ -212,6 +216,12 @@ class Elbow(Driver):
             HingeData(self.end, arm, lever.name),
             HingeData(lever.pin, lever.name),
         )
+
+    @property
+    def inertia(self) -> Any:
+        """That of both arms in series: of the first one about P, of the second one about its centroid [kg m2]."""
+        one, other = _inertia_about_start(self.bar.mass), 0.0 if self.arm.mass is None else self.arm.mass.I
+        return one * other / (one + other + 1e-300)
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The arms at the place `q` of the motor, which gives the length of the side P-C of a triangle."""

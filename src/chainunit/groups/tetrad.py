@@ -105,11 +105,11 @@ class Tetrad(FollowedGroup):
         data, link, legs = self.plates[0], Link(Motion(first.origin), first.u, 0.0, 0.0), []
         pins = {name: link.beside(arm.x, arm.y) for name, arm in data.pins.items()}
         for k, leg in enumerate(self.legs):
-            at = leg.at_position(k, _FirstPlate(pins, {data.bar.name: link}))(second.origin, second.u)
-            x, y, moment = at.row
+            placed = leg.at_position(k, _FirstPlate(pins, {data.bar.name: link}))(second.origin, second.u)
+            x, y, moment = placed.row
             force = Vec2(x, y)
             on_first = first.along(force, moment + (second.origin - first.origin).cross(force))
-            legs.append(at.between(first.origin, PLATE - 1, (-on_first, second.along(force, moment))))
+            legs.append(placed.between(first.origin, PLATE - 1, (-on_first, second.along(force, moment))))
         return legs
 
     def solved(self, xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> SolvedOnLegs:
