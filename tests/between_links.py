@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 STEPHENSON = """
 [ground]
 O = [0.9, 0.1]
@@ -262,3 +264,56 @@ force = [-20, "-100"]
 [start]
 points = {{ C = [0.8, 0.6], D = [1.3, 0.5] }}
 """
+_BODY = {"mass": 2.0, "inertia": 0.05, "centroid": [0.1, 0.03]}
+_PLACES = {"P": [0, 0], "B": [-0.1, 0.4], "D": [0.3, 0.2], "A": [1.0, 0.1], "C": [0.8, 0.6], "E": [0.9, -0.3]}
+
+
+def tetrad_of(kinds, rng):
+    """The tables of a tetrad on a rocker of a four-bar and on the ground, with its outer joints and the joints of
+    both legs by their letters, such as R, P, RR, PR; near and far end of a leg."""
+    outer, other, *legs = kinds
+    places = {name: np.array(place) + rng.uniform(-0.15, 0.15, 2) for name, place in _PLACES.items()}
+    z, y = places["P"] + [0.2, -0.5], places["P"] + [0.15, -0.1]
+    x, r = y + np.array([0.5, -0.2]), 0.03
+    links, ground, joints = {}, {"Z": z, "O": x - [r, 0.0], "A": places["A"]}, {}
+
+    def link(name, **points):
+        links[name] = {"points": points, **_BODY}
+
+    def slide(name, on, by, toward):
+        joints[name] = {"on": on, "by": by, "toward": toward, "angle": 0.0}
+
+    p, a = places["P"], places["A"]
+    link("crank", O=[0, 0], X=[r, 0])
+    link("coupler", X=[0, 0], Y=y - x)
+    link("rocker", Z=[0, 0], Y=y - z, P=p - z, P9=p - z + np.array([0.3, 1.0]))
+    link("one", **{"P" if outer == "R" else "P1": p - p}, B=places["B"] - p, D=places["D"] - p)
+    link("two", **{"A" if other == "R" else "A1": a - a}, C=places["C"] - a, E=places["E"] - a)
+    if outer == "P":
+        slide("rail", "one.P1", "rocker.P", "P9")
+    if other == "P":
+        ground["A9"] = a + np.array([0.5, -0.6])
+        slide("guide", "two.A1", "ground.A", "A9")
+    poses = {"rocker": [*z, 0], "coupler": [*x, 0], "one": [*p, 0], "two": [*a, 0]}
+    for name, ends, (near, far) in zip(("upper", "lower"), legs, ("BC", "DE"), strict=True):
+        begin, end = places[near], places[far]
+        length, angle = np.hypot(*(end - begin)), np.arctan2(*(end - begin)[::-1])
+        poses[name] = [*(end if ends == "PR" else begin), angle if ends == "RR" else 0.0]
+        if ends == "RR":
+            link(name, **{near: [0, 0], far: [length, 0]})
+        elif ends == "PR":
+            link(name, **{far: [0, 0]})
+            links["one"]["points"] |= {f"{far}_from": begin - p, f"{far}_to": end - p}
+            slide(f"slot_{name}", f"{name}.{far}", f"one.{far}_from", f"{far}_to")
+        else:
+            link(name, **{near: [0, 0]})
+            links["two"]["points"] |= {f"{near}_from": end - a, f"{near}_to": begin - a}
+            slide(f"slot_{name}", f"{name}.{near}", f"two.{near}_from", f"{near}_to")
+
+    def plain(value):
+        if isinstance(value, dict):
+            return {key: plain(x) for key, x in value.items()}
+        return [float(x) for x in value] if isinstance(value, list | np.ndarray) else value
+
+    return plain({"ground": ground, "driver": {"link": "crank"}, "links": links, "joints": joints,
+                  "start": {"poses": poses}})  # fmt: skip

@@ -3,6 +3,7 @@ Lagrange multipliers (`multibody`, which shares no line with the package)."""
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import between_links as texts
@@ -147,8 +148,12 @@ def test_slopes_of_the_load_port(name):
             assert here[prefix + slope] == pytest.approx(want, rel=1e-5, abs=1e-5 * size), prefix + slope
 
 
-FMUS = ("Stephenson's second chain", "tetrad on a rail, with slots", "arm on an arm, with a motor",
-        "motor between crank and coupler")  # fmt: skip
+FMUS = [
+    "Stephenson's second chain",
+    pytest.param("tetrad on a rail, with slots", marks=pytest.mark.slow),
+    "arm on an arm, with a motor",
+    "motor between crank and coupler",
+]
 
 
 @pytest.mark.second
@@ -364,3 +369,34 @@ def test_the_direct_model_gives_back_the_motion(name):
     low, high = machine.model.span
     reflected = machine.evaluate({"phi": np.linspace(low, high, 181)})["J"]
     assert 0.0 < machine.model.described_by.at_start.driver.inertia <= np.min(reflected)
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("outer", ["RR", "RP", "PR", "PP"])
+def test_tetrads_with_slides(outer):
+    """All kinds of legs, on plates that turn or slide: those that close are those of all their equations, and the
+    others do not close by them either."""
+    closing = 0
+    for legs in itertools.product(("RR", "PR", "RP"), repeat=2):
+        for seed in range(4):
+            data = texts.tetrad_of((*outer, *legs), np.random.default_rng(seed))
+            description = description_of(data, "machine")
+            body = Multibody(description)
+            try:
+                machine = Machine(linkage_from(data, "machine")[0])
+            except InputError as error:
+                assert "does not close all the way round" in str(error) or "dead position" in str(error)
+                course = [body.closed(0.0, body.rough)]
+                for q in np.linspace(0.0, 2.0 * math.pi, 201)[1:]:
+                    course.append(body.closed(q, course[-1], 12) if course[-1] is not None else None)
+                stiff = max(np.linalg.cond(body.equations(x, 0.0)[1]) for x in course if x is not None)
+                assert course[-1] is None or stiff > 200.0
+                continue
+            closing += 1
+            for q in (0.3, 2.9, -3.3):
+                out = machine.evaluate({"phi": q, "w": 2.0, "a": 5.0})
+                want = body.solution(body.followed(q), q, 2.0, 5.0)
+                forces = [key for key in want if key.endswith((".fx", ".fy", ".normal", ".moment", "tau"))]
+                size = max(abs(want[key]) for key in forces)
+                assert all(abs(out[key] - want[key]) < 1e-10 * size for key in forces), (legs, seed)
+    assert closing >= 12
