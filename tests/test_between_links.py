@@ -400,3 +400,28 @@ def test_tetrads_with_slides(outer):
                 size = max(abs(want[key]) for key in forces)
                 assert all(abs(out[key] - want[key]) < 1e-10 * size for key in forces), (legs, seed)
     assert closing >= 12
+
+
+@pytest.mark.parametrize("order", [("elbow", "wrist"), ("wrist", "elbow")])
+def test_three_arms_in_any_order(order):
+    """A motor on an arm that stands by a motor on the first one; the file may name them in any order."""
+    tables = {
+        "elbow": '[drivers.elbow]\njoint = "B"\nrange = ["-120 deg", "-10 deg"]\n',
+        "wrist": '[drivers.wrist]\njoint = "T"\nrange = ["-30 deg", "60 deg"]\npositive = "clockwise"\n',
+    }
+    hand = "[links.hand]\npoints = { T = [0, 0], H = [0.2, 0.05] }\nmass = 1.5\ninertia = 0.01\n"
+    head, _, rest = texts.ROBOT.format(law="").partition('[drivers.elbow]\njoint = "B"\n')
+    text = head + "".join(tables[name] for name in order) + rest.replace("[loads", f"{hand}[loads")
+    data = toml(text.replace("tool = [0.6, 0.05]", "tool = [0.6, 0.05], T = [0.6, 0]"))
+    machine, body = Machine(linkage_from(data, "machine")[0]), Multibody(description_of(data, "machine"))
+    motions = {"": (0.7, 1.5, -2.0), "elbow": (-0.9, 0.8, 3.0), "wrist": (0.4, -1.2, 5.0)}
+    values = {
+        f"{name}.{key}".removeprefix("."): x
+        for name, row in motions.items()
+        for key, x in zip(("phi", "w", "a"), row, strict=True)
+    }
+    moved = np.array([motions[name] for name in ("", *order)]).T
+    out, want = machine.evaluate(values), body.solution(body.followed(moved[0]), *moved)
+    size = max(abs(want[key]) for key in want if key.endswith((".fx", ".fy")))
+    for key in ("tau", "elbow.tau", "wrist.tau", "O.fx", "B.fy", "T.fx", "T.fy"):
+        assert out[key] == pytest.approx(want[key], abs=1e-10 * size), key
