@@ -94,7 +94,7 @@ class JointData(Protocol):
 
 class HingeData(NamedTuple):
     """A hinge as data: its pin, the link on which its reaction acts, and the link of the same group that carries the
-    pin; None if a link before the group does. This is `motor_on` if a motor turns the link against it."""
+    pin; None if a link before the group does. That one is `motor_on` if a motor on it turns the link."""
 
     pin: str
     link: str

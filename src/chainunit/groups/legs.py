@@ -1,8 +1,8 @@
 """The legs of a plate: a rod between two pins, a block on a rail, and a block in a slot of the plate.
 
-Each leg takes one degree of freedom from the plate. At one pose of the plate, which has its origin at
-`origin` and its x axis along `u`, a leg gives one row for Newton's method: the wrench (force, moment about the
-origin) that it can exert on the plate. A rod pulls along its line, a block pushes across its line.
+Each leg takes one degree of freedom from the plate. At one pose of the plate, which has its origin at `origin` and
+its x axis along `u`, a leg gives one row for Newton's method: the wrench (force, moment about the origin) that it can
+exert on the plate. A rod pulls along its line, a block pushes across its line.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ PLATE = 3
 
 
 class LegAt(NamedTuple):
-    """A leg at one pose: its `row`, the `gap` by which it misses, in the unit of the row, a `spot` of the ternary
-    link through which it goes, from the origin, the `length` of a rod, and of the leg as a link its `pose`, its outer
-    joint and the one with the plate."""
+    """A leg at one pose: its `row`, the `gap` by which it misses, in the unit of the row, a `spot` of the plate
+    through which it goes, from the origin, the `length` of a rod, and of the leg as a link its `pose`, its outer joint
+    and the one with the plate."""
 
     row: Sequence[Any]
     gap: Any
