@@ -22,8 +22,8 @@ PLATE = 3
 
 class LegAt(NamedTuple):
     """A leg at one pose: its `row`, the `gap` by which it misses, in the unit of the row, a `spot` of the plate
-    through which it goes, from the origin, the `length` of a rod, and of the leg as a link its `pose`, its outer joint
-    and the one with the plate."""
+    through which it goes, from the origin, the `length` of a rod, and of the leg as a link its `pose`, its outer
+    joint and the one with the plate."""
 
     row: Sequence[Any]
     gap: Any
