@@ -48,6 +48,8 @@ MODULES = (
     "batch/evaluate.py",
     "groups/chain.py",
     "groups/triad.py",
+    "groups/followed.py",
+    "groups/tetrad.py",
     "groups/block.py",
     "groups/joints.py",
     "groups/dyad.py",

@@ -165,6 +165,10 @@ class Multibody:
                 rows.append(d @ (p_by - r_by) + (p - r) @ turned(d) * other_by)
             else:
                 angle, by = self.angle(x, driver["link"])
+                # a motor between two links turns them against each other
+                ends = next([j["on"][0], j["by"][0]] for j in self.joints if j["name"] == driver["joint"])
+                (other,) = {*ends} - {driver["link"]}
+                angle, by = angle - self.angle(x, other)[0], by - self.angle(x, other)[1]
                 gaps.append(angle - self.number(driver["zero"]) - driver["sense"] * place)
                 rows.append(by)
         return np.array(gaps), np.array(rows)

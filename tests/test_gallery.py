@@ -50,6 +50,7 @@ KINDS = {
     "scotch_yoke_pump": ["RPP"],
     "slider_crank_press": ["RRP"],
     "stephenson_six_bar": ["RRR", "RRR"],
+    "stephenson_two_six_bar": ["tetrad"],
     "straight_line_pump": ["geared link"],
     "tipper": ["cylinder"],
     "toggle_clamp": ["RRR"],
@@ -149,6 +150,13 @@ def test_the_dwell_is_where_the_file_says():
     # of no other link
     others = [turn("dwell_six_bar").coupler, turn("dwell_six_bar").rocker, turn("dwell_six_bar").connector]
     assert min(np.ptp(np.degrees(each.angle[336:537])) for each in others) > 10.0
+
+
+def test_the_plate_tilts_and_the_beam_swings_as_the_file_says():
+    sizes = said("stephenson_two_six_bar", r"by (\S+) degrees alone, .* by (\S+) degrees:")
+    out = turn("stephenson_two_six_bar")
+    swings = [np.ptp(np.degrees(link.angle)) for link in (out.plate, out.beam)]
+    assert swings == pytest.approx(sizes, abs=0.05)
 
 
 @pytest.mark.parametrize(

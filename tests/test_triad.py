@@ -10,8 +10,9 @@ from scipy.optimize import brentq
 
 from chainunit.core.engines import MATH, Dual, dual, slope
 from chainunit.core.planar import Motion, Vec2
+from chainunit.groups.legs import PLATE as LEGS
 from chainunit.groups.legs import rods_at
-from chainunit.groups.triad import LEGS, Pose, SolvedTriad, assembly_modes, correct_pose
+from chainunit.groups.triad import Pose, assembly_modes, correct_pose, solved_triad
 
 
 def random_triad(rng, collinear=False):
@@ -110,7 +111,7 @@ def searched(pins, lengths, arms, tries=600):
         try:
             start = Pose(*rng.uniform(-2.0, 3.0, 2), rng.uniform(-math.pi, math.pi))
             pose = correct_pose(MATH, still(pins, lengths, arms), start, 40)
-            triad = SolvedTriad(MATH, still(pins, lengths, arms), pose)
+            triad = solved_triad(MATH, still(pins, lengths, arms), pose)
         except (ArithmeticError, ValueError):
             continue
         gaps = [math.sqrt((k.p - p).squared()) - l for k, p, l in zip(triad.pins, pins, lengths, strict=True)]
@@ -163,7 +164,7 @@ def test_motion_is_that_of_the_followed_pose(collinear):
     while checked < 40:
         pins, lengths, arms, pose = random_triad(rng, collinear)
         outer, at = moved(rng, pins)
-        triad = SolvedTriad(MATH, rods_at(outer, lengths, arms), pose)
+        triad = solved_triad(MATH, rods_at(outer, lengths, arms), pose)
         if abs(triad.margin) < 0.1:
             continue
         checked += 1
@@ -196,7 +197,7 @@ def test_forces_keep_every_link_in_balance(collinear):
     rng = np.random.default_rng(5)
     for _ in range(60):
         pins, lengths, arms, pose = random_triad(rng, collinear)
-        triad = SolvedTriad(MATH, still(pins, lengths, arms), pose)
+        triad = solved_triad(MATH, still(pins, lengths, arms), pose)
         if abs(triad.margin) < 1e-2:
             continue
         legs = tuple((Vec2(*rng.uniform(-9, 9, 2)), rng.uniform(-9, 9)) for _ in range(LEGS))
@@ -224,7 +225,7 @@ def test_three_moments_are_singular_on_a_line_and_this_is_not():
     """docs/papers.md, paper 003, item 6: the paper's three moment equations about C, D, E against ours."""
     rng = np.random.default_rng(6)
     pins, lengths, arms, pose = random_triad(rng, collinear=True)
-    triad = SolvedTriad(MATH, still(pins, lengths, arms), pose)
+    triad = solved_triad(MATH, still(pins, lengths, arms), pose)
     at = [pin.p for pin in triad.pins]
     pull = [leg.u for leg in triad.links[:LEGS]]
     moments = np.array([[(at[k] - at[i]).cross(pull[k]) for k in range(3)] for i in range(3)])
@@ -241,5 +242,5 @@ def test_the_margin_vanishes_where_the_legs_meet():
     pins = tuple(a + (meet - a) * 0.5 for a in arms)
     lengths = tuple(math.sqrt((p - a).squared()) for p, a in zip(pins, arms, strict=True))
     nearly = pins[0], pins[1], pins[2] + Vec2(1e-9, 0.0)
-    triad = SolvedTriad(MATH, still(nearly, lengths, arms), Pose(0.0, 0.0, 0.0))
+    triad = solved_triad(MATH, still(nearly, lengths, arms), Pose(0.0, 0.0, 0.0))
     assert abs(triad.margin) < 1e-8

@@ -410,7 +410,7 @@ def test_the_live_page_has_both_motions(name):
         ('range = ["0 deg", "90 deg"]\nby = "gear"', "drivers.other.by: belongs to a driver with a law"),
         ('range = ["0 deg", "90 deg"]\nstart = 2', 'must be within drivers.other.range, ["0 deg"'),
         ('range = ["0 deg", "90 deg"]\nstart = "80 deg"', "this is with other at"),
-        ('phi = "phi"\njoint = "C"', "drivers.other.joint: is \"C\", which is a pin"),
+        ('phi = "phi"\njoint = "E"', "drivers.other.joint: is \"E\", which is a pin of the ground: for that give"),
         ('phi = "phi"\nlaw = 3', "drivers.other.law: "),
     ],
 )  # fmt: skip

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from chainunit.core.engines import MATH
-from chainunit.groups.triad import LEGS
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.mechanism.machine import MachineState, add_wrenches
 
@@ -73,7 +72,7 @@ def as_the_paper(s: MachineState, line: float, *, cut: bool = True) -> Any:
     for k, (at, from_) in enumerate(zip(inner, outer, strict=True)):
         matrix[3 + k, 2 * k : 2 * k + 2] = at.y - from_.y, from_.x - at.x
         right[3 + k] = -line * (at.x * from_.y - from_.x * at.y)
-    along = np.linalg.solve(matrix, right).reshape(LEGS, 2)
+    along = np.linalg.solve(matrix, right).reshape(len(_LEGS), 2)
     return along + np.array([[t.x, t.y] for t in across])
 
 
@@ -140,7 +139,7 @@ def rank_in_line() -> float:
     """Item 6: rank of the three moments with C, D and E on one line."""
     m = _in_line().m
     at, legs = [m.pins[pin].p for pin in _PINS], [m.links[leg].u for leg in _LEGS]
-    moments = [[(at[k] - at[i]).cross(legs[k]) for k in range(LEGS)] for i in range(LEGS)]
+    moments = [[(at[k] - at[i]).cross(legs[k]) for k in range(len(_LEGS))] for i in range(len(_LEGS))]
     return float(np.linalg.matrix_rank(np.array(moments)))
 
 

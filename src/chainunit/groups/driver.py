@@ -13,11 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ..core.planar import ZERO, Vec2
+from ..core.planar import ZERO, Vec2, rotated
 from .body import Bar, Mass
 from .dyad import meeting
 from .group import Group, SolvedGroup
-from .joints import STEADY, CrankDrive, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
+from .joints import STEADY, DrivenHinge, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
 
 UPWARD = Vec2(0.0, 1.0)
 
@@ -48,17 +48,28 @@ class Driver(Group):
         raise NotImplementedError
 
 
+def _inertia_about_start(mass: Any) -> Any:
+    """Inertia of a body about the pin from which its link starts [kg m2]."""
+    if mass is None:
+        return 0.0
+    beside = mass.t if isinstance(mass, Mass) else None
+    arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
+    return mass.I + mass.m * arm2
+
+
 @dataclass
 class Crank(Driver):
     """A crank as data: its bar, which starts from a ground pin; the pin at the bar's `end`, or one of its points if
     the bar has no length; the direction of the bar at q = 0, a unit vector; and `sense`: +1 where q counts
-    counter-clockwise, -1 where clockwise."""
+    counter-clockwise, -1 where clockwise. One `on` a link before it starts from a pin of that, and its direction and
+    its angle count from it."""
 
     bar: Bar
     end: str
     start: Vec2 = UPWARD
     sense: float = -1.0
     course: Callable[[Any, Any], Course] | None = None
+    on: str | None = None
 
     @property
     def pins(self) -> dict[str, str]:
@@ -66,17 +77,12 @@ class Crank(Driver):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
-        return (HingeData(self.bar.pin, self.bar.name),)
+        return (HingeData(self.bar.pin, self.bar.name, None, self.on),)
 
     @property
     def inertia(self) -> Any:
         """Inertia of the crank alone about its bearing [kg m2]."""
-        mass = self.bar.mass
-        if mass is None:
-            return 0.0
-        beside = mass.t if isinstance(mass, Mass) else None
-        arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
-        return mass.I + mass.m * arm2
+        return _inertia_about_start(self.bar.mass)
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The crank at the coordinate `q`."""
@@ -84,9 +90,11 @@ class Crank(Driver):
         angle, rates = self.course_at(xp, q)
         c, s = xp.cos(angle), xp.sin(angle) * self.sense
         u = Vec2(start.x * c - start.y * s, start.y * c + start.x * s)
-        joints = Hinge(0, base=bearing), CrankDrive(0, int(self.sense), rates)
+        carrier = linkage.links[self.on] if self.on else None
+        u = u if carrier is None else rotated(u, carrier.u)
+        joint = DrivenHinge(0, int(self.sense), rates, carrier, None, ZERO, bearing)
         ends = [] if self.bar.length is None else [(0, u * self.bar.length)]
-        return SolvedGroup([(bearing, u)], joints, ends=ends, course=rates)
+        return SolvedGroup([(bearing, u)], [joint], ends=ends, course=rates)
 
 
 @dataclass
@@ -178,3 +186,58 @@ class Cylinder(Driver):
             Hinge(2, base=o),
         )
         return SolvedGroup(poses, joints, size=b * xp.sqrt(square), course=rates)
+
+
+@dataclass
+class Elbow(Driver):
+    """Two arms with a motor in the pin between them, and a lever, as data: the arm P-M (`bar`), the arm M-C and the
+    lever Q-C swing as barrel, rod and lever of a `Cylinder` do. The frames of the arms start at P and at M.
+
+    `start` is the direction of the second arm in the frame of the first one at the place 0, a unit vector; `sense` is
+    as of a `Crank`. `side` and the margin are as of a `Cylinder`, by the line P-C.
+    """
+
+    bar: Bar
+    joint: str
+    arm: Bar
+    end: str
+    lever: Bar
+    start: Vec2
+    sense: float
+    side: float
+    course: Callable[[Any, Any], Course] | None = None
+
+    @property
+    def joints(self) -> tuple[JointData, ...]:
+        bar, arm, lever = self.bar, self.arm.name, self.lever
+        return (
+            HingeData(bar.pin, bar.name),
+            HingeData(self.joint, arm, bar.name),
+            HingeData(self.end, arm, lever.name),
+            HingeData(lever.pin, lever.name),
+        )
+
+    @property
+    def inertia(self) -> Any:
+        """That of both arms in series: of the first one about P, of the second one about its centroid [kg m2]."""
+        one, other = _inertia_about_start(self.bar.mass), 0.0 if self.arm.mass is None else self.arm.mass.I
+        return one * other / (one + other + 1e-300)
+
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The arms at the place `q` of the motor, which gives the length of the side P-C of a triangle."""
+        p, o = linkage.pins[self.bar.pin], linkage.pins[self.lever.pin]
+        angle, rates = self.course_at(xp, q)
+        turned = rotated(self.start, Vec2(xp.cos(angle), xp.sin(angle) * self.sense))
+        reach, b = Vec2(self.bar.length, 0.0) + turned * self.arm.length, self.lever.length
+        square = reach.squared()
+        e, r = meeting(xp, p.p, o.p, square, b * b, self.side)
+        d = rotated(e, Vec2(reach.x, -reach.y)) * (1.0 / square)
+        to_motor, u = d * self.bar.length, rotated(turned, d)
+        joints = (
+            Hinge(0, base=p),
+            DrivenHinge(1, int(self.sense), rates, None, 0, to_motor),
+            Hinge(1, u * self.arm.length, 2, r),
+            Hinge(2, base=o),
+        )
+        poses = (p, d), (p.p + to_motor, u), (o, r * (1.0 / b))
+        return SolvedGroup(poses, joints, e.cross(r) / (b * xp.sqrt(square)), course=rates)

@@ -94,11 +94,12 @@ class JointData(Protocol):
 
 class HingeData(NamedTuple):
     """A hinge as data: its pin, the link on which its reaction acts, and the link of the same group that carries the
-    pin; None if a link before the group does."""
+    pin; None if a link before the group does. That one is `motor_on` if a motor on it turns the link."""
 
     pin: str
     link: str
     by: str | None = None
+    motor_on: str | None = None
 
     @property
     def form(self) -> str:
@@ -110,10 +111,14 @@ class HingeData(NamedTuple):
     def third_before(
         self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
     ) -> Third | None:
-        return (pins.get(self.pin, ZERO), 0.0) if self.by is None else None
+        turn = links[self.motor_on][1] if self.motor_on else 0.0
+        return (pins.get(self.pin, ZERO), turn) if self.by is None else None
 
     def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
-        return -reaction, -(m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
+        moment = (m.pins[self.pin].p - m.links[carrier].pin.p).cross(reaction)
+        if isinstance(reaction, GuideForce):
+            moment = moment + reaction.moment
+        return -reaction, -moment
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
         p1, start = m.pins[self.pin].p1, m.links[self.link].pin.p1
@@ -252,6 +257,10 @@ class Hinge(Placed):
             return None
         return (self._by, ZERO) if self._by_arm is ZERO else (self._link, self._arm)
 
+    def held_by(self, link: int, arm: Vec2) -> Hinge:
+        """The same joint of the start of its link with a `link` of the group, at the arm from the start of that."""
+        return Hinge(self._link, ZERO, link, arm)
+
     def rows(self) -> list[Row]:
         """Its rows: of the point along x and y."""
         k, r = UNKNOWNS * self._link, self._arm
@@ -288,24 +297,37 @@ def _bent(e: Vec2, arm: Vec2, rates: Rates, link: int, sign: float) -> Vec2:
     return e.plus(arm.turned(), sign * (t1 * t1 * t1)).plus(arm, 3.0 * sign * (t1 * rates[1][turn]))
 
 
-class CrankDrive(Placed):
-    """The drive of a crank: its angle changes by `sense`, 1 or -1, with the place of the driver, which has the
-    derivatives `course` by q."""
+class DrivenHinge(Hinge):
+    """A hinge with a motor: the angle of its link, from that of the other one, changes by `sense`, 1 or -1, with the
+    place of the driver, which has the derivatives `course` by q. The other one is `by`, or a `carrier` before the
+    group, None for the ground."""
 
-    __slots__ = ("_course", "_link", "_sense")
+    __slots__ = ("_carrier", "_course", "_sense")
 
-    def __init__(self, link: int, sense: int, course: Sequence[Any] = STEADY) -> None:
-        self._link, self._sense, self._course = link, sense, course
+    def __init__(
+        self, link: int, sense: int, course: Sequence[Any], carrier: Link | None, *held: Any
+    ) -> None:
+        super().__init__(link, ZERO, *held)
+        self._sense, self._course, self._carrier = sense, course, carrier
 
     def rows(self) -> list[Row]:
-        """Its row: of the angle."""
-        return [{UNKNOWNS * self._link + 2: self._sense}]
+        """See `Hinge`; then of the angle."""
+        turn: Row = {UNKNOWNS * self._link + 2: self._sense}
+        if self._by is not None:
+            turn[UNKNOWNS * self._by + 2] = -self._sense
+        return [*super().rows(), turn]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        return [self._course[len(rates)]]
+        turn, k = self._course[len(rates)], self._carrier
+        if k is not None:
+            carried = before[1] if before is not None else k.t2 if rates else k.t1
+            turn = turn + self._sense * carried
+        return [*super().right(rates, before), turn]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
-        return None, next(multipliers)
+        """See `Placed`; on a carrier before the group the reaction has the moment of the motor, a `GuideForce`."""
+        force, effort = Vec2(next(multipliers), next(multipliers)), next(multipliers)
+        return force if self._carrier is None else GuideForce(force.x, force.y, self._sense * effort), effort
 
 
 class Guide(Hinge):
@@ -333,6 +355,10 @@ class Guide(Hinge):
     @property
     def seat(self) -> Seat | None:
         return None
+
+    def held_by(self, link: int, arm: Vec2) -> Guide:
+        """See `Hinge`."""
+        return Guide(self._link, self._d, self._s, arm, link)
 
     def rows(self) -> list[Row]:
         """See `Hinge`; then of the angle. The way is an unknown, too."""

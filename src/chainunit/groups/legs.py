@@ -1,8 +1,8 @@
-"""The legs of a triad: a rod between two pins, a block on a rail, and a block in a slot of the ternary link.
+"""The legs of a plate: a rod between two pins, a block on a rail, and a block in a slot of the plate.
 
-Each leg takes one degree of freedom from the ternary link. At one pose of the ternary link, which has its origin at
-`origin` and its x axis along `u`, a leg gives one row for Newton's method: the wrench (force, moment about the
-origin) that it can exert on the ternary link. A rod pulls along its line, a block pushes across its line.
+Each leg takes one degree of freedom from the plate. At one pose of the plate, which has its origin at `origin` and
+its x axis along `u`, a leg gives one row for Newton's method: the wrench (force, moment about the origin) that it can
+exert on the plate. A rod pulls along its line, a block pushes across its line.
 """
 
 from __future__ import annotations
@@ -16,21 +16,28 @@ from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar
 from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
 
-LEGS = 3
+PLATE = 3
+"""The number of the link at the end of the legs: after the three of a triad, or after two and another plate."""
 
 
 class LegAt(NamedTuple):
-    """A leg at one pose: its `row`, the `gap` by which it misses, in the unit of the row, a `spot` of the ternary
-    link through which it goes, from the origin, the `length` of a rod, and of the leg as a link its `pose`, its outer
-    joint and the one with the ternary link."""
+    """A leg at one pose: its `row`, the `gap` by which it misses, in the unit of the row, a `spot` of the plate
+    through which it goes, from the origin, the `length` of a rod, and of the leg as a link its `pose`, its outer
+    joint and the one with the plate."""
 
-    row: tuple[Any, Any, Any]
+    row: Sequence[Any]
     gap: Any
     spot: Vec2
     length: Any
     pose: tuple[Vec2 | Motion, Vec2]
     outer: Hinge | Guide
     inner: Hinge | Guide
+
+    def between(self, origin: Vec2, other: int, row: Sequence[Any]) -> LegAt:
+        """The leg with this row from the link `other` of its group, at `origin`, in place of a link before that."""
+        start, d = self.pose
+        start = start.p if isinstance(start, Motion) else start
+        return self._replace(row=row, pose=(start, d), outer=self.outer.held_by(other, start - origin))
 
     def misfit(self, xp: Any) -> Any:
         """The gap in size, of a rod in parts of its length [1], of a block [m]."""
@@ -39,7 +46,7 @@ class LegAt(NamedTuple):
 
 
 PlacedLeg = Callable[[Vec2, Vec2], LegAt]
-"""A leg with the linkage before it, for any origin and axis of the ternary link."""
+"""A leg with the linkage before it, for any origin and axis of the plate."""
 
 
 @dataclass
@@ -48,8 +55,8 @@ class Leg:
 
     bar: Bar
 
-    def joints(self, ternary: str) -> tuple[JointData, JointData]:
-        """Its outer joint, and the one with the ternary link of this name."""
+    def joints(self, plate: str) -> tuple[JointData, JointData]:
+        """Its outer joint, and the one with the plate of this name."""
         raise NotImplementedError
 
     def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
@@ -59,15 +66,15 @@ class Leg:
 
 @dataclass
 class RodLeg(Leg):
-    """A rod from a pin of known motion to a `pin` of the ternary link, at `arm` in its frame [m]. With r from its
-    outer pin to its inner pin and A from the origin of the ternary link to the inner pin, its row is (r, A x r)."""
+    """A rod from a pin of known motion to a `pin` of the plate, at `arm` in its frame [m]. With r from its
+    outer pin to its inner pin and A from the origin of the plate to the inner pin, its row is (r, A x r)."""
 
     pin: str
     arm: Vec2
 
-    def joints(self, ternary: str) -> tuple[JointData, JointData]:
+    def joints(self, plate: str) -> tuple[JointData, JointData]:
         name = self.bar.name
-        return HingeData(self.bar.pin, name), HingeData(self.pin, name, ternary)
+        return HingeData(self.bar.pin, name), HingeData(self.pin, name, plate)
 
     def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
         return partial(_rod, number, linkage.pins[self.bar.pin], self.bar.length, self.arm)
@@ -75,9 +82,9 @@ class RodLeg(Leg):
 
 @dataclass
 class BlockLeg(Leg):
-    """A block on a rail of known motion, with a `pin` of the ternary link, at `arm` in its frame [m]. Its own frame
+    """A block on a rail of known motion, with a `pin` of the plate, at `arm` in its frame [m]. Its own frame
     starts at this pin and has the direction of the rail; the rail goes through the pin. `guide` is the pin at which
-    the force of the rail acts on the block. With n normal to the rail and A from the origin of the ternary link to
+    the force of the rail acts on the block. With n normal to the rail and A from the origin of the plate to
     the pin, its row is (n, A x n)."""
 
     pin: str
@@ -85,8 +92,8 @@ class BlockLeg(Leg):
     on: Rail
     guide: str
 
-    def joints(self, ternary: str) -> tuple[JointData, JointData]:
-        return GuideData(self.guide, self.bar.name, self.on), HingeData(self.pin, self.bar.name, ternary)
+    def joints(self, plate: str) -> tuple[JointData, JointData]:
+        return GuideData(self.guide, self.bar.name, self.on), HingeData(self.pin, self.bar.name, plate)
 
     def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
         return partial(_block, number, self.on.at_position(linkage.links), self.arm)
@@ -94,18 +101,18 @@ class BlockLeg(Leg):
 
 @dataclass
 class SlotLeg(Leg):
-    """A block on a pin of known motion, in a slot of the ternary link: the line through `at` [m] in the direction
-    `along`, a unit vector, both in the frame of the ternary link. The frame of the block starts at its pin and has
+    """A block on a pin of known motion, in a slot of the plate: the line through `at` [m] in the direction
+    `along`, a unit vector, both in the frame of the plate. The frame of the block starts at its pin and has
     the direction of the slot; the slot goes through the pin. `guide` is the pin at which the force of the slot acts
-    on the block. With n normal to the slot and y from the origin of the ternary link to the pin, its row is (n, y x
+    on the block. With n normal to the slot and y from the origin of the plate to the pin, its row is (n, y x
     n)."""
 
     at: Vec2
     along: Vec2
     guide: str
 
-    def joints(self, ternary: str) -> tuple[JointData, JointData]:
-        return HingeData(self.bar.pin, self.bar.name), GuideData(self.guide, self.bar.name, ternary)
+    def joints(self, plate: str) -> tuple[JointData, JointData]:
+        return HingeData(self.bar.pin, self.bar.name), GuideData(self.guide, self.bar.name, plate)
 
     def at_position(self, number: int, linkage: LinkageInMotion) -> PlacedLeg:
         return partial(_slot, number, linkage.pins[self.bar.pin], self.at, self.along)
@@ -120,21 +127,21 @@ def _rod(number: int, outer: Motion, length: Any, arm: Vec2, origin: Vec2, u: Ve
     a = _turned(arm, u)
     r = origin + a - outer.p
     gap = 0.5 * (length * length - r.squared())
-    joints = Hinge(number, base=outer), Hinge(number, r, LEGS, a)
+    joints = Hinge(number, base=outer), Hinge(number, r, PLATE, a)
     return LegAt((r.x, r.y, a.cross(r)), gap, a, length, (outer, r * (1.0 / length)), *joints)
 
 
 def _block(number: int, rail: Link, arm: Vec2, origin: Vec2, u: Vec2) -> LegAt:
     a, d, n = _turned(arm, u), rail.u, rail.u.turned()
     way = origin + a - rail.pin.p
-    joints = Guide(number, d, way.dot(d), way, rail), Hinge(number, ZERO, LEGS, a)
+    joints = Guide(number, d, way.dot(d), way, rail), Hinge(number, ZERO, PLATE, a)
     return LegAt((n.x, n.y, a.cross(n)), -way.dot(n), a, None, (rail.pin.p + way, d), *joints)
 
 
 def _slot(number: int, outer: Motion, point: Vec2, along: Vec2, origin: Vec2, u: Vec2) -> LegAt:
     d, a, y = _turned(along, u), _turned(point, u), outer.p - origin
     n = d.turned()
-    joints = Hinge(number, base=outer), Guide(number, d, (y - a).dot(d), y, LEGS)
+    joints = Hinge(number, base=outer), Guide(number, d, (y - a).dot(d), y, PLATE)
     return LegAt((n.x, n.y, y.cross(n)), (y - a).dot(n), a, None, (outer, d), *joints)
 
 

@@ -7,26 +7,20 @@ axis. Each leg gives a row, the wrench that it can exert on the ternary link; of
 
     (r.x, r.y, A x r).
 
-Newton's correction of the pose solves these three rows, and they are what is left of the matrix of the group after
-the legs are eliminated. Their determinant vanishes if the lines of the legs meet in one point or are parallel: these
-are the dead positions of a triad, and there are no others. If C, D and E lie on one line, the matrix is regular; the
-three moment equations about C, D and E, which paper 003 solves, are singular there.
+The determinant of the three rows vanishes if the lines of the legs meet in one point or are parallel: these are the
+dead positions of a triad, and there are no others. If C, D and E lie on one line, the matrix is regular; the three
+moment equations about C, D and E, which paper 003 solves, are singular there.
 
-There is no closed form for the pose. Up to six assembly modes are the real roots of a polynomial (`assembly_modes`),
-and `correct_pose` follows a mode from one position to the next.
-
-In a linkage with one crank the pose is a smooth periodic function of the crank angle. `Triad.derive` follows it once
-around, from the mode to which `Triad.assembly` leads at q = 0, and keeps it as a Fourier series. At any angle the
-series gives a pose that is nearly right, and Newton's method makes it exact. So the pose depends on the crank angle
-alone, independent of the step and the history. The branch cannot jump; `requirements` refuses parameters with which
-the branch ends within the turn.
+Up to six assembly modes are the real roots of a polynomial (`assembly_modes`); `chainunit.groups.followed` follows a
+mode from one position to the next.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -34,20 +28,10 @@ import numpy as np
 from ..core.engines import MATH
 from ..core.model import Requirement
 from ..core.planar import Motion, Vec2
-from .block import minus_cofactors
 from .body import Bar, Mass
-from .group import Group, SolvedGroup
+from .followed import MOST_MISFIT, TERMS, FollowedGroup, SolvedOnLegs, corrected
 from .joints import JointData, LinkageInMotion
-from .legs import LEGS, Leg, LegAt, PlacedLeg, RodLeg, rods_at
-
-SAMPLES = 20
-"""Number of crank angles at which a triad is followed once around."""
-HARMONICS = 8
-"""Number of harmonics in the series of the pose."""
-MOST_MISFIT = 1e-10
-"""Largest misfit of a leg that counts as closed, in parts of its length."""
-_STEPS = 3
-"""Steps of Newton's method from the series: three remove an error of 1e-3, as of a pose that moves sharply."""
+from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
 
 class Pose(NamedTuple):
@@ -58,32 +42,32 @@ class Pose(NamedTuple):
     theta: Any
 
 
-def legs_at(xp: Any, legs: Sequence[PlacedLeg], pose: Pose) -> list[LegAt]:
+def legs_at(xp: Any, legs: Sequence[PlacedLeg], pose: Sequence[Any]) -> list[LegAt]:
     """The legs at a pose."""
-    origin, u = Vec2(pose.x, pose.y), Vec2(xp.cos(pose.theta), xp.sin(pose.theta))
+    x, y, theta = pose
+    origin, u = Vec2(x, y), Vec2(xp.cos(theta), xp.sin(theta))
     return [leg(origin, u) for leg in legs]
 
 
-def correct_pose(xp: Any, legs: Sequence[PlacedLeg], near: Pose, steps: int) -> Pose:
-    """The pose after `steps` of Newton's method from `near`. From a pose that is nearly right each step doubles the
-    number of right digits. It also doubles the order up to which the derivatives of the pose are right."""
-    pose = near
-    for _ in range(steps):
-        placed = legs_at(xp, legs, pose)
-        minus, det = minus_cofactors([leg.row for leg in placed])
-        minus_per = -1.0 / det
-        moved = (
-            sum(leg.gap * row[k] for leg, row in zip(placed, minus, strict=True)) for k in range(len(pose))
-        )
-        pose = Pose(*(x + dx * minus_per for x, dx in zip(pose, moved, strict=True)))
-    return pose
+def correct_pose(xp: Any, legs: Sequence[PlacedLeg], near: Sequence[Any], steps: int) -> Pose:
+    """The pose after `steps` of Newton's method from `near`, see `corrected`."""
+    return Pose(*corrected(partial(legs_at, xp, legs), near, steps))
+
+
+def solved_triad(xp: Any, placed: Sequence[PlacedLeg], pose: Sequence[Any]) -> SolvedOnLegs:
+    """The triad on these legs at a pose of the ternary link; its `pins` are in the order of the legs."""
+    legs, (x, y, theta) = legs_at(xp, placed, pose), pose
+    ternary = Vec2(x, y), Vec2(xp.cos(theta), xp.sin(theta))
+    return SolvedOnLegs(xp, legs, [[leg.spot for leg in legs]], [ternary])
 
 
 @dataclass
-class Triad(Group):
-    """A triad as data: the ternary link with its `mass`, three legs, further points on the ternary link, and the pose
-    `assembly`, from which Newton's method leads to the assembly mode at the crank angle `start` [rad]. `turns` is how
-    often the ternary link turns counter-clockwise in a turn of the crank: the rest of its angle is periodic."""
+class Triad(FollowedGroup):
+    """A triad as data: the ternary link with its `mass`, three legs, and further points on the ternary link; its
+    coordinates are the pose, see `FollowedGroup`."""
+
+    kind: ClassVar[str] = "triad"
+    derived_count: ClassVar[int] = 3 * TERMS + 2
 
     name: str
     mass: Mass
@@ -91,10 +75,7 @@ class Triad(Group):
     points: Mapping[str, tuple[Any, Any]]
     assembly: Pose
     start: float = 0.0
-    turns: float = 0.0
-
-    derived_count: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
-    """The number of values that `derive` gives: the series of the pose, the largest misfit, the least margin."""
+    turns: Sequence[float] = ()
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -106,17 +87,11 @@ class Triad(Group):
         outer, inner = zip(*(leg.joints(self.name) for leg in self.legs), strict=True)
         return *outer, *inner
 
-    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedTriad:
-        """The triad with the linkage `linkage` before it, on the branch that the series `derived` gives."""
-        legs = self.at_position(linkage)
-        near = pose_of_series(derived, xp.cos(q), xp.sin(q))
-        if self.turns:
-            near = near._replace(theta=near.theta + self.turns * q)
-        return SolvedTriad(xp, legs, correct_pose(xp, legs, near, _STEPS))
-
     def at_position(self, linkage: LinkageInMotion) -> tuple[PlacedLeg, ...]:
         """The legs, with the linkage `linkage` before them, for any pose of the ternary link."""
         return tuple(leg.at_position(k, linkage) for k, leg in enumerate(self.legs))
+
+    legs_at, solved = staticmethod(legs_at), staticmethod(solved_triad)  # type: ignore[assignment]
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
         """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""
@@ -126,71 +101,6 @@ class Triad(Group):
             tuple(leg.bar.length for leg in rods),
             tuple(leg.arm for leg in rods),
         )
-
-    def _followed(
-        self, xp: Any, before: Callable[[float], LinkageInMotion], angles: Sequence[float]
-    ) -> list[Pose]:
-        """The poses at these crank angles, each from the ones before it."""
-
-        def pose(q: float, near: Pose, steps: int = _STEPS) -> Pose:
-            return correct_pose(xp, self.at_position(before(q)), near, steps)
-
-        poses = [pose(angles[0], self.assembly, 8)]
-        for q in angles[1:]:
-            near = poses[-1]
-            if len(poses) > 1:
-                near = Pose(*(2.0 * now - before for now, before in zip(near, poses[-2], strict=True)))
-            poses.append(pose(q, near))
-        return poses
-
-    def turns_in_a_turn(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> float:
-        """How often the ternary link turns in a turn of the crank, see `turns`."""
-        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
-        first, *_, last = self._followed(xp, before, angles)
-        return float(round((last.theta - first.theta) / (2.0 * math.pi)))
-
-    def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
-        """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
-        the linkage before the triad at a crank angle [rad]."""
-        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
-        poses = self._followed(xp, before, angles)
-        if self.turns:
-            poses = [
-                pose._replace(theta=pose.theta - self.turns * q)
-                for pose, q in zip(poses, angles, strict=True)
-            ]
-        series = []
-        for values in zip(*poses, strict=True):
-            series.append(sum(values) / SAMPLES)
-            for n in range(1, HARMONICS + 1):
-                for wave in (math.cos, math.sin):
-                    series.append(
-                        sum(v * (2.0 / SAMPLES * wave(n * q)) for v, q in zip(values, angles, strict=True))
-                    )
-        # the misfit as in a run, at angles halfway between the samples
-        misfit, first, least = 0.0, None, None
-        for q in angles:
-            middle = q + math.pi / SAMPLES
-            triad = self.solve(xp, middle, before(middle), series)
-            for leg in triad.legs:
-                misfit = xp.maximum(misfit, xp.minimum(leg.misfit(xp), 1.0))
-            # relative to the sign of the first margin: a margin that changes sign has passed a dead position
-            first = triad.margin if first is None else first
-            margin = triad.margin * first / xp.abs(first)
-            least = margin if least is None else xp.minimum(least, margin)
-        return [*series, misfit, least]
-
-
-def pose_of_series(series: Sequence[Any], cos: Any, sin: Any) -> Pose:
-    """The pose that the series gives, from cosine and sine of the crank angle."""
-    size = 2 * HARMONICS + 1
-    sums = [series[k * size] for k in range(3)]
-    c, s = cos, sin
-    for n in range(1, HARMONICS + 1):
-        for k in range(3):
-            sums[k] = sums[k] + series[k * size + 2 * n - 1] * c + series[k * size + 2 * n] * s
-        c, s = c * cos - s * sin, s * cos + c * sin
-    return Pose(*sums)
 
 
 def requirements(legs: tuple[str, ...], assembly: tuple[str, ...]) -> tuple[Requirement, Requirement]:
@@ -214,34 +124,10 @@ def requirements(legs: tuple[str, ...], assembly: tuple[str, ...]) -> tuple[Requ
 
 
 def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
-    """Value, lower and upper limit of each of `requirements`, from `Triad.derive`."""
+    """Value, lower and upper limit of each of `requirements`, from `FollowedGroup.derive`."""
     *_, misfit, least = derived
     yield misfit, -math.inf, MOST_MISFIT
     yield least, 1e-3, math.inf
-
-
-class SolvedTriad(SolvedGroup):
-    """A solved triad with its `legs`. Its `links` are the legs and then the ternary link (origin and x axis of its
-    frame); its `pins` are in the order of the legs; its `margin` is the determinant over the lengths of the rods and
-    the size of the ternary link: 0 is a dead position."""
-
-    __slots__ = ("legs",)
-
-    def __init__(self, xp: Any, placed: Sequence[PlacedLeg], pose: Pose) -> None:
-        """
-        Parameters
-        ----------
-        xp : engine (see `chainunit.core.engines`)
-        placed : the three legs, see `Leg.at_position`
-        pose : pose of the ternary link, see `correct_pose`
-        """
-        legs = self.legs = legs_at(xp, placed, pose)
-        size = xp.sqrt(sum((legs[k].spot - legs[k - 1].spot).squared() for k in range(LEGS)))
-        for leg in legs:
-            size = size if leg.length is None else size * leg.length
-        ternary = Vec2(pose.x, pose.y), Vec2(xp.cos(pose.theta), xp.sin(pose.theta))
-        joints = *(leg.outer for leg in legs), *(leg.inner for leg in legs)
-        super().__init__((*(leg.pose for leg in legs), ternary), joints, size=size)
 
 
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:

@@ -28,7 +28,8 @@ class FreeLinksError(InputError):
 
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
-    contain. `alone` is the kind of the group that a single link forms by it and a revolute joint."""
+    contain. `alone` is the kind of the group that a single link forms by it and a revolute joint. One that a driver
+    moves has 3 equations."""
 
     name: str
     kind: str
@@ -49,13 +50,15 @@ class JointOf(NamedTuple):
 
 
 class AssurGroup(NamedTuple):
-    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, or that of a single link), its links, and its joints in the
-    order of their roles.
+    """A group: its kind (RRR, RRP, RPR, PRP, RPP, triad, tetrad, that of a single link or a driver), its links, and
+    its joints in the order of their roles.
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
-    the joints are the outer ones of the legs, then their inner ones. Of a single link the revolute one
-    stands first.
+    the joints are the outer ones of the legs, then their inner ones. Of a tetrad the two links with an outer joint
+    stand first, then its legs; the joints are the outer ones, those of the legs with the first link, then with the
+    second. Of a single link the revolute one stands first. Of a driver between two links these stand first, then the
+    lever; the joints are as of a dyad, and that of the driver is the last one.
     """
 
     kind: str
@@ -63,10 +66,11 @@ class AssurGroup(NamedTuple):
     joints: tuple[JointOf, ...]
 
 
-def decompose(links: Sequence[str], joints: Sequence[JointOf], drivers: Collection[str]) -> list[AssurGroup]:
-    """The groups of the links that hang on the ground and on the `drivers`, in an order in which they can be solved.
-
-    `joints` are all but those of the drivers with the ground.
+def decompose(
+    links: Sequence[str], joints: Sequence[JointOf], drivers: Mapping[str, str]
+) -> list[AssurGroup]:
+    """The groups of the links, in an order in which they can be solved; `drivers` are the links that drivers move, by
+    joint. The first one moves its link in the ground, or is the first group; a further one is a group, too.
 
     Raises
     ------
@@ -74,16 +78,28 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], drivers: Collecti
         for a linkage with too many or too few degrees of freedom, or with a group of a class that is not covered, in
         one line that names the links and the joints.
     """
-    unknown = [link for link in links if link not in drivers]
+    by_name, first = {joint.name: joint for joint in joints}, next(iter(drivers))
+    grounded = {name: link for name, link in drivers.items() if GROUND in by_name[name].links}
+    alone = [
+        AssurGroup(DRIVER, (link,), (by_name[name],)) for name, link in grounded.items() if name != first
+    ]
+    joints = [
+        j._replace(equations=_DRIVEN) if j.name in drivers else j for j in joints if j.name not in grounded
+    ]
+    unknown = [link for link in links if link not in grounded.values()]
     matched = _matching(dict.fromkeys(unknown, 3), joints)
     free = {link: 3 - sum(1 for matched_link in matched.values() if matched_link == link) for link in unknown}
     if any(free.values()):
         raise _freedoms(unknown, joints, matched, free)
-    groups, placed = [], {GROUND, *drivers}
+    groups, placed = [], {GROUND, *grounded.values()}
     for part in _strong_parts(_dependences(unknown, joints, matched)):
         groups.append(_classified(tuple(part), joints, placed))
         placed |= {*part}
-    return groups
+    leading = [group for group in groups if group.joints[-1].name == first]
+    for group in leading:
+        if group.kind == DRIVER or not all(GROUND in joint.links for joint in group.joints[:3:2]):
+            raise _unpinned(group.joints[-1], "of the ground")
+    return [*leading, *alone, *(group for group in groups if group not in leading)]
 
 
 def in_order_of_motion(
@@ -267,7 +283,18 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
             if not outer[ternary] and all(
                 len(meeting) == 1 for meeting in (*pairs, *(outer[leg] for leg in legs))
             ):
-                return _triad(ternary, legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs])
+                return _on_legs(
+                    TRIAD, [ternary], legs, [outer[leg][0] for leg in legs], [pair[0] for pair in pairs]
+                )
+        held = [link for link in part if len(outer[link]) == 1]
+        legs = [link for link in part if not outer[link]]
+        ends = [[j for j in inner if {j.on, j.by} == {plate, leg}] for plate in held for leg in legs]
+        if len(held) == len(legs) == 2 and len(inner) == 4 and all(len(pair) == 1 for pair in ends):
+            near, far = ([pair[0] for pair in pairs] for pairs in (ends[:2], ends[2:]))
+            group = _on_legs(TETRAD, held, legs, near, far)
+            return group._replace(joints=(*(outer[plate][0] for plate in held), *group.joints))
+    if drive := next((j for j in joints if j.equations == _DRIVEN and {*j.links} & {*part}), None):
+        return _driven(drive, part, [j for j in inner if j is not drive], outer)
     number, many = (
         len([j for j in joints if {*part} & {*j.links} and {*j.links} <= {*part} | placed]),
         len(part) > 1,
@@ -275,14 +302,61 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
     raise InputError(
         f"the link{'s' * many} {', '.join(part)} form{'s' * (not many)} one group with {len(part)} "
         f"link{'s' * many} and {number} joint{'s' * (number > 1)}: a class that is not covered; covered are dyads "
-        "(class II) and triads (class III, a ternary link on three legs); drive another link, or add a link that "
-        "splits the group",
+        "(class II), triads (class III, a ternary link on three legs) and tetrads (class IV, two links with an outer "
+        "joint each and two legs between them); drive another link, or add a link that splits the group",
         key=part[0],
+    )
+
+
+def _driven(
+    drive: JointOf, part: Sequence[str], inner: Sequence[JointOf], outer: Mapping[str, Sequence[JointOf]]
+) -> AssurGroup:
+    """The group of a link that a driver turns on one before it, or of two links that it moves against each other,
+    with their lever.
+
+    Raises
+    ------
+    InputError
+        if it is neither.
+    """
+    if outer[part[0]] == [drive] and drive.kind == REVOLUTE:
+        return AssurGroup(DRIVER, (*part,), (drive,))
+    if len(part) == 3 and len(inner) == 1 and {drive.on, drive.by} < {*part}:
+        (lever,), c = {*part} - {drive.on, drive.by}, inner[0]
+        far = c.other_link(lever)
+        near = drive.other_link(far)
+        ends = *outer[near], c, *outer[lever]
+        if not outer[far] and [joint.kind for joint in ends] == [REVOLUTE] * 3:
+            kind = ELBOW if drive.kind == REVOLUTE else CYLINDER
+            return AssurGroup(kind, (near, far, lever), (*ends, drive))
+    raise _unpinned(drive, "of the ground or of a link that is moved before it")
+
+
+def _unpinned(drive: JointOf, place: str) -> InputError:
+    """The refusal of two links that a driver moves against each other, if their outer pins are not at that place."""
+    moves, machine, hint = "along", "a cylinder", ""
+    if drive.kind == REVOLUTE:
+        moves, machine = "against", "two arms"
+        hint = (
+            "; a motor on a link that another driver moves is no [driver] but [drivers.NAME] beside that one"
+        )
+    return InputError(
+        f"the links {drive.by} and {drive.on}, which the driver {drive.name} moves {moves} each other, must be "
+        f"{machine}: one of them on a pin {place}, the other one on a pin of a lever, and the lever on a pin {place}"
+        f"{hint}",
+        key=drive.by,
     )
 
 
 _LETTERS = {REVOLUTE: "R", PRISMATIC: "P"}
 DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
+DRIVER, CYLINDER, ELBOW = DRIVES = "driver", "cylinder", "elbow"
+"""Kinds of the groups of a link that a driver besides the first one moves in the ground, or turns on a link before;
+of a cylinder that is pinned at both ends, and of two arms with a motor between, with the lever that they swing."""
+_DRIVEN = 3
+"""Number of equations of a joint that a driver moves."""
+TRIAD, TETRAD = ON_LEGS = "triad", "tetrad"
+"""Kinds of groups of which links stand on legs, without a closed form."""
 
 
 def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -> AssurGroup:
@@ -308,22 +382,21 @@ def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -
     return AssurGroup(kind, (first, second), (outer[first], inner, outer[second]))
 
 
-def _triad(
-    ternary: str, legs: Sequence[str], outer: Sequence[JointOf], inner: Sequence[JointOf]
+def _on_legs(
+    kind: str, plates: Sequence[str], legs: Sequence[str], near: Sequence[JointOf], far: Sequence[JointOf]
 ) -> AssurGroup:
-    """The triad of a `ternary` link on three legs; by leg, an `inner` joint with the ternary link and an `outer` one
-    with a link before the group.
+    """The group of `plates` on legs; by leg, the joints at its ends.
 
     Raises
     ------
     InputError
         for a leg that slides in both joints.
     """
-    for leg, a, b in zip(legs, outer, inner, strict=True):
+    for leg, a, b in zip(legs, near, far, strict=True):
         if a.kind == b.kind == PRISMATIC:
             raise InputError(
-                f"the link {leg} slides in both of its joints, {a.name} and {b.name}: such a leg of a triad is not "
+                f"the link {leg} slides in both of its joints, {a.name} and {b.name}: such a leg of a {kind} is not "
                 "covered; make one of them a revolute joint",
                 key=leg,
             )
-    return AssurGroup("triad", (ternary, *legs), (*outer, *inner))
+    return AssurGroup(kind, (*plates, *legs), (*near, *far))

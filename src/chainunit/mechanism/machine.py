@@ -138,7 +138,7 @@ class Mechanism:
         # the force of a cylinder turns with it
         for (driver, connections), effort in zip(self._driven, efforts, strict=True):
             barrel, *rod = driver.links
-            if rod:
+            if rod and connections.guides:
                 more = barrel.u.turned() * (effort * barrel.t1)
                 yield Wrench(connections.links[1], more, 0.0)
                 yield Wrench(connections.links[0], -more, 0.0)

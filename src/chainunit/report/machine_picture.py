@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..groups.driver import Crank
 from ..machines.linkages.loads import ForceLaw, SpringDamper
 from ..machines.machine import Machine
 from ..mechanism.machine import MachineState, Mechanism
@@ -23,11 +24,12 @@ def picture(machine: Machine, way: Mechanism) -> Animation:
     """The parts of the picture of a machine that no run changes; `way` is its mechanism over the whole way of its
     driver."""
     driver, turns = way.linkage.driver, machine.model.turns
+    circles = [(driver.bar.pin, driver.end)] * (turns and isinstance(driver, Crank))
     return Animation(
         tuple(linkage.links(way.linkage)),
         linkage.supports(way.linkage),
         hanging=linkage.hanging(way),
-        circles=(*[(driver.bar.pin, driver.end)] * turns, *way.linkage.circles),
+        circles=(*circles, *way.linkage.circles),
         names=linkage.labels(way.linkage),
         paths=linkage.paths(way, "" if turns else driver.end),
         rails=linkage.rails(way),

@@ -30,7 +30,9 @@ _DEAD = {
     "PRP": "its two guides are parallel",
     "RPP": "its two guides are parallel",
     "cylinder": f"the cylinder and {{2}} are in line{_MEET}",
+    "elbow": f"its outer pins and that of {{1}} with {{2}} are in line{_MEET}",
     "triad": "the lines of its three legs meet in one point or are parallel",
+    "tetrad": "the lines of {2} and {3} meet on that of its outer pins, or all are parallel",
 }
 """What holds in the dead position of a group, by its kind and with its links."""
 

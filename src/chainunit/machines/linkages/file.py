@@ -17,7 +17,7 @@ from typing import Any
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
 from ...core.inputs import TOML, file_text
-from ...mechanism.assur import DYADS, FURTHER_DRIVERS, GROUND, PRISMATIC, REVOLUTE
+from ...mechanism.assur import CYLINDER, DYADS, ELBOW, FURTHER_DRIVERS, GROUND, ON_LEGS, PRISMATIC, REVOLUTE
 from ...mechanism.curves import TableCurve
 from ...mechanism.expressions import expression, value_of
 from ...mechanism.models import InverseMachine
@@ -42,7 +42,6 @@ from .names import model_name, name_fault, words_in
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
-from .structure import CYLINDER
 from .way import WHOLE
 
 TABLES = (
@@ -245,7 +244,7 @@ class _LinkageReader(LoadReader):
         if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
             self.fault("groups", f"is {shown(tables)}; must be tables [[groups]] with kind and links")
             return []
-        kinds = (*DYADS, "triad", CYLINDER, *SINGLES)
+        kinds = (*DYADS, *ON_LEGS, CYLINDER, ELBOW, *SINGLES)
         for k, table in enumerate(tables, 1):
             key, kind, links = f"groups.{k}", table.get("kind", ""), table.get("links")
             self.keys(key, table, ("kind", "links"))
@@ -451,38 +450,46 @@ class _LinkageReader(LoadReader):
             table = {name: entry for name, entry in table.items() if name not in further}
             self.keys(key, table, _DRIVER_KEYS)
         if "joint" in table:
-            return self.slide(key, table, joints)
-        link = table.get("link")
-        links = [name for name in self.points if name != GROUND]
-        if not is_among(link, links):
-            if links and isinstance(self.data.get("driver", {}), Mapping):
+            between = [j for j in joints if j["type"] == REVOLUTE and GROUND not in (j["on"][0], j["by"][0])]
+            motors = {joint["name"]: joint["on"][0] for joint in between}
+            if not is_among(table["joint"], motors):
+                return self.slide(key, table, joints, motors)
+            if "link" in table:
+                self.fault(f"{key}.link", "follows from the joint; take one of both out")
+            pivot, link = table["joint"], motors[table["joint"]]
+        else:
+            link, links = table.get("link"), [name for name in self.points if name != GROUND]
+            if not is_among(link, links):
+                if links and isinstance(self.data.get("driver", {}), Mapping):
+                    self.fault(
+                        f"{key}.link" if table else key,
+                        f"{is_given(link)}; must be the link that the motor turns{meant(str(link), links)} links: "
+                        f"{', '.join(links)}",
+                    )
+                return {}, None
+            ends = {GROUND, link}
+            pivots = [j["name"] for j in joints if {j["on"][0], j["by"][0]} == ends and j["type"] == REVOLUTE]
+            if len(pivots) != 1:
                 self.fault(
-                    f"{key}.link" if table else key,
-                    f"{is_given(link)}; must be the link that the motor turns{meant(str(link), links)} links: "
-                    f"{', '.join(links)}",
+                    f"{key}.link",
+                    f"{link} must have one revolute joint with the ground; it has {len(pivots)}: give it a point "
+                    "with the name of a point in [ground]",
                 )
-            return {}, None
-        pivots = [j for j in joints if {j["on"][0], j["by"][0]} == {GROUND, link} and j["type"] == REVOLUTE]
-        if len(pivots) != 1:
-            self.fault(
-                f"{key}.link",
-                f"{link} must have one revolute joint with the ground; it has {len(pivots)}: give it a point with "
-                "the name of a point in [ground]",
-            )
-            return {}, None
+                return {}, None
+            pivot = pivots[0]
         positive = table.get("positive", "counter-clockwise")
         if positive not in ("clockwise", "counter-clockwise"):
             self.fault(f"{key}.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
         zero = self.entry(f"{key}.zero", table.get("zero", 0.0), "rad")
         sense = -1.0 if positive == "clockwise" else 1.0
-        driver = {"joint": pivots[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}
+        driver = {"joint": pivot, "link": link, "linear": False, "zero": zero, "sense": sense}
         if "range" not in table:
             return driver, None
         span = self.span(key, table["range"], "angle", "rad", _RANGES[0])
         return driver | {"swings": True}, span
 
     def slide(
-        self, key: str, table: Mapping[str, Any], joints: list[dict[str, Any]]
+        self, key: str, table: Mapping[str, Any], joints: list[dict[str, Any]], motors: Iterable[str]
     ) -> tuple[dict[str, Any], list[float] | None]:
         """The driver that slides in the prismatic joint that its table names, with the link that moves, and its range
         [m]; nothing and None, with a fault, for another joint."""
@@ -495,11 +502,11 @@ class _LinkageReader(LoadReader):
         sliding = {joint["name"]: joint for joint in joints if joint["type"] == PRISMATIC}
         name = table["joint"]
         if not is_among(name, sliding):
-            pin = ", which is a pin" * is_among(name, kinds)
+            pin = ", which is a pin of the ground: for that give `link`" * is_among(name, kinds)
             self.fault(
                 f"{key}.joint",
-                f"is {shown(name)}{pin}; must be a prismatic joint, a table "
-                f"[joints.NAME] with `toward`: {', '.join(sliding) or 'there is none'}",
+                f"is {shown(name)}{pin}; must be a prismatic joint, a table [joints.NAME] with `toward`, or a pin of "
+                f"two links that move: {', '.join((*sliding, *motors)) or 'there is none'}",
             )
             return {}, None
         (on, _), (by, _) = sliding[name]["on"], sliding[name]["by"]
@@ -554,7 +561,8 @@ class _LinkageReader(LoadReader):
         in_frames = {
             link: {name: complex(*place) for name, place in places.items()} for link, places in points.items()
         }
-        pose = StartPose(in_frames, [*entries.values()])
+        held = [*entries.values()]
+        pose = StartPose(in_frames, held)
         value, linear = 0.0, driver["linear"]
         with self.at("start.phi"):
             value = self.number("start.phi", table.get("phi", 0.0), "m" if linear else "rad")
@@ -573,7 +581,11 @@ class _LinkageReader(LoadReader):
             if entry["linear"]:
                 pose.slides.append((entries[entry["joint"]][0], place))
             else:
-                pose.angles[entry["link"]] = number(entry["zero"]) + entry["sense"] * place
+                joint, turn = entries[entry["joint"]][0], number(entry["zero"]) + entry["sense"] * place
+                if GROUND in joint.links:
+                    pose.angles[entry["link"]] = turn
+                else:  # as a guide keeps the angle of its links
+                    held.append((joint._replace(kind=PRISMATIC), turn))
         self.refuse()
         with self.at("start"):
             return {"value": value, "poses": pose.complete()}

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...groups.triad import MOST_MISFIT, Triad
+from ...groups.followed import MOST_MISFIT, FollowedGroup
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
 from .closing import LEAST_MARGIN, dead_group, open_group
@@ -91,7 +91,7 @@ class FollowedLinkage:
         angles = {name: [angle] for name, angle in (near or poses).items()}
         margins = self.margins = []
         try:
-            check_triads(self.linkage, self.derived)
+            check_followed(self.linkage, self.derived)
             for q in places:
                 m = self.at(q)
                 self.signs = self.signs or signs_of(m.margins())
@@ -161,7 +161,7 @@ class FollowedLinkage:
     def range_words(self) -> str:
         """Words on the range of the driver in which the linkage closes around its start, for a refusal; empty if
         there is none, or if the driver has to go all the way round."""
-        if any(isinstance(group, Triad) for group in self.linkage.groups):
+        if any(isinstance(group, FollowedGroup) for group in self.linkage.groups):
             return ""
         # the start of a slide may lie outside its range
         low, high = self.way.limits or (-math.inf, math.inf)
@@ -286,37 +286,38 @@ def lesser(xp: Any, a: Any, b: Any) -> Any:
     return 0.5 * (a + b - xp.abs(a - b))
 
 
-# triads
+# groups without a closed form
 
 
-def turns_of_triads(linkage: Linkage) -> dict[str, float]:
-    """The turns of the ternary link of each triad in a turn of the crank, by name; the triads of the linkage have
-    them from here on. Triads from the first one on that does not close have none."""
+def turns_of_followed(linkage: Linkage) -> dict[str, tuple[float, ...]]:
+    """How often the coordinates of each triad and tetrad turn in a turn of the crank, by name; the groups of the
+    linkage have them from here on. Those from the first one on that does not close have none."""
     turns = {}
     with suppress(ArithmeticError, ValueError):
         for k, group in enumerate(linkage.groups):
-            if isinstance(group, Triad):
+            if isinstance(group, FollowedGroup):
                 before = linkage.before(k)
                 placed = partial(Mechanism, MATH, before, derived=derived_numbers(MATH, before))
                 turns[group.name] = group.turns = group.turns_in_a_turn(MATH, placed)
     return turns
 
 
-def misfits(linkage: Linkage, derived: Sequence[Any]) -> Iterator[tuple[str, Any]]:
-    """The name of each triad with the largest misfit of its legs over the turn, in parts of their lengths."""
+def misfits(linkage: Linkage, derived: Sequence[Any]) -> Iterator[tuple[FollowedGroup, Any]]:
+    """Each triad and tetrad with the largest misfit of its legs over the turn, in parts of their
+    lengths."""
     last = 0
     for group in linkage.groups:
         last += group.derived_count
-        if isinstance(group, Triad):
-            yield group.name, derived[last - 2]
+        if isinstance(group, FollowedGroup):
+            yield group, derived[last - 2]
 
 
-def check_triads(linkage: Linkage, derived: Sequence[Any]) -> None:
-    """Refuse triads that cannot be followed all the way round."""
-    for name, misfit in misfits(linkage, derived):
+def check_followed(linkage: Linkage, derived: Sequence[Any]) -> None:
+    """Refuse triads and tetrads that cannot be followed all the way round."""
+    for group, misfit in misfits(linkage, derived):
         if not misfit <= MOST_MISFIT:
             raise InputError(
-                f"the triad of {name} does not close all the way round, or moves too sharply to be followed: change "
-                "its lengths",
-                key=f"links.{name}",
+                f"the {group.kind} of {group.name} does not close all the way round, or moves too sharply to be "
+                "followed: change its lengths",
+                key=f"links.{group.name}",
             )

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 from ...core.errors import InputError
 from ...core.planar import ZERO, Vec2, mirrored, rotated
 from ...groups.body import Mass
-from ...mechanism.assur import GROUND
+from ...mechanism.assur import CYLINDER, ELBOW, GROUND
 from ...mechanism.expressions import value_of
 from .joint_kind import Entry, JointEntry
-from .structure import CYLINDER, LinkEntry, Structure
+from .structure import LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
-TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER)
+TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER, ELBOW)
 """Kinds of groups that can be assembled in two ways."""
 
 
@@ -110,6 +110,19 @@ class LinkGeometry:
         joint_point, other = self.point(link, joint.at(link)), joint.other_link(link)
         return self.point(other, joint.at(other)) + self.across(joint, point - joint_point, link)
 
+    def rough_place(self, link: str, point: str) -> Vec2:
+        """A point of a link in the rough pose of the start [m]."""
+        x, y, angle = self.structure.poses.get(link, (0.0, 0.0, 0.0))
+        turned = rotated(self.point(link, point), Vec2(math.cos(angle), math.sin(angle)))
+        return Vec2(x, y) + turned
+
+    def rough_way(self, joint: JointEntry, link: str) -> Any:
+        """The way of a link along the line in the link on the other side, in the rough pose of the start [m]."""
+        (by, start), other, place = joint.by, joint.other_link(link), self.rough_place
+        line = place(by, joint.toward) - place(by, start)
+        way = place(link, joint.at(link)) - place(other, joint.at(other))
+        return way.dot(line) / self.xp.sqrt(line.squared())
+
 
 def start_sides(geometry: LinkGeometry) -> dict[str, float]:
     """The assembly mode of each dyad that has two, by its first link, from the rough poses of the structure; the
@@ -120,12 +133,7 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
     InputError
         if a dyad starts in a dead position.
     """
-    structure = geometry.structure
-
-    def place(link: str, point: str) -> Vec2:
-        x, y, angle = structure.poses.get(link, (0.0, 0.0, 0.0))
-        turned = rotated(geometry.point(link, point), Vec2(math.cos(angle), math.sin(angle)))
-        return Vec2(x, y) + turned
+    structure, place = geometry.structure, geometry.rough_place
 
     def line(joint: JointEntry) -> Vec2:
         link, start = joint.by
@@ -136,7 +144,7 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
         if group.kind not in TWO_WAYS:
             continue
         first, last = group.links[0], group.links[-1]
-        outer, inner, other = (structure.joints[joint.name] for joint in group.joints)
+        outer, inner, other = (structure.joints[joint.name] for joint in group.joints[:3])
         start = place(outer.other_link(first), outer.at(outer.other_link(first)))
         if group.kind == "RRP":
             value = (place(last, inner.at(last)) - start).dot(line(other))

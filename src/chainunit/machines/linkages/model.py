@@ -25,9 +25,9 @@ from ...core.model import About, FmuData, Part, Requirement
 from ...core.planar import ZERO
 from ...core.ports import ShaftMotion
 from ...core.quantities import Fields, Value, declared_class, fields_of, group, quantity, variable_of
+from ...groups.followed import MOST_MISFIT
 from ...groups.loads import GuideLosses, PinLosses, Weight
-from ...groups.triad import MOST_MISFIT
-from ...mechanism.assur import GROUND, PRISMATIC
+from ...mechanism.assur import GROUND, ON_LEGS, PRISMATIC
 from ...mechanism.curves import TableCurve
 from ...mechanism.driven import StateOfDrivers
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
@@ -38,7 +38,7 @@ from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import DirectMachine, InverseMachine, names_of, slopes, words_on_motion
 from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, with_differing
-from .following import FollowedLinkage, lesser, misfits, signed, turns_of_triads
+from .following import FollowedLinkage, lesser, misfits, signed, turns_of_followed
 from .further import BACK, FurtherDrivers, splines
 from .geometry import LinkGeometry, start_sides
 from .joint_kinds import KINDS
@@ -182,9 +182,9 @@ class LinkageDescription(LinkageOutputs):
         self.Inputs = declared_class("Inputs", (motion,), [*inputs, *self.further.inputs()])
         p, u = self.Parameters(), self.Inputs()
         geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
-        self.sides = start_sides(geometry)
+        self.sides: dict[str, Any] = dict(start_sides(geometry))
         self.at_start = self._loaded(self._parts(geometry, u), p)
-        self.sides |= turns_of_triads(self.at_start)
+        self.sides |= turns_of_followed(self.at_start)
         self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
         self.start_derived = self.followed.derived
@@ -376,6 +376,8 @@ class LinkageDescription(LinkageOutputs):
         degrees = round(math.degrees(self.at_start.parts.geometry.number(driver.zero)), 6)
         named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
         way = "counter-clockwise" if driver.sense > 0.0 else "clockwise"
+        if (on := self.structure.joints[driver.joint].other_link(driver.link)) != GROUND:
+            return f"from {degrees:g} deg to the x axis of {on}, {way}"
         return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
 
     def _followed(self, linkage: DescribedLinkage) -> FollowedLinkage:
@@ -529,7 +531,7 @@ class LinkageDescription(LinkageOutputs):
                 names,
             )
             for links, kind in groups.items()
-            if kind == "triad"
+            if kind in ON_LEGS
         )
         laws = (
             Requirement(
@@ -543,8 +545,8 @@ class LinkageDescription(LinkageOutputs):
         return (*margins, *fits, *laws, *(requirement_of_width(*width, names) for width in self.widths))
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The least margin of each group over the way of the driver, and the largest misfit of each triad, with
-        their limits."""
+        """The least margin of each group over the way of the driver, and the largest misfit of each triad or
+        tetrad, with their limits."""
         if self.is_start(xp, p):
             linkage, derived, course = self.at_start, self.start_derived, self.followed.margins
         else:

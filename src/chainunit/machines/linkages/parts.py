@@ -6,19 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from ...core.planar import Vec2
+from ...core.planar import Vec2, rotated
 from ...groups.body import Bar, Mass
-from ...groups.driver import Course, Crank, Cylinder, Driver, Ram
+from ...groups.driver import Course, Crank, Cylinder, Driver, Elbow, Ram
 from ...groups.dyad import PRP, RPP, RPR, RRP, Dyad
 from ...groups.group import Group
-from ...groups.joints import Rail
+from ...groups.joints import GuideData, HingeData, Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
+from ...groups.tetrad import Plate, Tetrad
 from ...groups.triad import Pose, Triad
-from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
+from ...mechanism.assur import CYLINDER, DRIVER, ELBOW, GROUND, REVOLUTE, TETRAD, TRIAD, AssurGroup
 from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry
 from .joint_kind import JointEntry
 from .joint_kinds import SINGLES
-from .structure import CYLINDER, DRIVER, DriverEntry
+from .structure import DriverEntry
 
 
 class LinkageParts:
@@ -31,13 +32,13 @@ class LinkageParts:
     def __init__(
         self,
         geometry: LinkGeometry,
-        sides: Mapping[str, float],
+        sides: Mapping[str, Any],
         courses: Mapping[str, Callable[[Any, Any], Course]] = MappingProxyType({}),
     ) -> None:
         """
         Parameters
         ----------
-        sides : the assembly modes, of a triad the turns of its ternary link, by the first link of each group
+        sides : the assembly modes, of a triad or tetrad the turns of its coordinates, by the first link of each group
         courses : those of the drivers besides the first one, by the joint of each
         """
         self.geometry, self.structure, self.sides = geometry, geometry.structure, sides
@@ -48,8 +49,8 @@ class LinkageParts:
         self._courses, first = courses, self.structure.driver
         groups = list(self.structure.groups)
         slide = self.structure.joints[first.joint]
-        cylinder = groups.pop(0) if first.linear and GROUND not in slide.links else None
-        self.driver = self._driver(first) if cylinder is None else self._cylinder(cylinder)
+        cylinder = groups.pop(0) if GROUND not in slide.links else None
+        self.driver = self._driver(first, first.link) if cylinder is None else self._between(cylinder)
         self.groups: list[Group] = []
         for group in groups:
             self.groups.append(self._group(group))
@@ -122,16 +123,15 @@ class LinkageParts:
 
     # the driver and the groups
 
-    def _driver(self, entry: DriverEntry) -> Driver:
-        """The driver: a crank about its pin, or a ram on its line in the ground."""
+    def _driver(self, entry: DriverEntry, link: str) -> Driver:
+        """The driver of a link: a crank about its pin, or a ram on its line in the ground."""
         geometry, course = self.geometry, self._courses.get(entry.joint)
-        joint, link = self.structure.joints[entry.joint], entry.link
+        joint = self.structure.joints[entry.joint]
         if not entry.linear:
-            zero = geometry.number(entry.zero)
-            bar = self.hung(link, joint)
+            bar, on = self.hung(link, joint), joint.other_link(link)
             end = next(iter(bar.points), bar.pin)
-            start = Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero))
-            return Crank(bar, end, start, entry.sense, course)
+            start, sense = self._turn(entry, link, on, self.frames[link])
+            return Crank(bar, end, start, sense, course, None if on == GROUND else on)
         sign = 1.0 if joint.on[0] == link else -1.0
         along = geometry.direction(joint, link) * sign
         frame = LinkFrame(geometry.point(link, joint.at(link)), along)
@@ -139,17 +139,39 @@ class LinkageParts:
         bar = self.bar(link, frame)
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)), course)
 
-    def _cylinder(self, group: AssurGroup) -> Driver:
-        """The driver that is a cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
-        barrel, rod, lever = group.links
-        geometry = self.geometry
-        slide = next(
-            self.structure.joints[driver.joint]
-            for driver in self.structure.drivers
-            if self.structure.joints[driver.joint].links == {barrel, rod}
-        )
-        p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
-        inner = self._inner(c, rod, lever)
+    def _turn(self, entry: DriverEntry, link: str, on: str, frame: LinkFrame) -> tuple[Vec2, float]:
+        """The direction of a link's frame in that of the link that it turns on, at the place 0 of the driver, and its
+        sense."""
+        zero, sense = self.geometry.number(entry.zero), 1.0 if link == entry.link else -1.0
+        start = Vec2(self.geometry.xp.cos(zero), self.geometry.xp.sin(zero) * sense)
+        return self.frames[on].components(rotated(frame.axis, start)), sense * entry.sense
+
+    def _between(self, group: AssurGroup) -> Driver:
+        """The driver of two links that it moves against each other, which turn a lever: a cylinder or two arms."""
+        p, c, q, drive = (self.structure.joints[joint.name] for joint in group.joints)
+        near, far, lever = group.links
+        if group.kind == CYLINDER:
+            return self._cylinder(near, far, lever, p, c, q, drive)
+        inner, joint = self._inner(c, far, lever), self._inner(drive, far, near)
+        bar, swung = self._rod(near, p, drive), self._rod(lever, q, c)
+        frame, length = self.geometry.span(far, drive.at(far), c.at(far))
+        arm = self.bar(far, frame, joint, length)
+        entry = next(entry for entry in self.structure.drivers if entry.joint == drive.name)
+        turn, course = self._turn(entry, far, near, frame), self._courses.get(drive.name)
+        return Elbow(bar, joint, arm, inner, swung, *turn, self.sides[near], course)
+
+    def _cylinder(
+        self,
+        barrel: str,
+        rod: str,
+        lever: str,
+        p: JointEntry,
+        c: JointEntry,
+        q: JointEntry,
+        slide: JointEntry,
+    ) -> Driver:
+        """A cylinder: its barrel, the rod that slides in it, and the lever that it turns."""
+        geometry, inner = self.geometry, self._inner(c, rod, lever)
         # from the barrel to the rod
         in_barrel, in_rod = (
             -line if slide.on[0] == barrel else line
@@ -172,12 +194,14 @@ class LinkageParts:
         """The group of that kind with the numbers of its links."""
         joints = [self.structure.joints[j.name] for j in group.joints]
         if group.kind == DRIVER:
-            joint = joints[0].name
-            return self._driver(next(entry for entry in self.structure.further if entry.joint == joint))
-        if group.kind == CYLINDER:
-            return self._cylinder(group)
-        if group.kind == "triad":
+            entry = next(entry for entry in self.structure.further if entry.joint == joints[0].name)
+            return self._driver(entry, group.links[0])
+        if group.kind in (CYLINDER, ELBOW):
+            return self._between(group)
+        if group.kind == TRIAD:
             return self._triad(group.links[0], group.links[1:], joints[:3], joints[3:])
+        if group.kind == TETRAD:
+            return self._tetrad(group.links, joints)
         if group.kind in SINGLES:
             return SINGLES[group.kind].group(self, group.links[0], *joints)
         build: Callable[..., Group] = {
@@ -257,15 +281,38 @@ class LinkageParts:
             plate.points,
             Pose(*self.structure.poses[ternary]),
             self.structure.start,
-            self.sides.get(ternary, 0.0),
+            self.sides.get(ternary, ()),
         )
 
+    def _tetrad(self, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
+        """Two links, each on its outer joint, with two legs between them; they carry the pins of the legs."""
+        start = self.structure.start
+        first, x1 = self._plate(links[0], joints[0], joints[2:4])
+        second, x2 = self._plate(links[1], joints[1], joints[4:])
+        one, other = (self._leg(links[k], joints[k], joints[k + 2], links[1]) for k in (2, 3))
+        turns = self.sides.get(links[0], ())
+        return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, turns)
+
+    def _plate(self, link: str, outer: JointEntry, inner: Sequence[JointEntry]) -> tuple[Plate, Any]:
+        """A plate of a tetrad, by its `outer` joint and those with the legs, and its rough coordinate."""
+        geometry, pins = self.geometry, [joint for joint in inner if joint.kind == REVOLUTE]
+        self._carriers |= {self.pin(link, joint.at(link)): link for joint in pins}
+        held: HingeData | GuideData
+        if outer.kind == REVOLUTE:
+            bar, x = self.hung(link, outer), self.structure.poses[link][2]
+            held = HingeData(bar.pin, link)
+        else:
+            (bar, rail, guide), x = self._slider(link, outer, outer.at(link)), geometry.rough_way(outer, link)
+            held = GuideData(guide, link, rail)
+        arms = ((self.pin(link, j.at(link)), geometry.point(link, j.at(link))) for j in pins)
+        return Plate(bar, held, {pin: self.frames[link].coordinates(arm) for pin, arm in arms}), x
+
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
-        """A leg of a triad by its joints: a rod between two pins, a block on a line before it, or a slot in the
-        ternary link."""
-        pin = self.pin(ternary, inner.at(ternary))
+        """A leg by its joints: a rod between two pins, a block on a line before it, or a slot in the plate at its
+        end, the ternary link of a triad."""
+        pin, frame = self.pin(ternary, inner.at(ternary)), self.frames[ternary]
         if inner.kind == REVOLUTE:
-            arm = self.geometry.point(ternary, inner.at(ternary))
+            arm = frame.coordinates(self.geometry.point(ternary, inner.at(ternary)))
             self.receive(inner, pin, link)
             if outer.kind == REVOLUTE:
                 return RodLeg(self._rod(link, outer, inner), pin, arm)
@@ -273,4 +320,5 @@ class LinkageParts:
             return BlockLeg(bar, pin, arm, rail, guide)
         place = self.geometry.line_through(inner, link, self.geometry.point(link, outer.at(link)))
         bar = self.hung(link, outer, self.geometry.direction(inner, link))
-        return SlotLeg(bar, place, self.geometry.direction(inner, ternary), self._guide(inner, link))
+        along = frame.components(self.geometry.direction(inner, ternary))
+        return SlotLeg(bar, frame.coordinates(place), along, self._guide(inner, link))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import InputError
-from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
+from ...mechanism.assur import DRIVES, GROUND, ON_LEGS, PRISMATIC, REVOLUTE, AssurGroup, decompose
 from .joint_kind import Entry, JointEntry
 from .joint_kinds import SINGLES, in_decomposition
 from .names import LinkPoint, connected, owners_of
@@ -35,8 +35,9 @@ class LinkEntry:
 @dataclass(frozen=True)
 class DriverEntry:
     """A driver as described. A rotation: the link turns about its ground joint, at the place 0 its x axis has the
-    angle `zero` [rad], and the place counts counter-clockwise if `sense` is +1; if it `swings`, it has a range. A
-    slide: the joint is prismatic, and the place is the way in it.
+    angle `zero` [rad], and the place counts counter-clockwise if `sense` is +1; if it `swings`, it has a range. Of a
+    joint of two moving links that is the angle of the `link`, the one `on`, less that of the other one. A slide: the
+    joint is prismatic, and the place is the way in it.
 
     A driver besides the first one has a `name`. Its place follows the place of the first one by a `law`, an
     expression of ``phi``, and it is `geared` if the first one drives it; without a law it is an input, which goes
@@ -72,37 +73,23 @@ def groups_of(
     InputError
         if the linkage is not determined, or has a group that is not covered; its key is the name of a link.
     """
-    by_name, (driver, *_) = {joint.name: joint for joint in joints}, drivers
-    driving = [by_name[entry.joint] for entry in drivers]
-    seen = [in_decomposition(joint) for joint in joints if joint not in driving]
-    grounded = [
-        (entry, joint)
-        for entry, joint in zip(drivers, driving, strict=True)
-        if GROUND in (joint.on[0], joint.by[0])
-    ]
-    cylinders = [joint for joint in driving if GROUND not in (joint.on[0], joint.by[0])]
-    groups = _with_cylinders(links, seen, {entry.link for entry, _ in grounded}, cylinders, driving[0])
-    alone = [
-        AssurGroup(DRIVER, (entry.link,), (in_decomposition(joint),))
-        for entry, joint in grounded
-        if entry is not driver
-    ]
-    first = int(driving[0] in cylinders)
-    groups[first:first] = alone
-    triad = next((group for group in groups if group.kind == "triad"), None)
-    if triad is not None and any(entry.is_free for entry in drivers):
+    moved, driver = {entry.joint: entry.link for entry in drivers}, drivers[0]
+    groups = decompose(links, [in_decomposition(joint) for joint in joints], moved)
+    followed = next((group for group in groups if group.kind in ON_LEGS), None)
+    if followed is not None and any(entry.is_free for entry in drivers):
+        kind = followed.kind
         raise InputError(
-            f"the links {', '.join(triad.links)} form a triad, and two drivers are inputs: a triad needs one; give "
-            'the other one a law, phi = "..."',
-            key=triad.links[0],
+            f"the links {', '.join(followed.links)} form a {kind}, and two drivers are inputs: a {kind} needs one; "
+            'give the other one a law, phi = "..."',
+            key=followed.links[0],
         )
-    if triad is not None and (driver.linear or driver.swings):
+    if followed is not None and (driver.linear or driver.swings):
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
         raise InputError(
-            f"the links {', '.join(triad.links)} form a triad, and the driver {moves}: a triad needs a driver that "
-            f"{remedy} drive another link",
-            key=triad.links[0],
+            f"the links {', '.join(followed.links)} form a {followed.kind}, and the driver {moves}: a "
+            f"{followed.kind} needs a driver that {remedy} drive another link",
+            key=followed.links[0],
         )
     return groups
 
@@ -163,9 +150,9 @@ class Structure:
         driver, ground, start = DriverEntry(**data["driver"]), data["ground"], data["start"]
         others = [DriverEntry(**entry) for entry in data.get("drivers", ())]
         groups = groups_of([*links], [*joints.values()], [driver, *others])
-        driven = [group.links for group in groups if group.kind in (DRIVER, CYLINDER)]
+        driven = [group.joints[-1].name for group in groups if group.kind in DRIVES]
         # in the order of their groups
-        further = sorted(others, key=lambda entry: next(k for k, g in enumerate(driven) if entry.link in g))
+        further = sorted(others, key=lambda entry: driven.index(entry.joint))
         # points by link that stay apart from others in the same pin: of loads, and of joints between groups
         loaded = (load[key] for load in data["loads"] for key in ("on", "by") if key in load)
         marked = {tuple(end) for end in loaded if len(end) == 2}
@@ -190,68 +177,6 @@ class Structure:
             start["value"],
             poses,
         )
-
-
-CYLINDER = "cylinder"
-"""Kind of the group of a cylinder that is pinned at both ends, with the lever that it swings: barrel, rod, lever."""
-DRIVER = "driver"
-"""Kind of the group of a link that a driver besides the first one moves in the ground."""
-
-
-def _with_cylinders(
-    links: Sequence[str],
-    joints: Sequence[JointOf],
-    drivers: Collection[str],
-    slides: Sequence[JointEntry],
-    first: JointEntry,
-) -> list[AssurGroup]:
-    """The groups of a linkage with these `drivers` in the ground, and with cylinders, each by the slide between two
-    links; that of the `first` driver stands first.
-
-    At a given way barrel and rod are one link. With its lever it has to be a dyad, and that of the first driver one
-    on the ground.
-
-    Raises
-    ------
-    InputError
-        if it is not.
-    """
-    one_link = {slide.on[0]: slide.by[0] for slide in slides}
-    merged = [
-        joint._replace(on=on, by=by, third=third)
-        for joint in joints
-        for on, by, third in [[one_link.get(link, link) for link in (joint.on, joint.by, joint.third)]]
-    ]
-    groups = decompose([link for link in links if link not in one_link], merged, drivers)
-    for slide in slides:
-        k, cylinder = _cylinder(groups, {joint.name: joint for joint in joints}, slide, slide is first)
-        del groups[k]
-        groups.insert(0 if slide is first else k, cylinder)
-    return groups
-
-
-def _cylinder(
-    groups: Sequence[AssurGroup], joints: Mapping[str, JointOf], slide: JointEntry, first: bool
-) -> tuple[int, AssurGroup]:
-    """The number of the dyad that a cylinder forms with its lever, and its group."""
-    rod, barrel = slide.on[0], slide.by[0]
-    k, dyad = next((k, group) for k, group in enumerate(groups) if barrel in group.links)
-    if dyad.kind == "RRR":
-        (lever,) = {*dyad.links} - {barrel}
-        p, c, q = (joints[joint.name] for joint in dyad.joints[:: 1 if dyad.links[0] == barrel else -1])
-        near, far = ({*joint.links} & {rod, barrel} for joint in (p, c))
-        if (
-            near | far == {rod, barrel}
-            and len(near) == 1
-            and (not first or GROUND in {*p.links} & {*q.links})
-        ):
-            return k, AssurGroup(CYLINDER, (*near, *far, lever), (p, c, q))
-    place = "of the ground" if first else "of the ground or of a link that is moved before it"
-    raise InputError(
-        f"the links {barrel} and {rod}, which the driver {slide.name} moves along each other, must be a cylinder: "
-        f"one of them on a pin {place}, the other one on a pin of a lever, and the lever on a pin {place}",
-        key=barrel,
-    )
 
 
 def pin_names(

@@ -1,0 +1,172 @@
+"""A group without a closed form: its coordinates are followed once around the turn of the crank.
+
+Plates stand on legs (`chainunit.groups.legs`): the places of the plates are the coordinates of the group, and each
+leg gives an equation. Newton's method solves as many equations as there are coordinates; these rows are what is left
+of the matrix of the group after the legs are eliminated, and where their determinant vanishes is a dead position.
+
+In a linkage with one crank the coordinates are smooth periodic functions of the crank angle. `FollowedGroup.derive`
+follows them once around, from the mode to which `assembly` leads at the crank angle `start`, and keeps them as a
+Fourier series. At any angle the series gives coordinates that are nearly right, and Newton's method makes them exact.
+So they depend on the crank angle alone, independent of the step and the history. The branch cannot jump; a branch
+that ends within the turn has a misfit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+from ..core.planar import Motion, Vec2
+from .block import minus_cofactors
+from .group import Group, SolvedGroup
+from .joints import LinkageInMotion, Placed
+from .legs import LegAt
+
+SAMPLES = 20
+"""Number of crank angles at which a group is followed once around."""
+HARMONICS = 8
+"""Number of harmonics in the series of a coordinate."""
+MOST_MISFIT = 1e-10
+"""Largest misfit of a leg that counts as closed, in parts of its length."""
+STEPS = 3
+"""Steps of Newton's method from the series: three remove an error of 1e-3, as of a pose that moves sharply."""
+TERMS = 2 * HARMONICS + 1
+"""Number of values in such a series; a group derives two more, the largest misfit and the least margin."""
+
+
+def corrected(
+    legs_at: Callable[[Sequence[Any]], Sequence[LegAt]], near: Sequence[Any], steps: int
+) -> tuple[Any, ...]:
+    """The coordinates after `steps` of Newton's method from `near`; `legs_at` gives the legs by the coordinates. If
+    these are nearly right, each step doubles the number of right digits. It also doubles the order up to which their
+    derivatives are right."""
+    x = (*near,)
+    for _ in range(steps):
+        legs = legs_at(x)
+        minus, det = minus_cofactors([leg.row for leg in legs])
+        minus_per = -1.0 / det
+        moved = (sum(leg.gap * row[k] for leg, row in zip(legs, minus, strict=True)) for k in range(len(x)))
+        x = tuple(place + dx * minus_per for place, dx in zip(x, moved, strict=True))
+    return x
+
+
+class SolvedOnLegs(SolvedGroup):
+    """A solved group of plates on `legs`. Its `links` are the legs and then the plates; its `margin` is the
+    determinant over the lengths of the rods and the sizes of the plates that turn: 0 is a dead position."""
+
+    __slots__ = ("legs",)
+
+    def __init__(
+        self,
+        xp: Any,
+        legs: Sequence[LegAt],
+        spots: Sequence[Sequence[Vec2]],
+        plates: Sequence[tuple[Vec2 | Motion, Vec2]],
+        held: Sequence[Placed] = (),
+    ) -> None:
+        """
+        Parameters
+        ----------
+        spots : those at which each plate that turns is held [m]
+        plates, held : start and unit vector of each plate, see `SolvedGroup`, and the outer joints of the plates
+        """
+        self.legs = legs
+        size = 1.0
+        for plate in spots:
+            size = size * xp.sqrt(sum((s - plate[k - 1]).squared() for k, s in enumerate(plate)))
+        for leg in legs:
+            size = size if leg.length is None else size * leg.length
+        joints = (*held, *(leg.outer for leg in legs), *(leg.inner for leg in legs))
+        super().__init__((*(leg.pose for leg in legs), *plates), joints, size=size)
+
+
+class FollowedGroup(Group):
+    """A group of plates on legs as data. `assembly` are coordinates from which Newton's method leads to the assembly
+    mode at the crank angle `start` [rad]; `turns` is how often each coordinate turns counter-clockwise in a turn of
+    the crank, none at all if it is empty: the rest of it is periodic. `kind` and `name` are for a refusal."""
+
+    kind: ClassVar[str]
+    name: str
+    assembly: Sequence[Any]
+    start: float
+    turns: Sequence[float]
+
+    def at_position(self, linkage: LinkageInMotion) -> Any:
+        """What it needs of the linkage `linkage` before it."""
+        raise NotImplementedError
+
+    def legs_at(self, xp: Any, placed: Any, x: Sequence[Any]) -> Sequence[LegAt]:
+        """Its legs at the coordinates `x`, each with its row by them; `placed` is from `at_position`."""
+        raise NotImplementedError
+
+    def solved(self, xp: Any, placed: Any, x: Sequence[Any]) -> SolvedOnLegs:
+        """The group at the coordinates `x`; `placed` is from `at_position`."""
+        raise NotImplementedError
+
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedOnLegs:
+        """The group with the linkage `linkage` before it, on the branch that the series `derived` gives."""
+        placed = self.at_position(linkage)
+        near = by_series(derived, len(self.assembly), xp.cos(q), xp.sin(q))
+        for k, turn in enumerate(self.turns):
+            near[k] = near[k] + turn * q if turn else near[k]
+        return self.solved(xp, placed, self._corrected(xp, placed, near, STEPS))
+
+    def _corrected(self, xp: Any, placed: Any, near: Sequence[Any], steps: int) -> tuple[Any, ...]:
+        return corrected(lambda x: self.legs_at(xp, placed, x), near, steps)
+
+    def _followed(
+        self, xp: Any, before: Callable[[float], LinkageInMotion], angles: Sequence[float]
+    ) -> list[tuple[Any, ...]]:
+        """The coordinates at these crank angles, each from the ones before it."""
+        course = [self._corrected(xp, self.at_position(before(angles[0])), self.assembly, 8)]
+        for q in angles[1:]:
+            near = course[-1]
+            if len(course) > 1:
+                near = tuple(2.0 * now - last for now, last in zip(near, course[-2], strict=True))
+            course.append(self._corrected(xp, self.at_position(before(q)), near, STEPS))
+        return course
+
+    def turns_in_a_turn(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> tuple[float, ...]:
+        """How often each coordinate turns in a turn of the crank, see `turns`."""
+        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
+        first, *_, last = self._followed(xp, before, angles)
+        return tuple(float(round((b - a) / (2.0 * math.pi))) for a, b in zip(first, last, strict=True))
+
+    def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
+        """The series of the coordinates over the crank angle, the largest misfit and the least margin around;
+        `before` gives the linkage before the group at a crank angle [rad]."""
+        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
+        courses = zip(*self._followed(xp, before, angles), strict=True)
+        series = []
+        for course, turn in zip(courses, self.turns or [0.0] * len(self.assembly), strict=True):
+            values = [x - turn * q for x, q in zip(course, angles, strict=True)] if turn else course
+            series.append(sum(values) / SAMPLES)
+            for n in range(1, HARMONICS + 1):
+                for wave in (math.cos, math.sin):
+                    series.append(
+                        sum(v * (2.0 / SAMPLES * wave(n * q)) for v, q in zip(values, angles, strict=True))
+                    )
+        # the misfit as in a run, at angles halfway between the samples
+        misfit, first, least = 0.0, None, None
+        for q in angles:
+            middle = q + math.pi / SAMPLES
+            group = self.solve(xp, middle, before(middle), series)
+            for leg in group.legs:
+                misfit = xp.maximum(misfit, xp.minimum(leg.misfit(xp), 1.0))
+            # relative to the sign of the first margin: a margin that changes sign has passed a dead position
+            first = group.margin if first is None else first
+            margin = group.margin * first / xp.abs(first)
+            least = margin if least is None else xp.minimum(least, margin)
+        return [*series, misfit, least]
+
+
+def by_series(series: Sequence[Any], coordinates: int, cos: Any, sin: Any) -> list[Any]:
+    """The coordinates that the series gives, from cosine and sine of the crank angle."""
+    sums = [series[k * TERMS] for k in range(coordinates)]
+    c, s = cos, sin
+    for n in range(1, HARMONICS + 1):
+        for k in range(coordinates):
+            sums[k] = sums[k] + series[k * TERMS + 2 * n - 1] * c + series[k * TERMS + 2 * n] * s
+        c, s = c * cos - s * sin, s * cos + c * sin
+    return sums
