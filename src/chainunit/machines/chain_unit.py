@@ -28,6 +28,7 @@ from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import CrankMotion, InverseMachine
 from .crank_rocker import TURNS, half_width_range, longest_crank, pressure_angle, rocker_extremes
+from .differing import laws_of
 from .parts import Force, Pin, Processing, Rod, Stop, force
 
 SideName = Literal["left", "right"]
@@ -267,7 +268,12 @@ def organ_masses(p: Any, side: str, loads: Any) -> tuple[Any, Any]:
 
 def organ(p: Any, u: Any, side: SideName) -> Dyad:
     """A working organ as two bars: wall (A1-B) and web (A2-B) with the material on it."""
-    names, (on_wall, on_web) = NAMES[side], organ_masses(p, side, getattr(u, side))
+    return two_bars(p, side, *organ_masses(p, side, getattr(u, side)))
+
+
+def two_bars(p: Any, side: SideName, on_wall: Any, on_web: Any) -> Dyad:
+    """Wall and web of an organ with these masses [kg]."""
+    names = NAMES[side]
     wall = Bar(names.wall, names.a1, p.l1, _rod(p, on_wall, p.l1))
     web = Bar(names.web, "A2", p.l2, _rod(p, on_web, p.l2))
     return Dyad(names.b, wall, web, -names.hand)
@@ -415,6 +421,16 @@ JOINTS = {**ON_DRIVE, **ON_SIDE}
 """The joint of each reaction, by output."""
 PINS = {title: output for title, output, _, _ in (*_ON_DRIVE, *_ON_SIDE)}
 """The output of each bearing, by title."""
+PIN_NAMES = {joint[0]: joint for joint in ON_DRIVE.values()} | {
+    name: joint
+    for side, (a1, b, wall, web, *_) in NAMES.items()
+    for name, joint in (
+        (f"A2_{side}_web", ("A2", web)),
+        (f"B_{side}", (b, wall)),
+        (f"A1_{side}", (a1, wall)),
+    )
+}
+"""The joint of each pin, by its name in a file."""
 
 
 def on_drive(
@@ -465,7 +481,7 @@ def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]
             "weight": Weight(p.g),
             **processing,
             "stop": Block("rocker", u.stop),
-            "pins": PinLosses(p.pin, p.joint_damping),
+            "pins": PinLosses(p.pin, p.joint_damping, laws_of(p, PIN_NAMES)),
         },
     )
 
@@ -513,6 +529,13 @@ def _further_quantities(
     return columns
 
 
+def _extended(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
+    """See `chainunit.machines.across.extended`."""
+    from .across import extended  # it imports this module
+
+    return extended(machine, names)
+
+
 ChamberForces = InverseMachine(
     name="ChamberForces",
     text="The inverse model: motion of the motor shaft in, torque and every reaction out.",
@@ -541,6 +564,8 @@ ChamberForces = InverseMachine(
     pins=PINS,
     angles={"ψ": "rocker"},
     within={"e": "h", "coupler.s": "l", "rocker.s": "h"},
+    pin_names=PIN_NAMES,
+    extend=_extended,
     linkage=_linkage,
     probes=_probes,
     further_quantities=_further_quantities,

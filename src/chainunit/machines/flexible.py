@@ -203,6 +203,8 @@ def flexible(walls: int, webs: int) -> InverseMachine:
         Outputs=declared_class("ChainOutputs", (Outputs,), both(organs.Side)),
         joints=ChamberForces.joints,
         pins=ChamberForces.pins,
+        pin_names=ChamberForces.pin_names,
+        extend=ChamberForces.extend,
         probes=organs.probes,
         by_differences=frozenset(("dJ_dphi", *Layout(PortSlopes).names)),
         required=(*ChamberForces.required, *_MASSES),

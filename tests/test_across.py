@@ -1,0 +1,182 @@
+"""Shares across the width of a chain unit, and pins that differ, against own statics in space and own losses."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chainunit import ChainUnitMachine, InputError, SideLoads
+from chainunit.machines.across import PlacedLoads
+
+LOADS = {
+    "left": PlacedLoads(material_mass=42.0, processing_force=700.0, across=0.35, force_across=-0.9),
+    "right": PlacedLoads(material_mass=25.0, processing_force=130.0, across=-0.6, force_across=0.2),
+}
+WIDE = {"width": 1.4, "web_share": 0.7, "left.web_mass": 30.0}
+MOTION = {"phi": 0.8, "w": 3.1, "a": 0.7}
+
+
+def arm(length, angle):
+    """A point on a rod from its pin, by the angle from the downward vertical."""
+    return length * np.array([math.sin(angle), -math.cos(angle)])
+
+
+def acceleration(place, w, a):
+    return np.array([-place[1], place[0]]) * a - place * w * w
+
+
+def cross(r, f):
+    return r[0] * f[1] - r[1] * f[0]
+
+
+def strip(p, out, side, on_wall, on_web, at_b=np.zeros(2)):
+    """The force of the rocker on the web of a strip of an organ: six equations of Newton and Euler."""
+    hand = 1.0 if side == "left" else -1.0
+    organ, gravity = getattr(out, side), np.array([0.0, -p.g])
+    wall, web = ({n: float(x) for n, x in vars(m).items()} for m in (organ.wall, organ.web))
+    psi, w, a = (float(x) for x in (out.rocker.psi, out.rocker.w, out.rocker.a))
+    a1, a2 = np.array([-hand * p.z, 0.0]), arm(p.e, psi)
+    b = a1 + arm(p.l1, wall["angle"])
+    assert b == pytest.approx(a2 + arm(p.l2, web["angle"]), abs=1e-9)
+    matrix, right = np.zeros((6, 6)), np.zeros(6)
+    rods = ((0, a1, 2, 0, 1.0, on_wall, wall, p.l1), (3, a2, 4, 2, -1.0, on_web, web, p.l2))
+    for row, pin, outer, inner, sign, mass, rod, length in rods:
+        middle = arm(0.5 * length, rod["angle"])
+        start = acceleration(a2, w, a) if row else np.zeros(2)
+        force = mass * (start + acceleration(middle, rod["w"], rod["a"]) - gravity)
+        moment = cross(middle, force) + mass * length**2 / 12.0 * rod["a"]
+        if row:
+            force, moment = force - at_b, moment - cross(b - pin, at_b)
+        # unknowns: A1 on the wall, B on the wall, A2 on the web
+        first = {0: 0, 3: 4}[row]
+        matrix[row, first] = matrix[row + 1, first + 1] = 1.0
+        matrix[row, 2] = matrix[row + 1, 3] = sign
+        matrix[row + 2, 2:4] = sign * np.array([-(b - pin)[1], (b - pin)[0]])
+        right[row : row + 2], right[row + 2] = force, moment
+    return np.linalg.solve(matrix, right)[4:]
+
+
+def speed_of_b(p, out, side):
+    wall = getattr(out, side).wall
+    r = arm(p.l1, float(wall.angle))
+    return np.array([-r[1], r[0]]) * float(wall.w)
+
+
+def parts(p, out, loads):
+    """Forces of the rockers on the webs, each with its place across the width."""
+    for side, load in loads.items():
+        masses = getattr(p, side)
+        yield side, strip(p, out, side, masses.wall_mass, masses.web_mass), 0.0
+        on_web = p.web_share * load.material_mass
+        yield side, strip(p, out, side, load.material_mass - on_web, on_web), load.across
+        v = speed_of_b(p, out, side)
+        brake = -load.processing_force * v / math.sqrt(v @ v + p.processing.v_smooth**2)
+        yield side, strip(p, out, side, 0.0, 0.0, brake), load.force_across
+
+
+def vector(f):
+    return np.array([float(f.fx), float(f.fy)])
+
+
+def test_the_shares_are_those_of_own_statics_in_space():
+    """Six equations of the pair of rockers as one body: the unknowns are both pivots, the thrust of one, and the
+    force of the coupler across the rocker."""
+    machine = ChainUnitMachine(WIDE)
+    p, out = machine.p, machine.forces(**MOTION, **LOADS)
+    psi, w, a = (float(x) for x in (out.rocker.psi, out.rocker.w, out.rocker.a))
+    bd, middle, half = arm(p.h, psi), arm(p.rocker.s, psi), 0.5 * p.width
+    along, across = arm(1.0, psi), np.array([math.cos(psi), math.sin(psi)])
+    forces = [*parts(p, out, LOADS)]
+    loads = [(np.array([*arm(p.e, psi), half * s]), np.array([*-f, 0.0])) for _, f, s in forces]
+    loads.append((np.array([*middle, 0.0]), np.array([0.0, -p.rocker.m * p.g, 0.0])))
+    loads.append((np.array([*bd, 0.0]), np.array([*along * float(out.rocker.coupler_normal), 0.0])))
+    unknown = [((0.0, 0.0, z), axis) for z in (half, -half) for axis in np.eye(3)[:2]]
+    unknown += [((0.0, 0.0, half), np.eye(3)[2]), ((*bd, 0.0), np.array([*across, 0.0]))]
+    matrix = np.array([[*axis, *np.cross(place, axis)] for place, axis in unknown]).T
+    inertia = p.rocker.m * acceleration(middle, w, a)
+    spin = cross(middle, inertia) + p.rocker.I * a
+    right = np.array([*inertia, 0.0, 0.0, 0.0, spin])
+    for place, f in loads:
+        right -= [*f, *np.cross(place, f)]
+    fx, fy, bx, by, thrust, coupler = np.linalg.solve(matrix, right)
+    close = {"rtol": 1e-10, "atol": 1e-8}
+    np.testing.assert_allclose(vector(out.front.pivot), (fx, fy), **close)
+    np.testing.assert_allclose(vector(out.back.pivot), (bx, by), **close)
+    np.testing.assert_allclose((thrust, coupler), (0.0, float(out.rocker.coupler_tangential)), **close)
+    for row, sign in (("front", 1.0), ("back", -1.0)):
+        share = getattr(out, row)
+        for side in LOADS:
+            pin = sum(0.5 * (1.0 + sign * s) * f for of, f, s in forces if of == side)
+            np.testing.assert_allclose(vector(getattr(share, f"{side}_pin")), pin, **close)
+        torque = sum(0.5 * (1.0 + sign * s) * p.e * across @ f for _, f, s in forces)
+        np.testing.assert_allclose(float(share.tau), torque, **close)
+    # one rocker alone: it has half of the coupler's force and of its own inertia, and the torsion of the bar
+    torsion = float(out.front.tau) + 0.5 * (spin + p.rocker.m * p.g * middle[0] - p.h * coupler)
+    np.testing.assert_allclose(float(out.bar.torsion), torsion, **close)
+    # the corner with the lump carries much more than half
+    assert np.linalg.norm((bx, by)) > 1.2 * np.linalg.norm((fx, fy))
+
+
+def test_in_the_middle_all_numbers_are_as_without_width():
+    middle = {side: SideLoads(material_mass=x.material_mass) for side, x in LOADS.items()}
+    rest = {name: x for name, x in WIDE.items() if name != "width"}
+    one, two = (ChainUnitMachine(x).forces(**MOTION, **middle) for x in (rest, WIDE))
+    for name in ("tau", "margin", "kinetic_energy"):
+        assert getattr(one, name) == getattr(two, name)
+    assert vector(one.pivot).tolist() == vector(two.pivot).tolist()
+    for row in (two.front, two.back):
+        np.testing.assert_allclose(vector(row.pivot), 0.5 * vector(one.pivot), rtol=1e-14)
+    assert float(two.bar.torsion) == 0.0
+    assert not hasattr(one, "front")
+
+
+def bending_of(p, forces, halves, x):
+    """The moment at a place of a beam on two supports, of strips of loads, each cut into 4000 point loads."""
+    moment = np.zeros(2)
+    for (f, s), half in zip(forces, halves, strict=True):
+        for place in s + half * (np.arange(4000) + 0.5 - 2000) / 2000 if half else [s]:
+            low, high = min(place, x), max(place, x)
+            moment += f * (0.25 * p.width * (1.0 + low) * (1.0 - high)) / (4000 if half else 1)
+    return np.linalg.norm(moment)
+
+
+@pytest.mark.parametrize(
+    ("load", "half"),
+    [({"across": 0.4}, 0.6), ({"force_across": -0.5}, 0.0), ({"across": 1.0}, 0.0), ({}, 1.0)],
+)
+def test_the_bar_bends_as_a_beam_under_a_single_load(load, half):
+    massless = {f"{side}.{part}_mass": 0.0 for side in LOADS for part in ("wall", "web")}
+    machine = ChainUnitMachine({"width": 1.4, "bar.diameter": 0.06, "bar.bore": 0.04, **massless})
+    force = "force_across" in load
+    left = PlacedLoads(material_mass=0.0 if force else 50.0, processing_force=900.0 if force else 0.0, **load)
+    p, out = machine.p, machine.forces(**MOTION, left=left)
+    f, s = vector(out.left.rocker_joint), next(iter(load.values()), 0.0)
+    places = np.linspace(-1.0, 1.0, 401)
+    largest = max(bending_of(p, [(f, s)], [half], x) for x in (s * abs(s) if half else s,))
+    dense = max(bending_of(p, [(f, s)], [half], x) for x in places[::20])
+    assert float(out.bar.bending) == pytest.approx(largest, rel=1e-6, abs=1e-9)
+    assert dense <= float(out.bar.bending) * (1.0 + 1e-6) + 1e-9
+    modulus = math.pi / 32.0 * (0.06**4 - 0.04**4) / 0.06
+    wanted = math.hypot(float(out.bar.bending), math.sqrt(0.75) * float(out.bar.torsion)) / modulus
+    assert float(out.bar.stress) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_bar_without_width_and_a_place_without_width_are_refused():
+    with pytest.raises(InputError, match="give width, too"):
+        ChainUnitMachine({"bar.diameter": 0.1})
+    with pytest.raises(InputError, match="bar.bore"):
+        ChainUnitMachine({"width": 1.0, "bar.diameter": 0.1, "bar.bore": 0.1})
+    with pytest.raises(InputError, match=r"left\.across"):
+        ChainUnitMachine().forces(0.3, left=PlacedLoads(across=0.5))
+
+
+def test_a_machine_with_width_goes_to_another_process_and_is_shown_by_the_call_that_makes_it():
+    machine = ChainUnitMachine({"width": 1.0, "bar.diameter": 0.08})
+    assert pickle.loads(pickle.dumps(machine)).model is machine.model
+    assert eval(repr(machine)).by_name == machine.by_name
+    assert ChainUnitMachine().replace(width=1.0).model.layers == machine.model.layers
