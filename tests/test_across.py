@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import pickle
-import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,7 +32,7 @@ def cross(r, f):
     return r[0] * f[1] - r[1] * f[0]
 
 
-def strip(p, out, side, on_wall, on_web, at_b=np.zeros(2)):
+def strip(p, out, side, on_wall, on_web, at_b=(0.0, 0.0)):
     """The force of the rocker on the web of a strip of an organ: six equations of Newton and Euler."""
     hand = 1.0 if side == "left" else -1.0
     organ, gravity = getattr(out, side), np.array([0.0, -p.g])
@@ -44,16 +42,16 @@ def strip(p, out, side, on_wall, on_web, at_b=np.zeros(2)):
     b = a1 + arm(p.l1, wall["angle"])
     assert b == pytest.approx(a2 + arm(p.l2, web["angle"]), abs=1e-9)
     matrix, right = np.zeros((6, 6)), np.zeros(6)
-    rods = ((0, a1, 2, 0, 1.0, on_wall, wall, p.l1), (3, a2, 4, 2, -1.0, on_web, web, p.l2))
-    for row, pin, outer, inner, sign, mass, rod, length in rods:
+    rods = ((0, a1, 1.0, on_wall, wall, p.l1), (3, a2, -1.0, on_web, web, p.l2))
+    for row, pin, sign, mass, rod, length in rods:
         middle = arm(0.5 * length, rod["angle"])
         start = acceleration(a2, w, a) if row else np.zeros(2)
         force = mass * (start + acceleration(middle, rod["w"], rod["a"]) - gravity)
         moment = cross(middle, force) + mass * length**2 / 12.0 * rod["a"]
         if row:
-            force, moment = force - at_b, moment - cross(b - pin, at_b)
+            force, moment = force - np.array(at_b), moment - cross(b - pin, at_b)
         # unknowns: A1 on the wall, B on the wall, A2 on the web
-        first = {0: 0, 3: 4}[row]
+        first = 4 if row else 0
         matrix[row, first] = matrix[row + 1, first + 1] = 1.0
         matrix[row, 2] = matrix[row + 1, 3] = sign
         matrix[row + 2, 2:4] = sign * np.array([-(b - pin)[1], (b - pin)[0]])
@@ -169,7 +167,7 @@ def test_the_bar_bends_as_a_beam_under_a_single_load(load, half):
 def test_a_bar_without_width_and_a_place_without_width_are_refused():
     with pytest.raises(InputError, match="give width, too"):
         ChainUnitMachine({"bar.diameter": 0.1})
-    with pytest.raises(InputError, match="bar.bore"):
+    with pytest.raises(InputError, match=r"bar\.bore"):
         ChainUnitMachine({"width": 1.0, "bar.diameter": 0.1, "bar.bore": 0.1})
     with pytest.raises(InputError, match=r"left\.across"):
         ChainUnitMachine().forces(0.3, left=PlacedLoads(across=0.5))

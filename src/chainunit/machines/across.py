@@ -25,7 +25,7 @@ from ..core.quantities import Value, declaration, declared_class, group, quantit
 from ..groups.loads import Weight
 from ..mechanism.machine import MachineState
 from ..mechanism.models import InverseMachine
-from .chain_unit import NAMES, SIDES, SideLoads, SideName, organ_masses, resistances, two_bars
+from .bar_organs import NAMES, SIDES, SideLoads, SideName, organ_masses, resistances, two_bars
 from .differing import with_pins
 from .parts import Force, force
 
@@ -61,7 +61,7 @@ class BarSection:
 
 
 @declaration
-class Row:
+class RockerShare:
     """The share of one rocker."""
 
     pivot: Force = group(Force, "on this rocker at C, from the frame")
@@ -79,7 +79,7 @@ class BarLoad:
 
 
 @declaration
-class LoadedSection(BarLoad):
+class LoadedBar(BarLoad):
     """The load of the bar and of its section."""
 
     stress: Value = quantity("N/m2", "largest equivalent stress (von Mises)", nominal=1e7, kind="stress")
@@ -107,7 +107,7 @@ def extended(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
 @functools.cache
 def _of_width(machine: InverseMachine, bar: bool) -> InverseMachine:
     """`ChamberForces` with the shares of both rockers, and the stress of the bar."""
-    load: type = LoadedSection if bar else BarLoad
+    load: type = LoadedBar if bar else BarLoad
     sides = [
         (side, PlacedLoads, group(PlacedLoads, f"{side} organ", default=PlacedLoads())) for side in SIDES
     ]
@@ -121,7 +121,7 @@ def _of_width(machine: InverseMachine, bar: bool) -> InverseMachine:
             "required": (*machine.required, wall),
             "requirements": functools.partial(_limits, machine),
         }
-    outputs = [(row, Row, group(Row, f"{row} rocker")) for row in ROWS]
+    outputs = [(row, RockerShare, group(RockerShare, f"{row} rocker")) for row in ROWS]
     outputs.append(("bar", load, group(load, "bar that joins the rockers")))
     return machine.altered(
         root=machine,
@@ -186,7 +186,7 @@ def _probes(machine: InverseMachine, xp: Any, p: Any, u: Any, s: MachineState, a
     rows = {}
     for row, sign in zip(ROWS, (0.5, -0.5), strict=True):
         pins = {side: _sum(part.force * (0.5 + sign * part.place) for part in parts[side]) for side in SIDES}
-        rows[row] = Row(
+        rows[row] = RockerShare(
             pivot=force(half + _sum(part.force * (sign * part.place) for part in both)),
             left_pin=force(pins["left"]),
             right_pin=force(pins["right"]),
@@ -232,7 +232,7 @@ def _bar(xp: Any, p: Any, parts: Sequence[_PlacedForce], torsion: Any) -> BarLoa
     d2, bore2 = p.bar.diameter * p.bar.diameter, p.bar.bore * p.bar.bore
     modulus = (math.pi / 32.0) * (d2 * d2 - bore2 * bore2) / p.bar.diameter
     stress = xp.sqrt(bending * bending + 0.75 * (torsion * torsion)) / modulus
-    return LoadedSection(torsion=torsion, bending=bending, stress=stress)
+    return LoadedBar(torsion=torsion, bending=bending, stress=stress)
 
 
 def _worst(xp: Any, part: _PlacedForce) -> Any:

@@ -113,6 +113,7 @@ class ChainUnitMachine(Machine):
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
+        """The checked inputs with these loads, which may have places across the width."""
         for name, loads in (("left", left), ("right", right)):
             check_kind(name, loads, SideLoads)
         groups = {"left": left, "right": right, "stop": stop}
