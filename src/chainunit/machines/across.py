@@ -41,6 +41,12 @@ def place(what: str) -> Any:
     return quantity("1", f"{what}, {_PLACE}", default=0.0, min=-1.0, max=1.0)
 
 
+def middle_of(*loads: tuple[float, float]) -> float:
+    """The place of several loads together, each by its size and its place; 0 without a load."""
+    whole = math.fsum(size for size, _ in loads)
+    return math.fsum(size * place for size, place in loads) / whole if whole else 0.0
+
+
 @declaration
 class PlacedLoads(SideLoads):
     """The material on one organ, and its place."""

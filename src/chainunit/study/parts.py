@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import date
 from functools import cache, lru_cache
 from pathlib import Path
@@ -157,7 +157,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
         if _is_fmu(motor):
             beside(motor, source)
     with faults.collected():
-        machine, unusual = _machine_model(table, source)
+        machine, unusual = _machine_model(table, source, _names(named_table(data, "machine")))
     faults.refuse()
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual)
     if not motor and "motor" not in data and not motor_is_left(data):
@@ -176,8 +176,17 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(table in data for table in choosing_tables())
 
 
-def _machine_model(table: Any, source: str) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
-    """The machine that the table [system] names, and the unusual values of its linkage file."""
+def _names(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """The full names of all keys in a table."""
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _names(value, f"{prefix}{name}.")
+        yield prefix + name
+
+
+def _machine_model(table: Any, source: str, names: Iterable[str]) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
+    """The machine that the table [system] names, with the parameters of these `names`, and the unusual values of its
+    linkage file."""
     if table.machine.lower().endswith(LINKAGE):
         with refusal_prefix("system.machine: ", "system.machine"):
             model, unusual = linkage_in(beside(table.machine, source))
@@ -196,7 +205,7 @@ def _machine_model(table: Any, source: str) -> tuple[MachineModel, tuple[Unusual
             return model, unusual
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
-            return MACHINES[table.machine], ()
+            return MACHINES[table.machine].having(names), ()
         raise InputError(
             f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file "
             ".toml, or a file .fmu" + near_name(table.machine, MACHINES),
