@@ -33,7 +33,7 @@ ROWS = ("front", "back")
 """The rockers; the place 1 is at the first one."""
 PLACES: Mapping[str, str] = {"material_mass": "across", "processing_force": "force_across"}
 """By load of an organ, the name of its place across the width."""
-_PLACE = "place across the width: 0 in the middle, 1 at the front rocker, -1 at the back one"
+_PLACE = "place across: 0 middle, 1 front rocker, -1 back rocker"
 
 
 def place(what: str) -> Any:

@@ -501,6 +501,7 @@ ChamberForces = InverseMachine(
     angles={"ψ": "rocker"},
     within={"e": "h", "coupler.s": "l", "rocker.s": "h"},
     pin_names=PIN_NAMES,
+    further=("width", "bar.diameter"),
     extend=extended,
     linkage=_linkage,
     probes=_probes,

@@ -6,16 +6,19 @@ import functools
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.errors import InputError, near_name
+from ..core.errors import InputError, near_name, shown
 from ..core.quantities import Layout, declared_class, group
 from ..groups.joints import Joint
 from ..mechanism.models import InverseMachine, MachineModel
 from .parts import PinLaw
 
-_SHARED = {name: f"pin.{name}" for name in ("friction", "diameter", "w_smooth")} | {
-    "damping": "joint_damping"
-}
+SHARED = {name: f"pin.{name}" for name in ("friction", "diameter", "w_smooth")} | {"damping": "joint_damping"}
 """By name in the law of a pin, the parameter of all pins."""
+PLAIN, ROLLING = "plain", "rolling"
+"""Kinds of bearings in a pin."""
+ROLLING_FRICTION = 0.0015
+"""Usual coefficient of friction of a rolling bearing, on half of its mean diameter (makers' catalogues: 0.0010 to
+0.0024)."""
 
 
 def with_pins(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
@@ -41,7 +44,7 @@ def with_pins(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
 def _differing(machine: InverseMachine, pins: tuple[str, ...]) -> InverseMachine:
     """The machine in which these pins differ from the others."""
     shared = Layout(machine.Parameters).by_name(machine.Parameters())
-    law = PinLaw(**{name: shared[source] for name, source in _SHARED.items()})
+    law = PinLaw(**{name: shared[source] for name, source in SHARED.items()})
     declared = declared_class(
         "Pins", (), [(pin, PinLaw, group(PinLaw, f"pin {pin}", default=law)) for pin in pins]
     )
@@ -65,5 +68,10 @@ def completed(machine: MachineModel, values: Mapping[str, Any]) -> dict[str, Any
     layout = machine.parameter_layout
     start = layout.by_name(machine.Parameters())
     laws = [name for name in layout.names if machine.pin_names and name.startswith("pins.")]
-    sources = {name: _SHARED[name.rpartition(".")[2]] for name in laws}
+    sources = {name: SHARED[name.rpartition(".")[2]] for name in laws}
     return {name: values.get(source, start[source]) for name, source in sources.items()} | dict(values)
+
+
+def kind_fault(kind: Any) -> str:
+    """What is wrong with the kind of a pin's bearing, in words; empty for a right one."""
+    return "" if kind in (PLAIN, ROLLING) else f"is {shown(kind)}; must be {PLAIN} or {ROLLING}"

@@ -164,6 +164,8 @@ class InverseMachine(LinkageModel, MachineModel):
     """Whether its driver slides; else it turns."""
     end_stops: EndStops | None = None
     """The usual end stops of a driver with a range, at both ends of `span`."""
+    further: tuple[str, ...] = ()
+    """Names with which the machine has all of its further parameters, those of its pins apart."""
     extend: Callable[[Any, frozenset[str]], Any] | None = None
     """The machine (machine, names) with further parameters, which it has only if a user names one of them."""
     root: Any = None

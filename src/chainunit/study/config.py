@@ -59,6 +59,7 @@ from .parts import (
     linkage_lines,
     motor_is_left,
     over_example,
+    with_kinds,
     with_linkage,
 )
 from .proposal import DriveRequest, motor_choice
@@ -288,6 +289,7 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
 
 
 def _of_tables(data: Mapping[str, Any], source: str) -> Config:
+    data = with_kinds(data)
     in_system = with_linkage(data)
     parts, faults = check_values(in_system, source)
     if parts is None:

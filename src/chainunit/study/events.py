@@ -114,7 +114,6 @@ class Lumps(Jam):
         return [begin + k * period for k in range(int(self.p.number))]
 
 
-
 @declaration
 class FeedShift:
     """How fast material moves."""

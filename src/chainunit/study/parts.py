@@ -16,6 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..core.inputs import TOML, file_text
 from ..drives.motor import FOREIGN, Motor
+from ..machines.differing import ROLLING, ROLLING_FRICTION, kind_fault
 from ..machines.linkages.file import linkage_in
 from ..mechanism.models import MachineModel
 from ..models import MACHINES, MOTORS
@@ -184,7 +185,9 @@ def _names(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
         yield prefix + name
 
 
-def _machine_model(table: Any, source: str, names: Iterable[str]) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
+def _machine_model(
+    table: Any, source: str, names: Iterable[str]
+) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
     """The machine that the table [system] names, with the parameters of these `names`, and the unusual values of its
     linkage file."""
     if table.machine.lower().endswith(LINKAGE):
@@ -254,6 +257,26 @@ def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
 def example(name: str = "chain-unit") -> str:
     """A packaged study file, by its name in `EXAMPLES`."""
     return packaged(EXAMPLES[name])
+
+
+def with_kinds(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The tables of a file, in which each pin that differs has the usual friction of its `kind` of bearing.
+
+    Raises
+    ------
+    InputError
+        for another kind.
+    """
+    machine = named_table(data, "machine")
+    pins, faults = dict(named_table(machine, "pins")), Faults()
+    for name, entry in pins.items():
+        if isinstance(entry, Mapping) and "kind" in entry:
+            usual = {"friction": ROLLING_FRICTION} if entry["kind"] == ROLLING else {}
+            pins[name] = usual | {key: value for key, value in entry.items() if key != "kind"}
+            key = f"machine.pins.{name}.kind"
+            faults.add(InputError(f"{key}: {wrong}", key) for wrong in [kind_fault(entry["kind"])] if wrong)
+    faults.refuse()
+    return {**data, "machine": {**machine, "pins": pins}} if pins else data
 
 
 @cache

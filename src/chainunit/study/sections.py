@@ -14,6 +14,7 @@ from ..drives.contactor import StarDelta
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.motor import Motor
+from ..machines.across import PLACES
 from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
@@ -295,7 +296,24 @@ def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
         "motor": motor.Parameters,
     }
     places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}
-    return {
+    places["feed"] = {f"{side}.{place}": _NO_WIDTH for side in machine.sides for place in PLACES.values()}
+    sections = {
         name: FileSection(declaration, places=places.get(name, {}))
         for name, declaration in declarations.items()
-    } | all_sections()
+    }
+    if machine.layers:
+        sections["feed"] = replace(sections["feed"], completed=_of_material)
+    return sections | all_sections()
+
+
+_NO_WIDTH = "a load has a place across rockers that stand a width apart; give machine.width"
+
+
+def _of_material(feed: Any, reading: Any) -> Any:
+    """The feed whose processing force is where its material is, on each side for which the file gives no place of
+    the force."""
+    for side in reading.machine.model.sides if reading.machine else ():
+        loads = getattr(feed, side)
+        if f"{side}.{PLACES['processing_force']}" not in reading.given["feed"]:
+            feed = replace(feed, **{side: replace(loads, force_across=loads.across)})
+    return feed

@@ -15,16 +15,11 @@ from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
 from ...core.quantities import Layout, Variable
 from ...mechanism.expressions import CONSTANTS, WORDS, expression
+from ..differing import PLAIN, ROLLING, ROLLING_FRICTION, kind_fault
 from .declarations import LOSSES, CommonParameters
 from .entries import EntryReader
 from .loads import MOTION
 from .names import words_in
-
-PLAIN, ROLLING = "plain", "rolling"
-"""Kinds of bearings in a pin."""
-ROLLING_FRICTION = 0.0015
-"""Usual coefficient of friction of a rolling bearing, on half of its mean diameter (makers' catalogues: 0.0010 to
-0.0024)."""
 
 
 class ParameterReader(EntryReader):
@@ -96,8 +91,8 @@ class ParameterReader(EntryReader):
     def bearing(self, key: str, entry: Mapping[str, Any]) -> dict[str, float]:
         """The usual friction of the `kind` of bearing that an entry names."""
         kind = entry.get("kind", PLAIN)
-        if kind not in (PLAIN, ROLLING):
-            self.fault(f"{key}.kind", f"is {shown(kind)}; must be {PLAIN} or {ROLLING}")
+        if wrong := kind_fault(kind):
+            self.fault(f"{key}.kind", wrong)
         return {"friction": ROLLING_FRICTION} if kind == ROLLING else {}
 
     def about(self) -> dict[str, str]:
