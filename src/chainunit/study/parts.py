@@ -267,16 +267,18 @@ def with_kinds(data: Mapping[str, Any]) -> Mapping[str, Any]:
     InputError
         for another kind.
     """
-    machine = named_table(data, "machine")
-    pins, faults = dict(named_table(machine, "pins")), Faults()
-    for name, entry in pins.items():
+    machine = data.get("machine")
+    if not isinstance(machine, Mapping) or not isinstance(machine.get("pins"), Mapping):
+        return data
+    pins, faults = dict(machine["pins"]), Faults()
+    for name, entry in machine["pins"].items():
         if isinstance(entry, Mapping) and "kind" in entry:
             usual = {"friction": ROLLING_FRICTION} if entry["kind"] == ROLLING else {}
             pins[name] = usual | {key: value for key, value in entry.items() if key != "kind"}
             key = f"machine.pins.{name}.kind"
             faults.add(InputError(f"{key}: {wrong}", key) for wrong in [kind_fault(entry["kind"])] if wrong)
     faults.refuse()
-    return {**data, "machine": {**machine, "pins": pins}} if pins else data
+    return {**data, "machine": {**machine, "pins": pins}}
 
 
 @cache

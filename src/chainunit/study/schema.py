@@ -167,12 +167,12 @@ class _Schema:
         for key in table.keys:
             *tables, name = key.name.split(".")
             place, form = properties, self._form(key, table)
-            for part, inner in zip(tables, (*tables[1:], ""), strict=True):
-                if part != NAME:
-                    table_form = _object(place, part)
-                    place = table_form["properties"]
-                if inner == NAME:
-                    place = _object(table_form, "additionalProperties")["properties"]
+            holder: dict[str, Any] = {}
+            for part in tables:
+                if part == NAME and not holder["additionalProperties"]:
+                    del holder["additionalProperties"]
+                holder = _object(*((holder, "additionalProperties") if part == NAME else (place, part)))
+                place = holder["properties"]
             if table.of:
                 form["description"] = f"{table.of}: {form['description']}"
             other = place.setdefault(name, form)
