@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import math
 import pickle
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from chainunit import ChainUnitMachine, InputError, SideLoads
 from chainunit.machines.across import PlacedLoads
+from chainunit.machines.api import machine_of
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.machines.linkages.file import linkage_from
+from chainunit.machines.machine import Machine
+from chainunit.report.drawing import drawing
+from chainunit.study.config import parse
 
 LOADS = {
     "left": PlacedLoads(material_mass=42.0, processing_force=700.0, across=0.35, force_across=-0.9),
@@ -178,3 +187,154 @@ def test_a_machine_with_width_goes_to_another_process_and_is_shown_by_the_call_t
     assert pickle.loads(pickle.dumps(machine)).model is machine.model
     assert eval(repr(machine)).by_name == machine.by_name
     assert ChainUnitMachine().replace(width=1.0).model.layers == machine.model.layers
+
+
+EXAMPLES = Path(__file__).parents[1] / "examples" / "linkages"
+SEAT, ROLLING = {"friction": 0.15, "diameter": 0.09, "damping": 0.4}, {"friction": 0.0015}
+PHI, W = np.linspace(0.1, 6.2, 25), 3.2
+LAWS = {"O1": ROLLING, "Bd": SEAT, "A2_left_web": SEAT, "B_right": ROLLING, "A1_right": {"damping": 2.0}}
+KNIFE_LAWS = {
+    "O1": ROLLING | {"diameter": 0.08},
+    "coupler_pin": SEAT,
+    "leg_pin": {"friction": 0.1},
+    "O3": SEAT,
+}
+
+
+def differing(laws):
+    return {f"pins.{pin}.{name}": x for pin, law in laws.items() for name, x in law.items()}
+
+
+def as_file(name, **tables):
+    data = tomllib.loads((EXAMPLES / name).read_text("utf-8"))
+    data |= {table: data.get(table, {}) | entries for table, entries in tables.items()}
+    return Machine(linkage_from(data, "machine")[0])
+
+
+def test_pins_that_differ_take_the_power_of_their_laws():
+    """By the reactions, and by the relative speeds from the motion of rods and rocker: without the pins of the crank,
+    whose speeds are not among the outputs."""
+    laws = {pin: law for pin, law in LAWS.items() if pin not in ("O1", "Bd")}
+    loads = {side: SideLoads(material_mass=40.0, processing_force=100.0) for side in ("left", "right")}
+    one, two = (ChainUnitMachine(x).forces(PHI, W, **loads) for x in ({}, differing(laws)))
+    speeds = {
+        "A2_left_web": (one.left.rocker_joint, one.left.web.w - one.rocker.w),
+        "B_right": (one.right.hinge, one.right.wall.w - one.right.web.w),
+        "A1_right": (one.right.support, one.right.wall.w),
+    }
+
+    def power(pin, friction=0.12, diameter=0.06, damping=0.0):
+        force, slip = speeds[pin]
+        size = np.hypot(force.fx, force.fy)
+        return 0.5 * friction * diameter * size * slip**2 / np.sqrt(slip**2 + 0.02**2) + damping * slip**2
+
+    change = sum(power(pin, **law) - power(pin) for pin, law in laws.items())
+    np.testing.assert_allclose((two.tau - one.tau) * W, change, rtol=1e-10, atol=1e-9)
+    np.testing.assert_allclose(two.dissipated_power - one.dissipated_power, change, rtol=1e-10, atol=1e-9)
+    assert vector_of(two.pivot) == vector_of(one.pivot)
+
+
+def vector_of(f):
+    return f.fx.tolist(), f.fy.tolist()
+
+
+@pytest.mark.parametrize(
+    ("file", "machine", "laws"),
+    [("chain_unit.toml", ChamberForces, LAWS), ("knife_drive.toml", KnifeDrive, KNIFE_LAWS)],
+)
+def test_a_linkage_file_with_the_same_pins_has_the_same_torque(file, machine, laws):
+    own = machine_of(machine, differing(laws) | {"pin.friction": 0.12, "pin.diameter": 0.06})
+    usual = {"friction": 0.12, "diameter": 0.06}
+    other = as_file(file, pins=usual | laws)
+    inputs = {"phi": PHI, "w": W}
+    one, two = own.evaluate(inputs), other.evaluate(inputs)
+    for name in NAMES:
+        size = np.max(np.abs(one[name]))
+        np.testing.assert_allclose(one[name], two[name], rtol=1e-9, atol=1e-10 * size)
+    plain = machine_of(machine, {"pin.friction": 0.12, "pin.diameter": 0.06}).evaluate(inputs)
+    assert np.max(np.abs(plain["tau"] - one["tau"])) > 0.01
+
+
+NAMES = ["tau_bias", "tau", "tau_bias_dphi", "tau_bias_dw", "dissipated_power"]
+
+
+def test_what_a_pin_leaves_out_is_as_that_of_all_pins():
+    machine = ChainUnitMachine({"pin.diameter": 0.05, "joint_damping": 0.3, "pins.A.friction": 0.02})
+    values = {name.removeprefix("pins.A."): x for name, x in machine.by_name.items() if "pins." in name}
+    assert values == {"friction": 0.02, "diameter": 0.05, "w_smooth": 0.02, "damping": 0.3}
+    further = machine.replace({"pins.Bd.friction": 0.3, "pin.friction": 0.2})
+    assert further.by_name["pins.A.friction"] == 0.02 and further.by_name["pins.Bd.damping"] == 0.3
+    with pytest.raises(
+        InputError,
+        match=r"pins\.B: is no pin of this machine; was .B_left. meant\?; its pins are O1, A, Bd, C, A2",
+    ):
+        ChainUnitMachine({"pins.B.friction": 0.1})
+
+
+def test_a_study_names_pins_and_their_kinds():
+    config = parse(
+        '[machine.pins.O1]\nkind = "rolling"\n[machine.pins.A]\nkind = "plain"\ndiameter = "80 mm"\n'
+    )
+    values = config.machine.by_name
+    assert values["pins.O1.friction"] == 0.0015 and values["pins.O1.diameter"] == values["pin.diameter"]
+    assert values["pins.A.friction"] == values["pin.friction"] and values["pins.A.diameter"] == 0.08
+    with pytest.raises(InputError, match=r'machine\.pins\.A\.kind: is "ball"; must be plain or rolling'):
+        parse('[machine.pins.A]\nkind = "ball"\n')
+    with pytest.raises(InputError, match=r"machine\.pins\.X: is no pin of this machine"):
+        parse("[machine.pins.X]\nfriction = 0.1\n")
+
+
+PLACED = """
+[machine]
+width = "1.2 m"
+[feed]
+left.across = 0.5
+[[event]]
+type = "jam"
+side = "left"
+force = "3 kN"
+across = -1
+[[event]]
+type = "feed"
+side = "right"
+"""
+
+
+def test_an_event_brings_the_place_of_its_load():
+    """The force of the lump and that of the feed act at their common centre, and the feed that moves keeps its
+    place."""
+    config = parse(PLACED)
+    assert config.feed.left.force_across == 0.5  # it follows the material
+    normal = config.machine.model.feed_layout.by_name(config.feed)
+    jam, feed = config.events.values()
+    signals = jam.signals(normal, 2.0, {})
+    peak = 2.0 + jam.p.rise + 0.5 * jam.p.duration
+    force, place = (signals[f"left.{name}"](peak) for name in ("processing_force", "force_across"))
+    usual = normal["left.processing_force"]
+    assert force == usual + 3000.0 and force * place == pytest.approx(0.5 * usual - 3000.0)
+    assert signals["left.force_across"](1.9) == signals["left.force_across"](9.0) == 0.5
+    ends = feed.ends(normal)
+    masses = normal["left.material_mass"], normal["right.material_mass"]
+    assert ends["right.across"] == pytest.approx(0.5 * masses[0] / sum(masses))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            '[[event]]\ntype = "jam"\nside = "left"\nacross = 0.5\n',
+            "across = 0.5: is of rockers a width apart",
+        ),
+        ("[feed]\nleft.across = 0.5\n", r"feed\.left\.across: unknown key.*give machine\.width"),
+        ('organ = "chain"\n[machine]\nwidth = "1 m"\n', r"machine\.width: is of organs with two bars"),
+    ],
+)
+def test_a_place_needs_a_width_and_two_bars(text, words):
+    with pytest.raises(InputError, match=words):
+        parse(text)
+
+
+def test_the_drawing_has_a_view_from_above():
+    plain, wide = drawing(ChainUnitMachine()), drawing(ChainUnitMachine({"width": 1.2}))
+    assert "from above, width 1200 mm" in wide and "front (+1)" in wide
+    assert "from above" not in plain

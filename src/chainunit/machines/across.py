@@ -106,7 +106,7 @@ def extended(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
     if "width" not in names:
         return with_pins(machine, names)
     if machine.States is not None:
-        raise InputError('width: is of organs with two bars; leave out width, or organ = "chain"', "width")
+        raise InputError("width: is of organs with two bars, and these are chains; leave it out", "width")
     return with_pins(_of_width(machine, bar), names)
 
 

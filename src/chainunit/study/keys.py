@@ -230,9 +230,9 @@ def _of_machine(name: str, table: str) -> Iterator[Key]:
     if model.pin_names:
         pins = f"pins.{NAME}."
         yield from quantity_keys(PinLaw, prefix=pins, sources=SHARED)
-        words = tuple(f'"{kind}"' for kind in (PLAIN, ROLLING))
+        kinds = f'"{PLAIN}"', f'"{ROLLING}"'
         text = f"kind of the bearing; a rolling one has the friction {ROLLING_FRICTION:g}"
-        yield Key(f"{pins}kind", text, words=words, sort="text", left_out=words[0])
+        yield Key(f"{pins}kind", text, words=kinds, sort="text", left_out=kinds[0])
 
 
 def _of_motor(name: str) -> Iterator[Key]:

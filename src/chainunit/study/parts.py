@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..core.errors import Faults, InputError, each_refusal, near_name, refusal_prefix, shown
 from ..core.inputs import TOML, file_text
 from ..drives.motor import FOREIGN, Motor
 from ..machines.differing import ROLLING, ROLLING_FRICTION, kind_fault
@@ -208,7 +208,8 @@ def _machine_model(
             return model, unusual
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
-            return MACHINES[table.machine].having(names), ()
+            with each_refusal(lambda fault: InputError(f"machine.{fault}", f"machine.{fault.key}")):
+                return MACHINES[table.machine].having(names), ()
         raise InputError(
             f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file "
             ".toml, or a file .fmu" + near_name(table.machine, MACHINES),
