@@ -89,7 +89,7 @@ class Machine:
     def __repr__(self) -> str:
         """The call that makes the machine, with the parameters that differ from their start values, to nine
         digits, and with those that it has only as it was made with them."""
-        model = getattr(self.model, "root", None) or self.model
+        model = self.model.root or self.model
         start = dict.fromkeys(self.by_name, math.nan) | model.parameter_layout.by_name(model.Parameters())
         texts = {name: f"{value:.9g}" for name, value in self.by_name.items()}
         changes = [f'"{name}": {x}' for name, x in texts.items() if x != f"{start[name]:.9g}"]
@@ -115,6 +115,11 @@ class Machine:
     def by_name(self) -> dict[str, float]:
         """Values of the parameters by name."""
         return self.model.parameter_layout.by_name(self.p)
+
+    @property
+    def in_plane(self) -> dict[str, float]:
+        """Values by name of the parameters that every machine of its kind has, see `InverseMachine.having`."""
+        return (self.model.root or self.model).parameter_layout.by_name(self.p)
 
     def inputs(self, values: Mapping[str, Any]) -> Any:
         """Inputs from values by name, each within the bounds of its declaration; all others have their start values.

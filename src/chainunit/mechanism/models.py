@@ -110,6 +110,8 @@ class MachineModel(Model):
     side have the same name."""
     cuts: bool = False
     """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
+    root: Any = None
+    """The machine without further parameters, if it has some; else None."""
     layers: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """By link, its places across the parameter `width`, from -1 to 1; a link that is not named lies over all of it.
     Empty for a machine in a plane."""
@@ -168,8 +170,6 @@ class InverseMachine(LinkageModel, MachineModel):
     """Names with which the machine has all of its further parameters, those of its pins apart."""
     extend: Callable[[Any, frozenset[str]], Any] | None = None
     """The machine (machine, names) with further parameters, which it has only if a user names one of them."""
-    root: Any = None
-    """The machine without further parameters, if it has some; else None."""
 
     def __post_init__(self) -> None:
         if self.Feed is UNSTATED:
