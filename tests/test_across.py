@@ -336,5 +336,5 @@ def test_a_place_needs_a_width_and_two_bars(text, words):
 
 def test_the_drawing_has_a_view_from_above():
     plain, wide = drawing(ChainUnitMachine()), drawing(ChainUnitMachine({"width": 1.2}))
-    assert "from above, width 1200 mm" in wide and "front (+1)" in wide
+    assert "from above, width 1200 mm" in wide and "front (1)" in wide
     assert "from above" not in plain

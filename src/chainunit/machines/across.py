@@ -1,13 +1,12 @@
 """The chain unit across its width: two rockers on one axle, joined by the bar on which the webs hang.
 
-Paper 000 draws two rockers that coincide in the plane, and one coupler, in the plane of symmetry between them. So the
+Paper 000 draws two rockers that coincide in the plane, and one coupler in the plane of symmetry between them. So the
 coupler, the weights and the inertia of drive and empty organs load both rockers alike. Material and processing force
-may lie beside the middle, at the place s: 0 in the middle, 1 at the front rocker, -1 at the back one. The webs are
-made of many chains, and the walls are flexible: a load stays in its strip, and comes at its place s to the bar, which
-is rigid. The lever rule then gives the front rocker the share (1 + s)/2 of the load's force in A2, and the reaction
-in C the same share, as the coupler cannot take a moment about an axis in the plane. The moments of both rockers about
-C differ: the bar has to pass half the difference as torsion, and the axle helps it in fact. The bar bends as a beam
-on two supports. Material lies evenly on the widest strip whose middle is s, a processing force acts at its point s.
+may lie beside the middle, at the place s: 1 at the front rocker, -1 at the back one. As webs and walls are flexible, a
+load stays in its strip and comes at s to the rigid bar. By the lever rule the front rocker takes the share (1 + s)/2
+of its force in A2 and of its reaction in C. The moments of both rockers about C differ: the bar passes half of the
+difference as torsion, though the axle helps it. It bends as a beam on two supports, under material that lies evenly
+on the widest strip whose middle is s, and a processing force at one point.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 from ..core.errors import InputError
 from ..core.model import Requirement
@@ -81,7 +80,9 @@ class BarLoad:
     """The load of the bar that joins the rockers."""
 
     torsion: Value = quantity("N.m", "torque in the bar, if the axle in C takes none", nominal=100.0)
-    bending: Value = quantity("N.m", "largest bending moment in the bar", nominal=100.0)
+    bending: Value = quantity(
+        "N.m", "bending moment in the bar, the sum of the largest ones of all loads", nominal=100.0
+    )
 
 
 @declaration
@@ -164,42 +165,42 @@ def _limits(machine: InverseMachine, xp: Any, p: Any) -> Iterator[tuple[Any, Any
     yield p.bar.bore, -math.inf, p.bar.diameter
 
 
-class _PlacedForce(NamedTuple):
-    """A part of the force of the rockers on a web in A2 [N], its place across the width, and half of the width of the
-    strip over which it is spread, both in halves of the width; None for a force at one point."""
-
-    force: Vec2
-    place: Any
-    half: Any = None
-
-
 def _probes(machine: InverseMachine, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
     """The outputs of the machine, and the shares of both rockers."""
     reactions = s.reactions(a)
     material = {side: _material(p, side, getattr(u, side)) for side in SIDES}
     by_mass = _at_a2(xp, p, s, a, material, Weight(p.g))
     by_force = _at_a2(xp, p, s, a, dict.fromkeys(SIDES, (0.0, 0.0)), *resistances(p, u).values())
-    parts: dict[SideName, list[_PlacedForce]] = {}
+    # by side: force, place, and the largest moment in a beam by a unit of it, in quarters of the width
+    parts: dict[SideName, list[tuple[Vec2, Any, Any]]] = {}
     for side in SIDES:
-        loads, whole = getattr(u, side), reactions["A2", NAMES[side].web]
+        mass, push = by_mass[side], by_force[side]
+        s_mass, s_push = getattr(u, side).across, getattr(u, side).force_across
+        near = 1.0 - xp.abs(s_mass)
         parts[side] = [
-            _PlacedForce(whole - by_mass[side] - by_force[side], 0.0, 1.0),
-            _PlacedForce(by_mass[side], loads.across, 1.0 - xp.abs(loads.across)),
-            _PlacedForce(by_force[side], loads.force_across),
+            (reactions["A2", NAMES[side].web] - mass - push, 0.0, 0.5),
+            (mass, s_mass, 0.5 * near * (2.0 - near) * (2.0 - near)),
+            (push, s_push, 1.0 - s_push * s_push),
         ]
-    both = [*parts["left"], *parts["right"]]
     half, along = reactions["C", "rocker"] * 0.5, s.m.links["rocker"].u.turned()
-    rows = {}
+    shares = {}
     for row, sign in zip(ROWS, (0.5, -0.5), strict=True):
-        pins = {side: _sum(part.force * (0.5 + sign * part.place) for part in parts[side]) for side in SIDES}
-        rows[row] = RockerShare(
-            pivot=force(half + _sum(part.force * (sign * part.place) for part in both)),
+        pins = {side: _sum(f * (0.5 + sign * x) for f, x, _ in parts[side]) for side in SIDES}
+        shares[row] = RockerShare(
+            pivot=force(half + _sum(f * (sign * x) for side in SIDES for f, x, _ in parts[side])),
             left_pin=force(pins["left"]),
             right_pin=force(pins["right"]),
             tau=p.e * along.dot(pins["left"] + pins["right"]),
         )
-    bar = _bar(xp, p, both, 0.5 * (rows["front"].tau - rows["back"].tau))
-    return machine.probes(xp, p, u, s, a) | rows | {"bar": bar}
+    torsion = 0.5 * (shares["front"].tau - shares["back"].tau)
+    bending = 0.25 * p.width * sum(f.length(xp) * arm for side in SIDES for f, _, arm in parts[side])
+    bar: Any = BarLoad(torsion=torsion, bending=bending)
+    if hasattr(p, "bar"):
+        outer, inner = p.bar.diameter * p.bar.diameter, p.bar.bore * p.bar.bore
+        modulus = (math.pi / 32.0) * (outer * outer - inner * inner) / p.bar.diameter
+        stress = xp.sqrt(bending * bending + 0.75 * (torsion * torsion)) / modulus
+        bar = LoadedBar(torsion=torsion, bending=bending, stress=stress)
+    return machine.probes(xp, p, u, s, a) | shares | {"bar": bar}
 
 
 def _sum(vectors: Iterable[Vec2]) -> Vec2:
@@ -225,38 +226,3 @@ def _at_a2(
     )
     reactions = MachineState(xp, s.m.with_bodies(linkage), s.w).reactions(a)
     return {side: reactions["A2", NAMES[side].web] for side in SIDES}
-
-
-def _bar(xp: Any, p: Any, parts: Sequence[_PlacedForce], torsion: Any) -> BarLoad:
-    """The load of the bar. The bending moment is the largest of those in the middle, at the forces, and where each
-    strip of material by itself bends the bar most."""
-    places = (_worst(xp, part) for part in parts)
-    squares = (_sum(part.force * _arm(xp, part, x) for part in parts).squared() for x in places)
-    bending = 0.25 * p.width * xp.sqrt(functools.reduce(xp.maximum, squares) + _NO_FORCE)
-    if not hasattr(p, "bar"):
-        return BarLoad(torsion=torsion, bending=bending)
-    d2, bore2 = p.bar.diameter * p.bar.diameter, p.bar.bore * p.bar.bore
-    modulus = (math.pi / 32.0) * (d2 * d2 - bore2 * bore2) / p.bar.diameter
-    stress = xp.sqrt(bending * bending + 0.75 * (torsion * torsion)) / modulus
-    return LoadedBar(torsion=torsion, bending=bending, stress=stress)
-
-
-def _worst(xp: Any, part: _PlacedForce) -> Any:
-    """The place at which a force bends the bar most."""
-    return part.place if part.half is None else part.place * xp.abs(part.place)
-
-
-def _arm(xp: Any, part: _PlacedForce, x: Any) -> Any:
-    """The bending moment of a unit of a force at the place `x` of the bar, in quarters of the width: 1 - s x less the
-    mean distance of the strip from x."""
-    away = xp.abs(x - part.place)
-    if part.half is not None:
-        inside = xp.minimum(away, part.half)
-        away = away - inside + 0.5 * (part.half + inside * inside / (part.half + _NO_STRIP))
-    return 1.0 - part.place * x - away
-
-
-_NO_FORCE = 1e-30
-"""Square of a force that does not count [N2]: with it the root has a slope at zero, too."""
-_NO_STRIP = 1e-30
-"""Width of a strip that does not count."""

@@ -364,14 +364,8 @@ JOINTS = {**ON_DRIVE, **ON_SIDE}
 """The joint of each reaction, by output."""
 PINS = {title: output for title, output, _, _ in (*_ON_DRIVE, *_ON_SIDE)}
 """The output of each bearing, by title."""
-PIN_NAMES = {joint[0]: joint for joint in ON_DRIVE.values()} | {
-    name: joint
-    for side, (a1, b, wall, web, *_) in NAMES.items()
-    for name, joint in (
-        (f"A2_{side}_web", ("A2", web)),
-        (f"B_{side}", (b, wall)),
-        (f"A1_{side}", (a1, wall)),
-    )
+PIN_NAMES = {
+    (f"{pin} {link}" if pin == "A2" else pin).replace(" ", "_"): (pin, link) for pin, link in JOINTS.values()
 }
 """The joint of each pin, by its name in a file."""
 

@@ -213,43 +213,38 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     _column(canvas, sizes, whole.linkage.ground)
     if machine.model.layers:
         metre = to_page((1.0, 0.0))[0] - to_page((0.0, 0.0))[0]
-        _top_view(canvas, links, page_points, machine.model.layers, (float(machine.p.width), metre))
+        _top_view(canvas, machine, links, page_points, metre)
     return _svg(canvas, f"{machine.model.noun}: pins, links and dimensions", height)
 
 
 def _top_view(
-    canvas: _Canvas,
-    links: list[DrawnLink],
-    page_points: Mapping[str, Point],
-    layers: Mapping[str, tuple[float, ...]],
-    size: tuple[float, float],
+    canvas: _Canvas, machine: Machine, links: list[DrawnLink], page_points: Mapping[str, Point], metre: float
 ) -> None:
     """Draw the machine from above, below the picture, with its front at the lower edge: links at their places across
-    the width, cross-bars where a link lies at both edges, and all others over the width. `size` has the width [m] and
-    the length of a metre [px]; a machine that is too wide for the room is drawn narrower."""
-    width, metre = size
-    half = 0.5 * min(width * metre, _TOP - 70.0)
-    middle = HEIGHT + 0.5 * _TOP + 6.0
-    wide, narrow = ([link for link in links if (link.name in layers) == inside] for inside in (False, True))
-    for link in wide:
+    the width, cross-bars where a link lies at both edges, and all others over the width, at most as wide as the room.
+    `metre` is the length of a metre [px]."""
+    layers, width = machine.model.layers, float(machine.p.width)
+    half, middle = 0.5 * min(width * metre, _TOP - 70.0), HEIGHT + 0.5 * _TOP + 6.0
+    for link in sorted(links, key=lambda link: link.name in layers):
         xs = [page_points[joint][0] for joint in link.joints]
-        box = {"x": min(xs), "y": middle - half, "width": max(xs) - min(xs), "height": 2.0 * half}
-        canvas.add("rect", **box, fill="#0b6fa4", fill_opacity=0.12, stroke="#0b6fa4")
-    for link in narrow:
-        xs = [page_points[joint][0] for joint in link.joints]
-        places = [middle + half * place for place in layers[link.name]]
-        look = dict(zip(("stroke", "stroke_width"), _LOOKS[link.look], strict=True))
+        places = [middle + half * place for place in layers.get(link.name, ())]
+        colour, weight = _LOOKS[link.look]
+        if not places:
+            corner, size = (
+                {"x": min(xs), "y": middle - half},
+                {"width": max(xs) - min(xs), "height": 2.0 * half},
+            )
+            canvas.add("rect", **corner, **size, fill="#0b6fa4", fill_opacity=0.12, stroke=colour)
         for x in xs if len(places) > 1 else ():
-            canvas.line((x, places[0]), (x, places[-1]), stroke=look["stroke"], stroke_width=3)
+            canvas.line((x, places[0]), (x, places[-1]), stroke=colour, stroke_width=3)
         for y in places:
-            canvas.line((min(xs), y), (max(xs), y), **look)
-    edge = max(x for x, _ in page_points.values()) + 12.0
-    for name, place in (("front", 1.0), ("back", -1.0)):
-        canvas.add("text", f"{name} ({place:+.0f})", x=edge, y=middle + half * place + 4.0, fill="#1b1b1b")
+            canvas.line((min(xs), y), (max(xs), y), stroke=colour, stroke_width=weight)
+    ends = [x for x, _ in page_points.values()]
+    for name, place in (("front (1)", 1.0), ("back (-1)", -1.0)):
+        canvas.add("text", name, x=max(ends) + 12.0, y=middle + half * place + 4.0, fill="#1b1b1b")
     shown = number(width, "m", "millimetres", 4, full=False)
     canvas.add("text", f"from above, width {shown}", x=12.0, y=HEIGHT + 16.0, fill="#555555")
-    left = min(x for x, _ in page_points.values()) - 16.0
-    _line(canvas, (left, middle + half), (left, middle - half), "width")
+    _line(canvas, (min(ends) - 16.0, middle + half), (min(ends) - 16.0, middle - half), "width")
 
 
 _TOP = 240.0

@@ -271,14 +271,13 @@ def with_kinds(data: Mapping[str, Any]) -> Mapping[str, Any]:
     machine = data.get("machine")
     if not isinstance(machine, Mapping) or not isinstance(machine.get("pins"), Mapping):
         return data
-    pins, faults = dict(machine["pins"]), Faults()
-    for name, entry in machine["pins"].items():
+    pins = dict(machine["pins"])
+    for name, entry in pins.items():
         if isinstance(entry, Mapping) and "kind" in entry:
-            usual = {"friction": ROLLING_FRICTION} if entry["kind"] == ROLLING else {}
+            if wrong := kind_fault(kind := entry["kind"]):
+                raise InputError(f"machine.pins.{name}.kind: {wrong}", f"machine.pins.{name}.kind")
+            usual = {"friction": ROLLING_FRICTION} if kind == ROLLING else {}
             pins[name] = usual | {key: value for key, value in entry.items() if key != "kind"}
-            key = f"machine.pins.{name}.kind"
-            faults.add(InputError(f"{key}: {wrong}", key) for wrong in [kind_fault(entry["kind"])] if wrong)
-    faults.refuse()
     return {**data, "machine": {**machine, "pins": pins}}
 
 
