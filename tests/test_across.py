@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from chainunit import ChainUnitMachine, InputError, SideLoads
-from chainunit.machines.across import PlacedLoads
 from chainunit.machines.api import machine_of
-from chainunit.machines.chain_unit import ChamberForces
+from chainunit.machines.chain_unit import ChamberForces, PlacedLoads
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import linkage_from
 from chainunit.machines.machine import Machine

@@ -2,29 +2,27 @@
 
 Paper 000 draws two rockers that coincide in the plane, and one coupler in the plane of symmetry between them. So the
 coupler, the weights and the inertia of drive and empty organs load both rockers alike. Material and processing force
-may lie beside the middle, at the place s: 1 at the front rocker, -1 at the back one. As webs and walls are flexible, a
-load stays in its strip and comes at s to the rigid bar. By the lever rule the front rocker takes the share (1 + s)/2
-of its force in A2 and of its reaction in C. The moments of both rockers about C differ: the bar passes half of the
+may lie beside the middle, at the place s: 1 at the front rocker, -1 at the back one. Webs and walls are flexible, so
+that a load comes in its strip to the rigid bar. By the lever rule the front rocker takes the share (1 + s)/2 of its
+force in A2 and of its reaction in C. The moments of both rockers about C differ: the bar passes half of the
 difference as torsion, though the axle helps it. It bends as a beam on two supports, under material that lies evenly
 on the widest strip whose middle is s, and a processing force at one point.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..core.errors import InputError
 from ..core.model import Requirement
-from ..core.planar import Vec2
+from ..core.planar import ZERO, Vec2
 from ..core.quantities import Value, declaration, declared_class, group, quantity
-from ..groups.loads import Weight
 from ..mechanism.machine import MachineState
 from ..mechanism.models import InverseMachine
-from .bar_organs import NAMES, SIDES, SideLoads, SideName, organ_masses, resistances, two_bars
 from .differing import with_pins
 from .parts import Force, force
 
@@ -44,14 +42,6 @@ def middle_of(*loads: tuple[float, float]) -> float:
     """The place of several loads together, each by its size and its place; 0 without a load."""
     whole = math.fsum(size for size, _ in loads)
     return math.fsum(size * place for size, place in loads) / whole if whole else 0.0
-
-
-@declaration
-class PlacedLoads(SideLoads):
-    """The material on one organ, and its place."""
-
-    across: Value = place("material")
-    force_across: Value = place("processing force")
 
 
 @declaration
@@ -92,9 +82,10 @@ class LoadedBar(BarLoad):
     stress: Value = quantity("N/m2", "largest equivalent stress (von Mises)", nominal=1e7, kind="stress")
 
 
-def extended(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
-    """The chain unit with those of its further parameters that are among `names`, see `InverseMachine.having`: with
-    its width the shares of both rockers, with the section of the bar its stress, and pins that differ.
+def extended(placed: type, machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
+    """The chain unit with those of its further parameters that are among `names`, see `MachineModel.having`: with
+    its width the shares of both rockers, with the section of the bar its stress, and pins that differ. `placed` is
+    the declaration of the loads of an organ with their places.
 
     Raises
     ------
@@ -108,55 +99,49 @@ def extended(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
         return with_pins(machine, names)
     if machine.States is not None:
         raise InputError("width: is of organs with two bars, and these are chains; leave it out", "width")
-    return with_pins(_of_width(machine, bar), names)
+    return with_pins(_of_width(machine, placed, bar), names)
 
 
 @functools.cache
-def _of_width(machine: InverseMachine, bar: bool) -> InverseMachine:
+def _of_width(machine: InverseMachine, placed: type, bar: bool) -> InverseMachine:
     """`ChamberForces` with the shares of both rockers, and the stress of the bar."""
     load: type = LoadedBar if bar else BarLoad
-    sides = [
-        (side, PlacedLoads, group(PlacedLoads, f"{side} organ", default=PlacedLoads())) for side in SIDES
-    ]
+    sides = [(side, placed, group(placed, f"{side} organ", default=placed())) for side in machine.sides]
     width = quantity("m", "distance of the rockers", default=1.0, above=0.0, max=1e3)
     parameters: list[tuple[str, Any, Any]] = [("width", Value, width)]
     section: dict[str, Any] = {}
     if bar:
         parameters.append(("bar", BarSection, group(BarSection, "bar", default=BarSection())))
         wall = Requirement("bar.bore", "m", "the bar has no wall", depends=("bar.diameter",))
-        section = {
-            "required": (*machine.required, wall),
-            "requirements": functools.partial(_limits, machine),
-        }
+        limits = functools.partial(_limits, machine)
+        section = {"required": (*machine.required, wall), "requirements": limits}
     outputs = [(row, RockerShare, group(RockerShare, f"{row} rocker")) for row in ROWS]
     outputs.append(("bar", load, group(load, "bar that joins the rockers")))
     return machine.altered(
         root=machine,
-        made=(_of_width, (machine, bar)),
+        made=(_of_width, (machine, placed, bar)),
         Parameters=declared_class("WideParameters", (machine.Parameters,), parameters),
         Inputs=declared_class("PlacedInputs", (machine.Inputs,), sides),
         Feed=declared_class("PlacedFeed", (machine.Feed,), sides),
         Outputs=declared_class("WideOutputs", (machine.Outputs,), outputs),
         probes=functools.partial(_probes, machine),
-        joints={**machine.joints, **{output: joint for _, output, joint in _BEARINGS}},
-        pins={**machine.pins, **{title: output for title, output, _ in _BEARINGS}},
+        joints={**machine.joints, **{name: machine.joints[joint] for _, name, joint in BEARINGS}},
+        pins={**machine.pins, **{title: name for title, name, _ in BEARINGS}},
         layers={"rocker": (1.0, -1.0), "crank": (0.0,), "coupler": (0.0,)},
         **section,
     )
 
 
-_BEARINGS = tuple(
+BEARINGS = tuple(
     (title.format(row), f"{row}.{name}", joint)
     for row in ROWS
     for title, name, joint in (
-        ("C {} rocker pivot", "pivot", ("C", "rocker")),
-        ("A2 left web at {} rocker", "left_pin", ("A2", NAMES["left"].web)),
-        ("A2 right web at {} rocker", "right_pin", ("A2", NAMES["right"].web)),
+        ("C {} rocker pivot", "pivot", "pivot"),
+        ("A2 left web at {} rocker", "left_pin", "left.rocker_joint"),
+        ("A2 right web at {} rocker", "right_pin", "right.rocker_joint"),
     )
 )
-"""Title, output and joint of the bearings of both rockers."""
-SHARES = tuple(output for _, output, _ in _BEARINGS)
-"""The outputs of these bearings."""
+"""Title and output of the bearings of both rockers, and the output for both rockers together."""
 
 
 def _limits(machine: InverseMachine, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -168,32 +153,29 @@ def _limits(machine: InverseMachine, xp: Any, p: Any) -> Iterator[tuple[Any, Any
 def _probes(machine: InverseMachine, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
     """The outputs of the machine, and the shares of both rockers."""
     reactions = s.reactions(a)
-    material = {side: _material(p, side, getattr(u, side)) for side in SIDES}
-    by_mass = _at_a2(xp, p, s, a, material, Weight(p.g))
-    by_force = _at_a2(xp, p, s, a, dict.fromkeys(SIDES, (0.0, 0.0)), *resistances(p, u).values())
+    by_mass, by_force = (_at_a2(machine, xp, p, u, s, a, load) for load in PLACES)
     # by side: force, place, and the largest moment in a beam by a unit of it, in quarters of the width
-    parts: dict[SideName, list[tuple[Vec2, Any, Any]]] = {}
-    for side in SIDES:
-        mass, push = by_mass[side], by_force[side]
+    parts: dict[str, list[tuple[Vec2, Any, Any]]] = {}
+    for side, mass, push in zip(machine.sides, by_mass, by_force, strict=True):
         s_mass, s_push = getattr(u, side).across, getattr(u, side).force_across
         near = 1.0 - xp.abs(s_mass)
         parts[side] = [
-            (reactions["A2", NAMES[side].web] - mass - push, 0.0, 0.5),
+            (reactions[machine.joints[f"{side}.rocker_joint"]] - mass - push, 0.0, 0.5),
             (mass, s_mass, 0.5 * near * (2.0 - near) * (2.0 - near)),
             (push, s_push, 1.0 - s_push * s_push),
         ]
-    half, along = reactions["C", "rocker"] * 0.5, s.m.links["rocker"].u.turned()
+    half, along = reactions[machine.joints["pivot"]] * 0.5, s.m.links["rocker"].u.turned()
     shares = {}
     for row, sign in zip(ROWS, (0.5, -0.5), strict=True):
-        pins = {side: _sum(f * (0.5 + sign * x) for f, x, _ in parts[side]) for side in SIDES}
+        pins = {side: sum((f * (0.5 + sign * x) for f, x, _ in parts[side]), ZERO) for side in parts}
         shares[row] = RockerShare(
-            pivot=force(half + _sum(f * (sign * x) for side in SIDES for f, x, _ in parts[side])),
+            pivot=force(sum((f * (sign * x) for side in parts for f, x, _ in parts[side]), half)),
             left_pin=force(pins["left"]),
             right_pin=force(pins["right"]),
             tau=p.e * along.dot(pins["left"] + pins["right"]),
         )
     torsion = 0.5 * (shares["front"].tau - shares["back"].tau)
-    bending = 0.25 * p.width * sum(f.length(xp) * arm for side in SIDES for f, _, arm in parts[side])
+    bending = 0.25 * p.width * sum(f.length(xp) * arm for side in parts for f, _, arm in parts[side])
     bar: Any = BarLoad(torsion=torsion, bending=bending)
     if hasattr(p, "bar"):
         outer, inner = p.bar.diameter * p.bar.diameter, p.bar.bore * p.bar.bore
@@ -203,26 +185,16 @@ def _probes(machine: InverseMachine, xp: Any, p: Any, u: Any, s: MachineState, a
     return machine.probes(xp, p, u, s, a) | shares | {"bar": bar}
 
 
-def _sum(vectors: Iterable[Vec2]) -> Vec2:
-    return functools.reduce(Vec2.__add__, vectors)
-
-
-def _material(p: Any, side: SideName, loads: Any) -> tuple[Any, Any]:
-    """The masses of the material on wall and web [kg]."""
-    (on_wall, on_web), masses = organ_masses(p, side, loads), getattr(p, side)
-    return on_wall - masses.wall_mass, on_web - masses.web_mass
-
-
 def _at_a2(
-    xp: Any, p: Any, s: MachineState, a: Any, masses: Mapping[SideName, tuple[Any, Any]], *loads: Any
-) -> dict[SideName, Vec2]:
-    """The forces of the rockers on the webs in A2 [N] if the organs have these `masses` of wall and web and carry
-    these `loads` alone, in the motion of the machine."""
-    organs = (two_bars(p, side, *masses[side]) for side in SIDES)
-    linkage = dataclasses.replace(
-        s.m.linkage,
-        groups=(s.m.linkage.groups[0], *organs),
-        loads={f"load {k}": load for k, load in enumerate(loads)},
+    machine: InverseMachine, xp: Any, p: Any, u: Any, s: MachineState, a: Any, load: str
+) -> list[Vec2]:
+    """By side, the force of the rockers on the web in A2 [N] if organs without mass carry this `load` alone, in the
+    motion of the machine."""
+    others = {name: 0.0 for name in PLACES if name != load}
+    bare, alone = (
+        {side: replace(getattr(values, side), **zeros) for side in machine.sides}
+        for values, zeros in ((p, {"wall_mass": 0.0, "web_mass": 0.0}), (u, others))
     )
+    linkage = machine.linkage(xp, replace(p, **bare), replace(u, **alone))
     reactions = MachineState(xp, s.m.with_bodies(linkage), s.w).reactions(a)
-    return {side: reactions["A2", NAMES[side].web] for side in SIDES}
+    return [reactions[machine.joints[f"{side}.rocker_joint"]] for side in machine.sides]

@@ -12,38 +12,38 @@ corrections of docs/physics.md.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from ..core.model import FmuData, Requirement
 from ..core.planar import ZERO, Link, Vec2
 from ..core.ports import PortValues
 from ..core.quantities import Quantity, Value, Variable, declaration, group, quantity
-from ..groups.body import Bar
+from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
-from ..groups.loads import Block, PinLosses, Weight
+from ..groups.loads import Block, PinLosses, Resistance, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import CrankMotion, InverseMachine
-from .across import extended
-from .bar_organs import NAMES as NAMES
-from .bar_organs import SIDES as SIDES
-from .bar_organs import OrganNames as OrganNames
-from .bar_organs import SideLoads as SideLoads
-from .bar_organs import SideName as SideName
-from .bar_organs import organ, resistances
-from .bar_organs import organ_masses as organ_masses
-from .bar_organs import other as other
+from .across import extended, place
 from .crank_rocker import TURNS, half_width_range, longest_crank, pressure_angle, rocker_extremes
 from .differing import laws_of
 from .parts import Force, Pin, Processing, Rod, Stop, force
 
+SideName = Literal["left", "right"]
+SIDES: tuple[SideName, ...] = ("left", "right")
 RodName = Literal["web", "wall"]
 RODS: tuple[RodName, ...] = ("web", "wall")
 Pulls: TypeAlias = dict[SideName, dict[RodName, dict[str, Any]]]
 """Axial pulls in the rods of the organs [N] by side, rod and pin, see `organ_pulls`."""
+
+
+def other(side: SideName) -> SideName:
+    """The opposite side."""
+    return "right" if side == "left" else "left"
 
 
 @declaration
@@ -111,6 +111,24 @@ class Parameters:
         "N.m.s/rad", "viscous damping of each of the ten pins", default=0.0, min=0.0, tunable=True
     )
     processing: Processing = group(Processing, "processing force", default=Processing())
+
+
+@declaration
+class SideLoads:
+    """The material on one organ."""
+
+    material_mass: Value = quantity("kg", "material that lies on the organ", default=30.0, min=0.0)
+    processing_force: Value = quantity(
+        "N", "force on the web at B, against the motion of B", default=0.0, min=0.0, nominal=100.0
+    )
+
+
+@declaration
+class PlacedLoads(SideLoads):
+    """The material on one organ, and its place across the width."""
+
+    across: Value = place("material")
+    force_across: Value = place("processing force")
 
 
 @declaration
@@ -233,6 +251,50 @@ class Outputs(PortValues):
 def supports(p: Any) -> dict[str, Vec2]:
     """The wall hinge A1 of the left and of the right organ."""
     return {"A1 left": Vec2(-p.z, 0.0), "A1 right": Vec2(p.z, 0.0)}
+
+
+class OrganNames(NamedTuple):
+    """The names of an organ's parts in the linkage (pins, links, load), and its `hand`: +1 left, -1 right."""
+
+    a1: str
+    b: str
+    wall: str
+    web: str
+    processing: str
+    hand: float
+
+
+NAMES: dict[SideName, OrganNames] = {
+    side: OrganNames(f"A1 {side}", f"B {side}", f"{side} wall", f"{side} web", f"{side} processing", hand)
+    for side, hand in zip(SIDES, (1.0, -1.0), strict=True)
+}
+
+
+def organ_masses(p: Any, side: str, loads: Any) -> tuple[Any, Any]:
+    """The masses of wall and web of an organ with the material of these loads on them [kg]."""
+    masses, on_web = getattr(p, side), p.web_share * loads.material_mass
+    return masses.wall_mass + (loads.material_mass - on_web), masses.web_mass + on_web
+
+
+def organ(p: Any, u: Any, side: SideName) -> Dyad:
+    """A working organ as two bars: wall (A1-B) and web (A2-B) with the material on it."""
+    names, (on_wall, on_web) = NAMES[side], organ_masses(p, side, getattr(u, side))
+    wall = Bar(names.wall, names.a1, p.l1, _rod(p, on_wall, p.l1))
+    web = Bar(names.web, "A2", p.l2, _rod(p, on_web, p.l2))
+    return Dyad(names.b, wall, web, -names.hand)
+
+
+def _rod(p: Any, mass: Any, length: Any) -> Mass:
+    return Mass(mass, 0.5 * length, p.rod_inertia * mass * (length * length) * (1.0 / 12.0))
+
+
+def resistances(p: Any, u: Any) -> dict[str, Resistance]:
+    """The processing force of each side."""
+    law = p.processing
+    return {
+        names.processing: Resistance(names.b, getattr(u, side).processing_force, law)
+        for side, names in NAMES.items()
+    }
 
 
 def _on_sides(xp: Any, p: Any, s: MachineState, a: Any, reactions: Mapping[Any, Vec2]) -> Chamber:
@@ -496,7 +558,7 @@ ChamberForces = InverseMachine(
     within={"e": "h", "coupler.s": "l", "rocker.s": "h"},
     pin_names=PIN_NAMES,
     further=("width", "bar.diameter"),
-    extend=extended,
+    extend=functools.partial(extended, PlacedLoads),
     linkage=_linkage,
     probes=_probes,
     further_quantities=_further_quantities,

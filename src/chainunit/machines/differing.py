@@ -72,6 +72,14 @@ def completed(machine: MachineModel, values: Mapping[str, Any]) -> dict[str, Any
     return {name: values.get(source, start[source]) for name, source in sources.items()} | dict(values)
 
 
-def kind_fault(kind: Any) -> str:
-    """What is wrong with the kind of a pin's bearing, in words; empty for a right one."""
-    return "" if kind in (PLAIN, ROLLING) else f"is {shown(kind)}; must be {PLAIN} or {ROLLING}"
+def friction_of(kind: Any) -> dict[str, float]:
+    """The usual friction of a kind of bearing, by its name in the law of a pin; empty for a plain one.
+
+    Raises
+    ------
+    InputError
+        for another kind, without its key.
+    """
+    if kind not in (PLAIN, ROLLING):
+        raise InputError(f"is {shown(kind)}; must be {PLAIN} or {ROLLING}")
+    return {"friction": ROLLING_FRICTION} if kind == ROLLING else {}

@@ -118,7 +118,7 @@ class Machine:
 
     @property
     def in_plane(self) -> dict[str, float]:
-        """Values by name of the parameters that every machine of its kind has, see `InverseMachine.having`."""
+        """Values by name of the parameters that every machine of its kind has, see `MachineModel.having`."""
         return (self.model.root or self.model).parameter_layout.by_name(self.p)
 
     def inputs(self, values: Mapping[str, Any]) -> Any:

@@ -110,6 +110,10 @@ class MachineModel(Model):
     side have the same name."""
     cuts: bool = False
     """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
+    further: tuple[str, ...] = ()
+    """Names with which the machine has all of its further parameters, those of its pins apart."""
+    extend: Callable[[Any, frozenset[str]], Any] | None = None
+    """The machine (machine, names) with further parameters, which it has only if a user names one of them."""
     root: Any = None
     """The machine without further parameters, if it has some; else None."""
     layers: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
@@ -130,8 +134,19 @@ class MachineModel(Model):
         return Layout(self.Feed)
 
     def having(self, names: Iterable[str]) -> Self:
-        """The machine with those of its further parameters that are among `names`; see `InverseMachine.extend`."""
-        return self
+        """The machine with those of its further parameters that are among `names`.
+
+        Raises
+        ------
+        InputError
+            for a parameter of a pin that the machine does not have, or one that requires another.
+        """
+        root, present = self.root or self, {*self.parameter_layout.names}
+        further = {name for name in names if isinstance(name, str)} - present
+        if self.extend is None or not further:
+            return self
+        machine: Self = self.extend(root, frozenset(further | (present - {*root.parameter_layout.names})))
+        return machine
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -166,10 +181,6 @@ class InverseMachine(LinkageModel, MachineModel):
     """Whether its driver slides; else it turns."""
     end_stops: EndStops | None = None
     """The usual end stops of a driver with a range, at both ends of `span`."""
-    further: tuple[str, ...] = ()
-    """Names with which the machine has all of its further parameters, those of its pins apart."""
-    extend: Callable[[Any, frozenset[str]], Any] | None = None
-    """The machine (machine, names) with further parameters, which it has only if a user names one of them."""
 
     def __post_init__(self) -> None:
         if self.Feed is UNSTATED:
@@ -193,21 +204,6 @@ class InverseMachine(LinkageModel, MachineModel):
             further_quantities=self.usual_quantities,
         )
         super().__post_init__()
-
-    def having(self, names: Iterable[str]) -> Self:
-        """See `MachineModel`.
-
-        Raises
-        ------
-        InputError
-            for a parameter of a pin that the machine does not have, or one that requires another.
-        """
-        root, present = self.root or self, {*self.parameter_layout.names}
-        further = {name for name in names if isinstance(name, str)} - present
-        if self.extend is None or not further:
-            return self
-        machine: Self = self.extend(root, frozenset(further | (present - {*root.parameter_layout.names})))
-        return machine
 
     def _at_shaft(self, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
         """The machine at the crank angle and speed that follow from angle and speed of the motor."""

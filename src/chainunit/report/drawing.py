@@ -230,18 +230,15 @@ def _top_view(
         places = [middle + half * place for place in layers.get(link.name, ())]
         colour, weight = _LOOKS[link.look]
         if not places:
-            corner, size = (
-                {"x": min(xs), "y": middle - half},
-                {"width": max(xs) - min(xs), "height": 2.0 * half},
-            )
-            canvas.add("rect", **corner, **size, fill="#0b6fa4", fill_opacity=0.12, stroke=colour)
+            size = {"width": max(xs) - min(xs), "height": 2.0 * half, "fill_opacity": 0.12}
+            canvas.add("rect", x=min(xs), y=middle - half, **size, fill="#0b6fa4", stroke=colour)
         for x in xs if len(places) > 1 else ():
             canvas.line((x, places[0]), (x, places[-1]), stroke=colour, stroke_width=3)
         for y in places:
             canvas.line((min(xs), y), (max(xs), y), stroke=colour, stroke_width=weight)
     ends = [x for x, _ in page_points.values()]
-    for name, place in (("front (1)", 1.0), ("back (-1)", -1.0)):
-        canvas.add("text", name, x=max(ends) + 12.0, y=middle + half * place + 4.0, fill="#1b1b1b")
+    for name, y in (("front (1)", middle + half), ("back (-1)", middle - half)):
+        canvas.add("text", name, x=max(ends) + 12.0, y=y + 4.0, fill="#1b1b1b")
     shown = number(width, "m", "millimetres", 4, full=False)
     canvas.add("text", f"from above, width {shown}", x=12.0, y=HEIGHT + 16.0, fill="#555555")
     _line(canvas, (min(ends) - 16.0, middle + half), (min(ends) - 16.0, middle - half), "width")

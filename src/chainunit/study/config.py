@@ -59,7 +59,6 @@ from .parts import (
     linkage_lines,
     motor_is_left,
     over_example,
-    with_kinds,
     with_linkage,
 )
 from .proposal import DriveRequest, motor_choice
@@ -289,12 +288,12 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
 
 
 def _of_tables(data: Mapping[str, Any], source: str) -> Config:
-    data = with_kinds(data)
     in_system = with_linkage(data)
     parts, faults = check_values(in_system, source)
     if parts is None:
         # a key that the file has, not the one that stands for it
-        raise InputError.joined(faults if in_system is data else [_of_linkage(fault) for fault in faults])
+        same = in_system.get("system") is data.get("system")
+        raise InputError.joined(faults if same else [_of_linkage(fault) for fault in faults])
     data = in_system
     if not faults:
         return _of_values(data, parts, source)

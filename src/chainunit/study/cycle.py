@@ -66,10 +66,8 @@ def all_on_one(side: SideName, feed: Feed) -> Feed:
     """The feed with which the organ of `side` has the load of both organs."""
     one, two = getattr(feed, side), getattr(feed, other(side))
     whole = {load: getattr(one, load) + getattr(two, load) for load in PLACES}
-    if hasattr(one, "across"):
-        for load, place in PLACES.items():
-            parts = [(getattr(x, load), getattr(x, place)) for x in (one, two)]
-            whole[place] = middle_of(*parts)
+    for load, place in PLACES.items() if hasattr(one, "across") else ():
+        whole[place] = middle_of(*((getattr(x, load), getattr(x, place)) for x in (one, two)))
     return without(other(side), replace(feed, **{side: replace(one, **whole)}))
 
 

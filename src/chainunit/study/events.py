@@ -77,22 +77,20 @@ class Jam(_Pulses):
     def _height(self, usual: float) -> Any:
         return self.p.force
 
-    @property
-    def _place(self) -> str:
-        return f"{self.side}.{PLACES['processing_force']}"
-
     def fault(self, normal: Values) -> str:
         """A place across the width needs a machine with a width."""
-        needs = self.p.across and self._place not in normal
-        return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width" if needs else ""
+        lacks_width = self.p.across and f"{self.side}.force_across" not in normal
+        return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width" * bool(
+            lacks_width
+        )
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The pulses, and the place of the whole force across the width."""
-        signals, usual = super().signals(normal, begin, state), normal[self.inputs[0]]
-        if self._place in normal:
-            before = normal[self._place]
-            together = middle_of((usual, before), (self.p.force, self.p.across))
-            signals[self._place] = self._pulses(begin, before, together)
+        signals, name = super().signals(normal, begin, state), f"{self.side}.force_across"
+        if name in normal:
+            usual = normal[self.inputs[0]], normal[name]
+            together = middle_of(usual, (self.p.force, self.p.across))
+            signals[name] = self._pulses(begin, normal[name], together)
         return signals
 
 
@@ -181,10 +179,9 @@ class OneSidedFeed(Event):
             here, there = (filled(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
             ends[there] = (1.0 - share) * normal[there]
             ends[here] = normal[here] + share * normal[there]
-            place_here, place_there = (f"{side}.{PLACES[load]}" for side in (self.side, other(self.side)))
-            if place_here in normal:
-                parts = (normal[here], normal[place_here]), (share * normal[there], normal[place_there])
-                ends[place_here] = middle_of(*parts)
+            if (name := f"{self.side}.{PLACES[load]}") in normal:
+                moved = share * normal[there], normal[f"{other(self.side)}.{PLACES[load]}"]
+                ends[name] = middle_of((normal[here], normal[name]), moved)
         return ends
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:

@@ -128,14 +128,10 @@ def _fold(w: Window) -> float | None:
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
 
 
-def _of_width(*names: str) -> Reader:
+def _of_width(*outputs: str) -> Reader:
     """The reader of the largest size of outputs that only a machine with a width has."""
-
-    def reader(w: Window) -> float | None:
-        parts = [w.run[f"machine.{name}"].values for name in names if f"machine.{name}" in w.run]
-        return float(np.max(np.sqrt(sum(part * part for part in parts)))) if parts else None
-
-    return reader
+    names = [f"machine.{name}" for name in outputs]
+    return lambda w: peak(np.linalg.norm([w.value(x) for x in names], axis=0)) if names[0] in w.run else None
 
 
 def time_to_start(time: Any, speed: Any, final: float, requested: float) -> float | None:

@@ -16,7 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from ..core.errors import Faults, InputError, each_refusal, near_name, refusal_prefix, shown
 from ..core.inputs import TOML, file_text
 from ..drives.motor import FOREIGN, Motor
-from ..machines.differing import ROLLING, ROLLING_FRICTION, kind_fault
+from ..machines.differing import friction_of
 from ..machines.linkages.file import linkage_in
 from ..mechanism.models import MachineModel
 from ..models import MACHINES, MOTORS
@@ -230,14 +230,18 @@ def linkage_lines(data: Mapping[str, Any], source: str) -> tuple[str, Mapping[st
 
 
 def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The tables of a file; the machine that ``linkage`` in [machine] names stands in [system], as every machine.
+    """The tables of a file; the machine that ``linkage`` in [machine] names stands in [system], as every machine, and
+    the friction of a pin in place of its kind.
 
     Raises
     ------
     InputError
-        for a name that is none of a linkage file, or a second machine.
+        for a name that is none of a linkage file, a second machine, or another kind.
     """
     machine = data.get("machine")
+    if isinstance(machine, Mapping) and isinstance(machine.get("pins"), Mapping):
+        machine = {**machine, "pins": _frictions(machine["pins"])}
+        data = {**data, "machine": machine}
     if not isinstance(machine, Mapping) or "linkage" not in machine:
         return data
     system, name = named_table(data, "system"), machine["linkage"]
@@ -260,25 +264,15 @@ def example(name: str = "chain-unit") -> str:
     return packaged(EXAMPLES[name])
 
 
-def with_kinds(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The tables of a file, in which each pin that differs has the usual friction of its `kind` of bearing.
-
-    Raises
-    ------
-    InputError
-        for another kind.
-    """
-    machine = data.get("machine")
-    if not isinstance(machine, Mapping) or not isinstance(machine.get("pins"), Mapping):
-        return data
-    pins = dict(machine["pins"])
+def _frictions(pins: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of pins that differ, with the usual friction of the `kind` of bearing in its place."""
+    tables = dict(pins)
     for name, entry in pins.items():
         if isinstance(entry, Mapping) and "kind" in entry:
-            if wrong := kind_fault(kind := entry["kind"]):
-                raise InputError(f"machine.pins.{name}.kind: {wrong}", f"machine.pins.{name}.kind")
-            usual = {"friction": ROLLING_FRICTION} if kind == ROLLING else {}
-            pins[name] = usual | {key: value for key, value in entry.items() if key != "kind"}
-    return {**data, "machine": {**machine, "pins": pins}}
+            with refusal_prefix(f"machine.pins.{name}.kind: ", f"machine.pins.{name}.kind"):
+                friction = friction_of(entry["kind"])
+            tables[name] = friction | {key: value for key, value in entry.items() if key != "kind"}
+    return tables
 
 
 @cache

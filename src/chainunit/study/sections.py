@@ -296,7 +296,8 @@ def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
         "motor": motor.Parameters,
     }
     places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}
-    places["feed"] = {f"{side}.{place}": _NO_WIDTH for side in machine.sides for place in PLACES.values()}
+    no_width = "a load has a place across rockers that stand a width apart; give machine.width"
+    places["feed"] = {f"{side}.{place}": no_width for side in machine.sides for place in PLACES.values()}
     sections = {
         name: FileSection(declaration, places=places.get(name, {}))
         for name, declaration in declarations.items()
@@ -306,14 +307,11 @@ def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
     return sections | all_sections()
 
 
-_NO_WIDTH = "a load has a place across rockers that stand a width apart; give machine.width"
-
-
 def _of_material(feed: Any, reading: Any) -> Any:
     """The feed whose processing force is where its material is, on each side for which the file gives no place of
     the force."""
-    for side in reading.machine.model.sides if reading.machine else ():
-        loads = getattr(feed, side)
-        if f"{side}.{PLACES['processing_force']}" not in reading.given["feed"]:
-            feed = replace(feed, **{side: replace(loads, force_across=loads.across)})
-    return feed
+    sides = reading.machine.model.sides if reading.machine else ()
+    loads = {
+        side: getattr(feed, side) for side in sides if f"{side}.force_across" not in reading.given["feed"]
+    }
+    return replace(feed, **{side: replace(x, force_across=x.across) for side, x in loads.items()})

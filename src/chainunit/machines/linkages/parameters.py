@@ -15,7 +15,7 @@ from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
 from ...core.quantities import Layout, Variable
 from ...mechanism.expressions import CONSTANTS, WORDS, expression
-from ..differing import PLAIN, ROLLING, ROLLING_FRICTION, kind_fault
+from ..differing import PLAIN, friction_of
 from .declarations import LOSSES, CommonParameters
 from .entries import EntryReader
 from .loads import MOTION
@@ -79,7 +79,9 @@ class ParameterReader(EntryReader):
                     self.fault(key, f"has the name of a key of [{table}]; give the joint another name")
                     continue
                 self.keys(key, entry, (*shared, "kind") if table == "pins" else (*shared,))
-                values = shared | self.bearing(key, entry)
+                values = dict(shared)
+                with self.at(f"{key}.kind"):
+                    values |= friction_of(entry.get("kind", PLAIN))
                 for variable in Layout(declared).variables:
                     if (value := entry.get(variable.name)) is not None:
                         with self.at(f"{key}.{variable.name}"):
@@ -87,13 +89,6 @@ class ParameterReader(EntryReader):
                             values[variable.name] = self.admitted(full, value)
                 laws.setdefault(table, {})[name] = values
         return laws
-
-    def bearing(self, key: str, entry: Mapping[str, Any]) -> dict[str, float]:
-        """The usual friction of the `kind` of bearing that an entry names."""
-        kind = entry.get("kind", PLAIN)
-        if wrong := kind_fault(kind):
-            self.fault(f"{key}.kind", wrong)
-        return {"friction": ROLLING_FRICTION} if kind == ROLLING else {}
 
     def about(self) -> dict[str, str]:
         """Who made the machine, as its FMUs say it."""
