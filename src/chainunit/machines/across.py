@@ -115,7 +115,9 @@ def _of_width(machine: InverseMachine, placed: type, bar: bool) -> InverseMachin
         wall = Requirement("bar.bore", "m", "the bar has no wall", depends=("bar.diameter",))
         limits = functools.partial(_limits, machine)
         section = {"required": (*machine.required, wall), "requirements": limits}
-    outputs = [(row, RockerShare, group(RockerShare, f"{row} rocker")) for row in ROWS]
+    outputs: list[tuple[str, Any, Any]] = [
+        (row, RockerShare, group(RockerShare, f"{row} rocker")) for row in ROWS
+    ]
     outputs.append(("bar", load, group(load, "bar that joins the rockers")))
     return machine.altered(
         root=machine,

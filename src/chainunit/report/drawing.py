@@ -230,7 +230,7 @@ def _top_view(
         places = [middle + half * place for place in layers.get(link.name, ())]
         colour, weight = _LOOKS[link.look]
         if not places:
-            size = {"width": max(xs) - min(xs), "height": 2.0 * half, "fill_opacity": 0.12}
+            size: dict[str, Any] = {"width": max(xs) - min(xs), "height": 2.0 * half, "fill_opacity": 0.12}
             canvas.add("rect", x=min(xs), y=middle - half, **size, fill="#0b6fa4", stroke=colour)
         for x in xs if len(places) > 1 else ():
             canvas.line((x, places[0]), (x, places[-1]), stroke=colour, stroke_width=3)

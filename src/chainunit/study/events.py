@@ -179,8 +179,9 @@ class OneSidedFeed(Event):
             here, there = (filled(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
             ends[there] = (1.0 - share) * normal[there]
             ends[here] = normal[here] + share * normal[there]
-            if (name := f"{self.side}.{PLACES[load]}") in normal:
-                moved = share * normal[there], normal[f"{other(self.side)}.{PLACES[load]}"]
+            name, from_name = (filled(f"{{{side}}}.{PLACES[load]}", self.side) for side in ("side", "other"))
+            if name in normal:
+                moved = share * normal[there], normal[from_name]
                 ends[name] = middle_of((normal[here], normal[name]), moved)
         return ends
 

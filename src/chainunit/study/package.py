@@ -104,9 +104,9 @@ def model_and_start(
     if config is None:
         return model_named(name, direct, rods), {}
     model, drive = model_named(name, direct), drive_to_export(config, backend, progress)
-    if isinstance(machine := drive.driven_machine.model, InverseMachine):
+    if isinstance(driven := drive.driven_machine.model, InverseMachine):
         # a study may give the machine further parameters
-        model = next((kind for kind in (machine, machine.direct()) if kind.name == model.name), model)
+        model = next((kind for kind in (driven, driven.direct()) if kind.name == model.name), model)
     start = start_of(drive, config.operation, model)
     if name == "ChainUnitFlexible":
         if rods is None:
