@@ -7,10 +7,12 @@ import pickle
 import tomllib
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 
-from chainunit import ChainUnitMachine, InputError, SideLoads
+from chainunit import ChainUnitMachine, InputError, SideLoads, Study
+from chainunit.fmu.backends import export
 from chainunit.machines.api import machine_of
 from chainunit.machines.chain_unit import ChamberForces, PlacedLoads
 from chainunit.machines.knife_drive import KnifeDrive
@@ -18,6 +20,7 @@ from chainunit.machines.linkages.file import linkage_from
 from chainunit.machines.machine import Machine
 from chainunit.report.drawing import drawing
 from chainunit.study.config import parse
+from chainunit.study.package import model_and_start
 
 LOADS = {
     "left": PlacedLoads(material_mass=42.0, processing_force=700.0, across=0.35, force_across=-0.9),
@@ -337,3 +340,40 @@ def test_the_drawing_has_a_view_from_above():
     plain, wide = drawing(ChainUnitMachine()), drawing(ChainUnitMachine({"width": 1.2}))
     assert "from above, width 1200 mm" in wide and "front (1)" in wide
     assert "from above" not in plain
+
+
+@pytest.mark.second
+@pytest.mark.compiler
+@pytest.mark.parametrize("backend", ["native", "python"])
+def test_the_fmu_has_the_shares_and_pins_of_the_study(backend, tmp_path):
+    text = PLACED.replace("[feed]", "bar.diameter = '60 mm'\npins.A.friction = 0.05\n[feed]")
+    (tmp_path / "study.toml").write_text(text, "utf-8")
+    config = Study.from_file(tmp_path / "study.toml").config
+    model, start = model_and_start("ChamberForces", config)
+    export(model, tmp_path / "wide.fmu", start, backend=backend)
+    inputs = {"phi": 40.0, "w": 0.0, "left.force_across": -1.0, "left.processing_force": 500.0}
+    names = ["tau", "front.pivot.fx", "back.pivot.fy", "back.left_pin.fx", "bar.stress", "bar.torsion"]
+    rows = fmpy.simulate_fmu(
+        tmp_path / "wide.fmu", start_values=inputs, stop_time=0.01, output_interval=0.01, output=names
+    )
+    machine, feed = config.machine, config.machine.model.feed_layout.by_name(config.feed)
+    wanted = machine.evaluate(feed | inputs)
+    for name in names:
+        assert rows[name][0] == pytest.approx(float(wanted[name]), rel=1e-10, abs=1e-9)
+    assert machine.by_name["pins.A.friction"] == start["pins.A.friction"] == 0.05
+
+
+@pytest.mark.second
+@pytest.mark.compiler
+def test_a_study_shows_the_corner_that_a_lump_overloads(tmp_path):
+    text = PLACED.replace("[feed]", "[machine.bar]\ndiameter = '40 mm'\nlimit = '50 MPa'\n[feed]")
+    (tmp_path / "study.toml").write_text(text, "utf-8")
+    study = Study.from_file(tmp_path / "study.toml").run().record
+    jam, run = study.answers["jam_left"], study.runs["jam_left"]
+    assert jam.back_pivot_peak > 1.5 * jam.front_pivot_peak
+    peak = float(np.max(np.hypot(run["machine.back.pivot.fx"], run["machine.back.pivot.fy"])))
+    assert jam.back_pivot_peak == pytest.approx(peak)
+    (remark,) = (remark for remark in study.remarks if remark.code == "bar-overloaded")
+    assert (
+        remark.runs == ("jam_left",) and jam.bar_stress_peak > 5e7 > study.answers["steady"].bar_stress_peak
+    )
