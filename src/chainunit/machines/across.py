@@ -113,8 +113,7 @@ def _of_width(machine: InverseMachine, placed: type, bar: bool) -> InverseMachin
     if bar:
         parameters.append(("bar", BarSection, group(BarSection, "bar", default=BarSection())))
         wall = Requirement("bar.bore", "m", "the bar has no wall", depends=("bar.diameter",))
-        limits = functools.partial(_limits, machine)
-        section = {"required": (*machine.required, wall), "requirements": limits}
+        section = {"required": (*machine.required, wall), "requirements": functools.partial(_limits, machine)}
     outputs: list[tuple[str, Any, Any]] = [
         (row, RockerShare, group(RockerShare, f"{row} rocker")) for row in ROWS
     ]
