@@ -25,7 +25,6 @@ from .conditions import (
 )
 from .foreign_machine import ForeignModel
 from .line.flywheel import MACHINE, MOTOR
-from .organs import USUAL
 from .parts import FMU, Parts, parts_of
 from .registry import parts_of_line, registered
 from .sections import choosing_tables
@@ -167,8 +166,6 @@ def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
     yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
     yield Rule("organ", ~has_sides(), OF_CHAIN_UNIT)
-    refusal = "is of organs with two bars; leave it out, or the key organ"
-    yield Rule("machine.width", given("organ") & ~is_one_of("organ", USUAL), refusal)
     for name in lengths(**filled(Ratios, {})):
         refusal = "given beside [ratios], which sets it; leave out one of the two"
         yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), refusal)
