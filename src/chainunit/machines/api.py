@@ -433,7 +433,7 @@ class ChainUnitOfChains(ChainUnitMachine):
 def machine_of(model: InverseMachine, parameters: Any = None, /, **values: float) -> Machine:
     """The machine of a model, of the class with the methods for its kind; arguments and errors are those of
     `Machine`."""
-    if (model.root or model) is ChamberForces:
+    if (model.root or model).Parameters is ChamberForces.Parameters:
         return ChainUnitMachine(parameters, model=model, **values)
     if isinstance(model, ChainedModel):
         return ChainedUnit(model, parameters, **values)
