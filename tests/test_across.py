@@ -13,7 +13,7 @@ import pytest
 
 from chainunit import ChainUnitMachine, InputError, SideLoads, Study
 from chainunit.fmu.backends import export
-from chainunit.machines.api import machine_of
+from chainunit.machines.api import ChainUnitOfChains, machine_of
 from chainunit.machines.chain_unit import ChamberForces, PlacedLoads
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import linkage_from
@@ -271,6 +271,17 @@ def test_what_a_pin_leaves_out_is_as_that_of_all_pins():
         match=r"pins\.B: is no pin of this machine; was .B_left. meant\?; its pins are O1, A, Bd, C, A2",
     ):
         ChainUnitMachine({"pins.B.friction": 0.1})
+
+
+def test_chains_take_the_laws_of_the_pins_of_the_drive():
+    machine = ChainUnitOfChains({"pins.O1.friction": 0.3}).simulated
+    loads = machine.model.linkage(np, machine.p, machine.model.Inputs()).loads
+    ((joint, law),) = loads["pins"].laws.items()
+    assert joint == ("O1", "crank") and (law.friction, law.diameter) == (0.3, 0.06)
+    with pytest.raises(
+        InputError, match=r"pins\.B_left: is no pin of this machine.*its pins are O1, A, Bd, C$"
+    ):
+        _ = ChainUnitOfChains({"pins.B_left.friction": 0.3}).simulated
 
 
 def test_a_study_names_pins_and_their_kinds():
