@@ -123,7 +123,11 @@ def _one_key(table, key):
     if table.of in MACHINES and (further := MACHINES[table.of].further):
         of_machine = "".join(f"{name} = {x}\n" for name, x in zip(further, (1.0, 0.08), strict=True))
         own = f"{key.name.replace(NAME, 'A')} = {key.left_out}\n"
-        return f"{system}[machine]\n{of_machine}" + (f"[{table.name}]\n" if table.name != "machine" else "") + own
+        return (
+            f"{system}[machine]\n{of_machine}"
+            + (f"[{table.name}]\n" if table.name != "machine" else "")
+            + own
+        )
     if table.of in MACHINES:
         return f"{system}[{table.name}]\n{key.name.replace(NAME, 'A')} = {key.left_out}\n"
     heading = "" if table.name == "driveline" and key.name.startswith("shaft") else f"[{table.name}]\n"
