@@ -21,7 +21,7 @@ from chainunit.models import MACHINES, MODELS, MOTORS
 from chainunit.study.commented import commented
 from chainunit.study.config import parse
 from chainunit.study.event import TYPES
-from chainunit.study.keys import catalogue_columns, entry_tables, key_tables
+from chainunit.study.keys import NAME, catalogue_columns, entry_tables, key_tables
 from chainunit.study.motor_sources import OwnMotor
 from chainunit.study.parts import Parts, example
 from chainunit.study.schema import json_schema
@@ -42,7 +42,8 @@ def _leaves(form, prefix=""):
 @pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize("motor", MOTORS)
 def test_each_key_of_the_form_is_documented(machine, motor):
-    form = Parts(MACHINES[machine], MOTORS[motor]).form
+    model = MACHINES[machine]
+    form = Parts(model.having((*model.further, *(["pins.A"] if model.pin_names else []))), MOTORS[motor]).form
     documented = {
         f"{table.name}.{key.name}".lstrip(".")
         for table in key_tables()
@@ -50,6 +51,10 @@ def test_each_key_of_the_form_is_documented(machine, motor):
         for key in table.keys
     }
     asked = {name for name in _leaves(form) if name not in ("event", "report.units")}
+    asked = {name.replace(".pins.A.", f".pins.{NAME}.") for name in asked}
+    if model.pin_names:
+        # the reader of the file takes the kind of a pin before the form
+        asked.add(f"machine.pins.{NAME}.kind")
     assert asked <= documented
     assert {
         name
@@ -116,6 +121,16 @@ def _one_key(table, key):
         return f"{key.name} = {key.left_out}"
     if table.name == "system":
         return f"title = 'x'\nsystem.{key.name} = {key.left_out}"
+    if table.of in MACHINES and (further := MACHINES[table.of].further):
+        of_machine = "".join(f"{name} = {x}\n" for name, x in zip(further, (1.0, 0.08), strict=True))
+        own = f"{key.name.replace(NAME, 'A')} = {key.left_out}\n"
+        return (
+            f"{system}[machine]\n{of_machine}"
+            + (f"[{table.name}]\n" if table.name != "machine" else "")
+            + own
+        )
+    if table.of in MACHINES:
+        return f"{system}[{table.name}]\n{key.name.replace(NAME, 'A')} = {key.left_out}\n"
     heading = "" if table.name == "driveline" and key.name.startswith("shaft") else f"[{table.name}]\n"
     return f"{system}{heading}{key.name} = {key.left_out}\n"
 

@@ -70,7 +70,7 @@ WITHOUT = {
     # numbers of single runs, of which the remark gives a list in words
     *("stall_time", "coupling_trip_time", "energy_after_trip", "energy_behind", "speed_ripple"),
     *("J1", "J4", "c2", "c3", "crank_torque_low", "crank_torque_high", "over"),
-    *("blade_bottom", "blade_top", "speed", "speed_dip"),
+    *("blade_bottom", "blade_top", "speed", "speed_dip", "bar_stress_peak"),
 }
 
 

@@ -79,7 +79,8 @@ class ChainUnitMachine(Machine):
 
     @property
     def _kind(self) -> list[str]:
-        return [] if self.model is ChamberForces else [f"model={self.model.name}"]
+        model = self.model.root or self.model
+        return [] if model is ChamberForces else [f"model={model.name}"]
 
     @classmethod
     def from_ratios(
@@ -112,10 +113,16 @@ class ChainUnitMachine(Machine):
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
+        """The checked inputs with these loads, which may have places across the width."""
         for name, loads in (("left", left), ("right", right)):
             check_kind(name, loads, SideLoads)
-        values = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
-        inputs: Inputs = self.inputs(ChamberForces.input_layout.by_name(values))
+        groups = {"left": left, "right": right, "stop": stop}
+        values = {"phi": phi, "w": w, "a": a} | {
+            f"{name}.{key}": x
+            for name, group in groups.items()
+            for key, x in Layout(type(group)).by_name(group).items()
+        }
+        inputs: Inputs = self.inputs(values)
         return inputs
 
     def forces(
@@ -426,7 +433,7 @@ class ChainUnitOfChains(ChainUnitMachine):
 def machine_of(model: InverseMachine, parameters: Any = None, /, **values: float) -> Machine:
     """The machine of a model, of the class with the methods for its kind; arguments and errors are those of
     `Machine`."""
-    if model.Parameters is ChamberForces.Parameters:
+    if (model.root or model).Parameters is ChamberForces.Parameters:
         return ChainUnitMachine(parameters, model=model, **values)
     if isinstance(model, ChainedModel):
         return ChainedUnit(model, parameters, **values)

@@ -12,6 +12,7 @@ corrections of docs/physics.md.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -27,7 +28,9 @@ from ..groups.loads import Block, PinLosses, Resistance, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import CrankMotion, InverseMachine
+from .across import extended, place
 from .crank_rocker import TURNS, half_width_range, longest_crank, pressure_angle, rocker_extremes
+from .differing import laws_of
 from .parts import Force, Pin, Processing, Rod, Stop, force
 
 SideName = Literal["left", "right"]
@@ -118,6 +121,14 @@ class SideLoads:
     processing_force: Value = quantity(
         "N", "force on the web at B, against the motion of B", default=0.0, min=0.0, nominal=100.0
     )
+
+
+@declaration
+class PlacedLoads(SideLoads):
+    """The material on one organ, and its place across the width."""
+
+    across: Value = place("material")
+    force_across: Value = place("processing force")
 
 
 @declaration
@@ -415,6 +426,10 @@ JOINTS = {**ON_DRIVE, **ON_SIDE}
 """The joint of each reaction, by output."""
 PINS = {title: output for title, output, _, _ in (*_ON_DRIVE, *_ON_SIDE)}
 """The output of each bearing, by title."""
+PIN_NAMES = {
+    (f"{pin} {link}" if pin == "A2" else pin).replace(" ", "_"): (pin, link) for pin, link in JOINTS.values()
+}
+"""The joint of each pin, by its name in a file."""
 
 
 def on_drive(
@@ -465,7 +480,7 @@ def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]
             "weight": Weight(p.g),
             **processing,
             "stop": Block("rocker", u.stop),
-            "pins": PinLosses(p.pin, p.joint_damping),
+            "pins": PinLosses(p.pin, p.joint_damping, laws_of(p, PIN_NAMES)),
         },
     )
 
@@ -541,6 +556,9 @@ ChamberForces = InverseMachine(
     pins=PINS,
     angles={"ψ": "rocker"},
     within={"e": "h", "coupler.s": "l", "rocker.s": "h"},
+    pin_names=PIN_NAMES,
+    further=("width", "bar.diameter"),
+    extend=functools.partial(extended, PlacedLoads),
     linkage=_linkage,
     probes=_probes,
     further_quantities=_further_quantities,

@@ -28,7 +28,7 @@ from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
 from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration
 from .chain_organs import LEAST, MOST, Organs, Parameters, both
-from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
+from .chain_unit import ON_DRIVE, PIN_NAMES, SIDES, ChamberForces, Inputs, Outputs, drive
 
 CLOSING = 20.0
 """Rate at which the gap between a chain and A2 is closed [1/s]."""
@@ -203,6 +203,8 @@ def flexible(walls: int, webs: int) -> InverseMachine:
         Outputs=declared_class("ChainOutputs", (Outputs,), both(organs.Side)),
         joints=ChamberForces.joints,
         pins=ChamberForces.pins,
+        pin_names={pin: joint for pin, joint in PIN_NAMES.items() if joint in ON_DRIVE.values()},
+        extend=ChamberForces.extend,
         probes=organs.probes,
         by_differences=frozenset(("dJ_dphi", *Layout(PortSlopes).names)),
         required=(*ChamberForces.required, *_MASSES),

@@ -27,6 +27,7 @@ from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import CrankMotion, InverseMachine
 from .crank_rocker import TURNS, longest_crank
+from .differing import laws_of, with_pins
 from .parts import Force, Pin, Rod, force
 
 
@@ -196,6 +197,8 @@ JOINTS = {output: (pin, link) for _, output, pin, link in _BEARINGS}
 """The joint of each reaction, by output."""
 PINS = {title: output for title, output, _, _ in _BEARINGS}
 """The output of each bearing, by title."""
+PIN_NAMES = {output if joint[0] == "B" else joint[0]: joint for output, joint in JOINTS.items()}
+"""The joint of each pin, by its name in a file; two pins lie in B."""
 
 
 def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
@@ -240,7 +243,7 @@ def _linkage(xp: Any, p: Any, u: Any) -> Linkage:
             "weight": Weight(p.g),
             "cut": Cut("blade", u.cut_force, p.stack),
             "push": Push("blade", Vec2(u.blade.fx, u.blade.fy)),
-            "pins": PinLosses(p.pin, p.joint_damping),
+            "pins": PinLosses(p.pin, p.joint_damping, laws_of(p, PIN_NAMES)),
         },
     )
 
@@ -268,6 +271,8 @@ KnifeDrive = InverseMachine(
     Feed=CutForce,
     joints=JOINTS,
     pins=PINS,
+    pin_names=PIN_NAMES,
+    extend=with_pins,
     linkage=_linkage,
     probes=_probes,
     required=(

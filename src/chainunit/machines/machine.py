@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -14,6 +15,7 @@ from ..core.errors import InputError, check_kind, shown
 from ..core.quantities import Variable, complaint
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine, MachineModel
+from .differing import completed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,11 +60,12 @@ class Machine:
 
     def __init__(self, model: InverseMachine, parameters: Any = None, /, **values: Any) -> None:
         check_kind("model", model, MachineModel, "a machine, such as KnifeDrive")
-        self.model = model
         if isinstance(parameters, model.Parameters):
             parameters = model.parameter_layout.by_name(parameters)
         check_kind("parameters", parameters, Mapping | None, _NAMED)
-        self.p: Any = self._checked({**(parameters or {}), **values}, model.Parameters())
+        values = {**(parameters or {}), **values}
+        self.model = model.having(values)
+        self.p: Any = self._checked(completed(self.model, values), self.model.Parameters())
 
     def _checked(self, values: Mapping[str, Any], base: Any) -> Any:
         """The checked parameters `base` with other values by name."""
@@ -76,14 +79,18 @@ class Machine:
 
     def replace(self, parameters: Mapping[str, Any] | None = None, /, **values: Any) -> Self:
         """The same machine with new values of some parameters; the arguments are as of the constructor."""
-        machine = copy.copy(self)
-        machine.p = self._checked({**(parameters or {}), **values}, self.p)
+        machine, values = copy.copy(self), {**(parameters or {}), **values}
+        machine.model, base = self.model.having(values), self.p
+        if machine.model is not self.model:
+            values, base = completed(machine.model, self.by_name | values), machine.model.Parameters()
+        machine.p = machine._checked(values, base)
         return machine
 
     def __repr__(self) -> str:
         """The call that makes the machine, with the parameters that differ from their start values, to nine
-        digits."""
-        start = self.model.parameter_layout.by_name(self.model.Parameters())
+        digits, and with those that it has only as it was made with them."""
+        model = self.model.root or self.model
+        start = dict.fromkeys(self.by_name, math.nan) | model.parameter_layout.by_name(model.Parameters())
         texts = {name: f"{value:.9g}" for name, value in self.by_name.items()}
         changes = [f'"{name}": {x}' for name, x in texts.items() if x != f"{start[name]:.9g}"]
         arguments = [*self._kind, *([f"{{{', '.join(changes)}}}"] if changes else [])]
@@ -108,6 +115,11 @@ class Machine:
     def by_name(self) -> dict[str, float]:
         """Values of the parameters by name."""
         return self.model.parameter_layout.by_name(self.p)
+
+    @property
+    def in_plane(self) -> dict[str, float]:
+        """Values by name of the parameters that every machine of its kind has, see `MachineModel.having`."""
+        return (self.model.root or self.model).parameter_layout.by_name(self.p)
 
     def inputs(self, values: Mapping[str, Any]) -> Any:
         """Inputs from values by name, each within the bounds of its declaration; all others have their start values.

@@ -38,6 +38,13 @@ class Pin:
 
 
 @declaration
+class PinLaw(Pin):
+    """The pins with their damping."""
+
+    damping: Value = quantity("N.m.s/rad", "viscous damping of each", default=0.0, min=0.0, tunable=True)
+
+
+@declaration
 class GuideLaw:
     """The guides, all alike."""
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.engines import MATH
@@ -110,6 +110,17 @@ class MachineModel(Model):
     side have the same name."""
     cuts: bool = False
     """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
+    further: tuple[str, ...] = ()
+    """Names with which the machine has all of its further parameters, those of its pins apart."""
+    extend: Callable[[Any, frozenset[str]], Any] | None = None
+    """The machine (machine, names) with further parameters, which it has only if a user names one of them."""
+    root: Any = None
+    """The machine without further parameters, if it has some; else None."""
+    layers: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    """By link, its places across the parameter `width`, from -1 to 1; a link that is not named lies over all of it.
+    Empty for a machine in a plane."""
+    pin_names: Mapping[str, Joint] = field(default_factory=dict)
+    """The joints of the pins that may differ, by the names that a file uses."""
     never_repeats: str = ""
     """The reason, in words, why no turn of its runs is like the one before; empty if steady turns are alike."""
 
@@ -121,6 +132,21 @@ class MachineModel(Model):
     def feed_layout(self) -> Layout:
         """The layout of the feed."""
         return Layout(self.Feed)
+
+    def having(self, names: Iterable[str]) -> Self:
+        """The machine with those of its further parameters that are among `names`.
+
+        Raises
+        ------
+        InputError
+            for a parameter of a pin that the machine does not have, or one that requires another.
+        """
+        root, present = self.root or self, {*self.parameter_layout.names}
+        further = {name for name in names if isinstance(name, str)} - present
+        if self.extend is None or not further:
+            return self
+        machine: Self = self.extend(root, frozenset(further | (present - {*root.parameter_layout.names})))
+        return machine
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

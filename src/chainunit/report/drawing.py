@@ -168,7 +168,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     )
     page_points = {name: to_page(place) for name, place in _positions(whole).items()}
     links = [_straightened(link, page_points) for link in linkage.links(whole.linkage)]
-    canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
+    height = HEIGHT + (_TOP if machine.model.layers else 0.0)
+    canvas.add("rect", width=WIDTH + COLUMN, height=height, fill="#ffffff", rx=8)
     for rail in rails:
         _rail(canvas, *map(to_page, rail))
     for centre, rim in whole.linkage.circles:
@@ -211,7 +212,41 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     _names(canvas, links, sizes, page_points, lines)
     _frame(canvas)
     _column(canvas, sizes, whole.linkage.ground)
-    return _svg(canvas, f"{machine.model.noun}: pins, links and dimensions")
+    if machine.model.layers:
+        metre = to_page((1.0, 0.0))[0] - to_page((0.0, 0.0))[0]
+        _top_view(canvas, machine, links, page_points, metre)
+    return _svg(canvas, f"{machine.model.noun}: pins, links and dimensions", height)
+
+
+def _top_view(
+    canvas: _Canvas, machine: Machine, links: list[DrawnLink], page_points: Mapping[str, Point], metre: float
+) -> None:
+    """Draw the machine from above, below the picture, with its front at the lower edge: links at their places across
+    the width, cross-bars where a link lies at both edges, and all others over the width, at most as wide as the room.
+    `metre` is the length of a metre [px]."""
+    layers, width = machine.model.layers, float(machine.p.width)
+    half, middle = 0.5 * min(width * metre, _TOP - 70.0), HEIGHT + 0.5 * _TOP + 6.0
+    for link in sorted(links, key=lambda link: link.name in layers):
+        xs = [page_points[joint][0] for joint in link.joints]
+        places = [middle + half * place for place in layers.get(link.name, ())]
+        colour, weight = _LOOKS[link.look]
+        if not places:
+            size: dict[str, Any] = {"width": max(xs) - min(xs), "height": 2.0 * half, "fill_opacity": 0.12}
+            canvas.add("rect", x=min(xs), y=middle - half, **size, fill="#0b6fa4", stroke=colour)
+        for x in xs if len(places) > 1 else ():
+            canvas.line((x, places[0]), (x, places[-1]), stroke=colour, stroke_width=3)
+        for y in places:
+            canvas.line((min(xs), y), (max(xs), y), stroke=colour, stroke_width=weight)
+    ends = [x for x, _ in page_points.values()]
+    for name, y in (("front (1)", middle + half), ("back (-1)", middle - half)):
+        canvas.add("text", name, x=max(ends) + 12.0, y=y + 4.0, fill="#1b1b1b")
+    shown = number(width, "m", "millimetres", 4, full=False)
+    canvas.add("text", f"from above, width {shown}", x=12.0, y=HEIGHT + 16.0, fill="#555555")
+    _line(canvas, (min(ends) - 16.0, middle + half), (min(ends) - 16.0, middle - half), "width")
+
+
+_TOP = 240.0
+"""Height of the room for the view from above [px]."""
 
 
 def _positions(whole: Mechanism) -> dict[str, Point]:
@@ -458,7 +493,7 @@ def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground:
         y += 7.0
 
 
-def _svg(canvas: _Canvas, title: str) -> str:
+def _svg(canvas: _Canvas, title: str, height: float) -> str:
     tips = "".join(
         f'<marker id="drawing-{name}" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" markerHeight="7" '
         f'orient="auto"><path d="M0 0L8 4L0 8z" fill="{colour}"/></marker>'
@@ -469,7 +504,7 @@ def _svg(canvas: _Canvas, title: str) -> str:
         .replace("drawing-end", "drawing-begin")
         .replace('"auto"', '"auto-start-reverse"')
     )
-    size = f"{WIDTH + COLUMN:.0f} {HEIGHT:.0f}"
+    size = f"{WIDTH + COLUMN:.0f} {height:.0f}"
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" font-family="Helvetica, Arial, '
         f'sans-serif" font-size="13">\n<title>{escape(title)}</title>\n<defs>{tips}</defs>\n'

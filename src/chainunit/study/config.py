@@ -294,7 +294,8 @@ def _of_tables(data: Mapping[str, Any], source: str) -> Config:
     parts, faults = check_values(in_system, source)
     if parts is None:
         # a key that the file has, not the one that stands for it
-        raise InputError.joined(faults if in_system is data else [_of_linkage(fault) for fault in faults])
+        same = in_system.get("system") is data.get("system")
+        raise InputError.joined(faults if same else [_of_linkage(fault) for fault in faults])
     data = in_system
     if not faults:
         return _of_values(data, parts, source)

@@ -4,14 +4,14 @@ cases."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..core.quantities import Layout
-from ..machines.api import EMPTY
-from ..machines.chain_unit import Feed, SideLoads, SideName
+from ..machines.across import PLACES, middle_of
+from ..machines.chain_unit import Feed, SideName, other
 from ..machines.machine import Machine
 
 
@@ -64,17 +64,16 @@ def needed_inertia(swing: float, speed: float, fluctuation: float, there: float 
 
 def all_on_one(side: SideName, feed: Feed) -> Feed:
     """The feed with which the organ of `side` has the load of both organs."""
-    left, right = feed.left, feed.right
-    whole = SideLoads(
-        material_mass=left.material_mass + right.material_mass,
-        processing_force=left.processing_force + right.processing_force,
-    )
-    return Feed(left=whole, right=EMPTY) if side == "left" else Feed(left=EMPTY, right=whole)
+    one, two = getattr(feed, side), getattr(feed, other(side))
+    whole = {load: getattr(one, load) + getattr(two, load) for load in PLACES}
+    for load, place in PLACES.items() if hasattr(one, "across") else ():
+        whole[place] = middle_of(*((getattr(x, load), getattr(x, place)) for x in (one, two)))
+    return without(other(side), replace(feed, **{side: replace(one, **whole)}))
 
 
 def without(side: SideName, feed: Feed) -> Feed:
     """The feed with the organ of that side empty."""
-    return Feed(left=feed.left, right=EMPTY) if side == "right" else Feed(left=EMPTY, right=feed.right)
+    return replace(feed, **{side: replace(getattr(feed, side), **dict.fromkeys(PLACES, 0.0))})
 
 
 def one_sided_feeds(feed: Feed) -> dict[str, Feed]:

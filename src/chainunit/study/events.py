@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from ..core.quantities import Value, declaration, quantity
 from ..drives.contactor import CONTACTOR_EDGE
+from ..machines.across import PLACES, middle_of, place
 from ..machines.chain_unit import SideName, other
 from ..reading.text import number
 from ..system.signals import Profile
@@ -46,11 +47,14 @@ class _Pulses(Event):
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The pulses, added to the input of normal running."""
-        (name,), p, changes = self.inputs, self.p, list[tuple[float, float, float]]()
-        usual = normal[name]
+        (name,) = self.inputs
+        return {name: self._pulses(begin, normal[name], normal[name] + self._height(normal[name]))}
+
+    def _pulses(self, begin: float, usual: float, height: float) -> Profile:
+        p, changes = self.p, list[tuple[float, float, float]]()
         for pulse in self._begins(begin):
-            changes += _spell(usual, usual + self._height(usual), pulse, p.rise, p.rise + p.duration).changes
-        return {name: Profile(usual, tuple(changes))}
+            changes += _spell(usual, height, pulse, p.rise, p.rise + p.duration).changes
+        return Profile(usual, tuple(changes))
 
 
 class Jam(_Pulses):
@@ -68,9 +72,26 @@ class Jam(_Pulses):
         force: Value = quantity("N", "processing force of the lump", default=2000.0, min=0.0)
         duration: Value = _duration("time for which the lump holds", 0.3)
         rise: Value = _rise("the force", 0.02)
+        across: Value = place("the lump")
 
     def _height(self, usual: float) -> Any:
         return self.p.force
+
+    def fault(self, normal: Values) -> str:
+        """A place across the width needs a machine with a width."""
+        lacks_width = self.p.across and f"{self.side}.force_across" not in normal
+        return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width" * bool(
+            lacks_width
+        )
+
+    def signals(self, normal: Values, begin: float, state: Values) -> Signals:
+        """The pulses, and the place of the whole force across the width."""
+        signals, name = super().signals(normal, begin, state), f"{self.side}.force_across"
+        if name in normal:
+            usual = normal[self.inputs[0]], normal[name]
+            together = middle_of(usual, (self.p.force, self.p.across))
+            signals[name] = self._pulses(begin, normal[name], together)
+        return signals
 
 
 class Lumps(Jam):
@@ -89,9 +110,6 @@ class Lumps(Jam):
     def _begins(self, begin: float) -> list[float]:
         period = 2.0 * self.p.rise + self.p.duration + self.p.pause
         return [begin + k * period for k in range(int(self.p.number))]
-
-
-_LOADS = ("material_mass", "processing_force")
 
 
 @declaration
@@ -116,7 +134,7 @@ class Empties(Event):
     kind, run = "empties", "{side}_empties"
     words, heading = "the {side} side empties", "{side} empties"
     role = Role.DUTY
-    acts_on = tuple(f"{{side}}.{load}" for load in _LOADS)
+    acts_on = tuple(f"{{side}}.{load}" for load in PLACES)
 
     @declaration
     class Parameters(Timing, FeedShift):
@@ -143,7 +161,7 @@ class OneSidedFeed(Event):
     kind, run = "feed", "feed_{side}"
     words, heading = "all feed moves to the {side}", "feed to {side}"
     role = Role.DUTY
-    acts_on = tuple(f"{{{side}}}.{load}" for side in ("side", "other") for load in _LOADS)
+    acts_on = tuple(f"{{{side}}}.{load}" for side in ("side", "other") for load in PLACES)
 
     @declaration
     class Parameters(Timing, FeedShift, FeedShare):
@@ -157,10 +175,14 @@ class OneSidedFeed(Event):
     def ends(self, normal: Mapping[str, float]) -> dict[str, float]:
         """The inputs of both sides after the feed has moved."""
         ends, share = {}, self.p.share
-        for load in _LOADS:
+        for load in PLACES:
             here, there = (filled(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
             ends[there] = (1.0 - share) * normal[there]
             ends[here] = normal[here] + share * normal[there]
+            name, from_name = (filled(f"{{{side}}}.{PLACES[load]}", self.side) for side in ("side", "other"))
+            if name in normal:
+                moved = share * normal[there], normal[from_name]
+                ends[name] = middle_of((normal[here], normal[name]), moved)
         return ends
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:

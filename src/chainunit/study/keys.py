@@ -16,7 +16,10 @@ from ..core.quantities import Layout, Variable, variables, written
 from ..core.units import shortest_text
 from ..drives.catalogue import KINDS as CATALOGUES
 from ..drives.catalogue_rows import LEFT_OUT, TEXTS
+from ..machines.differing import PLAIN, ROLLING, ROLLING_FRICTION, SHARED
 from ..machines.paper_ratios import Ratios
+from ..machines.parts import PinLaw
+from ..mechanism.models import InverseMachine
 from ..models import MACHINES, MOTORS
 from ..reading.lists import TableList
 from ..reading.tables import instance
@@ -213,11 +216,24 @@ def quantity_keys(
 
 
 def _of_machine(name: str, table: str) -> Iterator[Key]:
-    """The keys of [machine], or of the `table` [feed], for a machine of that name."""
+    """The keys of [machine], or of the `table` [feed], for a machine of that name, with those that it has only if a
+    file names one of them."""
     config = _study(name)
+    model: InverseMachine = config.machine.model.having(config.machine.model.further)
     if table == "feed":
-        return quantity_keys(config.machine.model.Feed, config.feed)
-    return quantity_keys(config.machine.model.Parameters, config.machine.p)
+        feed = model.feed_layout.from_names(config.machine.model.feed_layout.by_name(config.feed))
+        places = {f"{side}.force_across": f"{side}.across" for side in model.sides}
+        yield from quantity_keys(model.Feed, feed, sources=places)
+        return
+    values = model.parameter_layout.from_names(config.machine.by_name)
+    sources = dict.fromkeys(model.further, "none, and nothing that follows from it")
+    yield from quantity_keys(model.Parameters, values, sources=sources)
+    if model.pin_names:
+        pins = f"pins.{NAME}."
+        yield from quantity_keys(PinLaw, prefix=pins, sources=SHARED)
+        kinds = f'"{PLAIN}"', f'"{ROLLING}"'
+        text = f"kind of the bearing; a rolling one has the friction {ROLLING_FRICTION:g}"
+        yield Key(f"{pins}kind", text, words=kinds, sort="text", left_out=kinds[0])
 
 
 def _of_motor(name: str) -> Iterator[Key]:

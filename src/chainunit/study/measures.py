@@ -29,6 +29,7 @@ from .window import Phase, Window, drift, end_gap
 STARTED = 0.95
 """Share of the speed at which a start ends, see `time_to_start`."""
 
+Reader = Callable[[Window], float | None]
 _ALL = frozenset(Phase)
 _RUNNING = _ALL - {Phase.START_UP, Phase.SETTLING}
 _STEADY = frozenset({Phase.STEADY})
@@ -128,6 +129,12 @@ def _fold(w: Window) -> float | None:
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
 
 
+def _of_width(*outputs: str) -> Reader:
+    """The reader of the largest size of outputs that only a machine with a width has."""
+    names = [f"machine.{name}" for name in outputs]
+    return lambda w: peak(np.linalg.norm([w.value(x) for x in names], axis=0)) if names[0] in w.run else None
+
+
 def time_to_start(time: Any, speed: Any, final: float, requested: float) -> float | None:
     """Time at which a shaft first turns at the share `STARTED` of the `requested` speed or, if it settles at
     another speed, of that one; None where it never does. A shaft that stands or creeps at the end may have
@@ -163,9 +170,6 @@ def _standstill(w: Window) -> float | None:
         return None
     still = np.flatnonzero(np.abs(crank_speed(w.drive, run)) < 0.01 * w.requested_speed)
     return float(run["time"][still[0]]) - w.begin if still.size else None
-
-
-Reader = Callable[[Window], float | None]
 
 
 @dataclass(frozen=True)
@@ -342,6 +346,15 @@ class Answers:
         "1", "share of the time with a slack rod", _slack_time, kind="percent", during=_ALL
     )
     fold_largest: Value = measure("rad", "largest angle between two rods", _fold, during=_ALL)
+    front_pivot_peak: Value = measure(
+        "N", "front, peak", _of_width("front.pivot.fx", "front.pivot.fy"), during=_ALL, of="rocker pivot"
+    )
+    back_pivot_peak: Value = measure(
+        "N", "back, peak", _of_width("back.pivot.fx", "back.pivot.fy"), during=_ALL, of="rocker pivot"
+    )
+    bar_stress_peak: Value = measure(
+        "N/m2", "stress in the bar, peak", _of_width("bar.stress"), during=_ALL, kind="stress"
+    )
     shaft_share: Value = measure(
         "1",
         "shaft/motor peak torque",

@@ -102,6 +102,7 @@ class TwoBars(OrganModel):
         config = study.setup.config
         empty = {name for name in study.runs.overloads if config.events[name].empties}
         slack_speed, resonance = slack_and_mode(study.setup.drive.chain_unit, config.feed)
+        end = ", without machine.width" if config.machine.model.layers else ""
         return verdict.two_bars(
             speed,
             resonance,
@@ -110,7 +111,7 @@ class TwoBars(OrganModel):
             residuals,
             empty={""} if has_empty_side(config.feed) else empty,
             actual=actual,
-            finer="; ".join(f'take organ = "{other.name}"' for other in finer_models()),
+            finer="; ".join(f'take organ = "{other.name}"{end}' for other in finer_models()),
         )
 
     def remark(self, study: StudyRecord) -> None:

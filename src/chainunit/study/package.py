@@ -17,7 +17,7 @@ from ..machines.api import ChainedUnit
 from ..machines.chain_organs import USUAL
 from ..machines.flexible import ChainedModel, with_rods
 from ..machines.machine import Machine
-from ..mechanism.models import DirectMachine
+from ..mechanism.models import DirectMachine, InverseMachine
 from ..models import model_named
 from ..reading.text import number
 from ..system import ModelComponent, System, compiled
@@ -103,8 +103,11 @@ def model_and_start(
         return whole_system(drive, config.operation, config.title, config.file.labels)
     if config is None:
         return model_named(name, direct, rods), {}
-    model = model_named(name, direct)
-    start = start_of(drive_to_export(config, backend, progress), config.operation, model)
+    model, drive = model_named(name, direct), drive_to_export(config, backend, progress)
+    if isinstance(driven := drive.driven_machine.model, InverseMachine):
+        # a study may give the machine further parameters
+        model = next((kind for kind in (driven, driven.direct()) if kind.name == model.name), model)
+    start = start_of(drive, config.operation, model)
     if name == "ChainUnitFlexible":
         if rods is None:
             machine = config.machine.simulated

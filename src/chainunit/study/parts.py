@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import date
 from functools import cache, lru_cache
 from pathlib import Path
@@ -13,9 +13,10 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..core.errors import Faults, InputError, each_refusal, near_name, refusal_prefix, shown
 from ..core.inputs import TOML, file_text
 from ..drives.motor import FOREIGN, Motor
+from ..machines.differing import friction_of
 from ..machines.linkages.file import linkage_in
 from ..mechanism.models import MachineModel
 from ..models import MACHINES, MOTORS
@@ -157,7 +158,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
         if _is_fmu(motor):
             beside(motor, source)
     with faults.collected():
-        machine, unusual = _machine_model(table, source)
+        machine, unusual = _machine_model(table, source, _names(named_table(data, "machine")))
     faults.refuse()
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual)
     if not motor and "motor" not in data and not motor_is_left(data):
@@ -176,8 +177,19 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(table in data for table in choosing_tables())
 
 
-def _machine_model(table: Any, source: str) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
-    """The machine that the table [system] names, and the unusual values of its linkage file."""
+def _names(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """The full names of all keys in a table."""
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _names(value, f"{prefix}{name}.")
+        yield prefix + name
+
+
+def _machine_model(
+    table: Any, source: str, names: Iterable[str]
+) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
+    """The machine that the table [system] names, with the parameters of these `names`, and the unusual values of its
+    linkage file."""
     if table.machine.lower().endswith(LINKAGE):
         with refusal_prefix("system.machine: ", "system.machine"):
             model, unusual = linkage_in(beside(table.machine, source))
@@ -196,7 +208,8 @@ def _machine_model(table: Any, source: str) -> tuple[MachineModel, tuple[Unusual
             return model, unusual
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
-            return MACHINES[table.machine], ()
+            with each_refusal(lambda fault: InputError(f"machine.{fault}", f"machine.{fault.key}")):
+                return MACHINES[table.machine].having(names), ()
         raise InputError(
             f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file "
             ".toml, or a file .fmu" + near_name(table.machine, MACHINES),
@@ -217,14 +230,18 @@ def linkage_lines(data: Mapping[str, Any], source: str) -> tuple[str, Mapping[st
 
 
 def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The tables of a file; the machine that ``linkage`` in [machine] names stands in [system], as every machine.
+    """The tables of a file; the machine that ``linkage`` in [machine] names stands in [system], as every machine, and
+    the friction of a pin in place of its kind.
 
     Raises
     ------
     InputError
-        for a name that is none of a linkage file, or a second machine.
+        for a name that is none of a linkage file, a second machine, or another kind.
     """
     machine = data.get("machine")
+    if isinstance(machine, Mapping) and isinstance(machine.get("pins"), Mapping):
+        machine = {**machine, "pins": _frictions(machine["pins"])}
+        data = {**data, "machine": machine}
     if not isinstance(machine, Mapping) or "linkage" not in machine:
         return data
     system, name = named_table(data, "system"), machine["linkage"]
@@ -245,6 +262,17 @@ def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
 def example(name: str = "chain-unit") -> str:
     """A packaged study file, by its name in `EXAMPLES`."""
     return packaged(EXAMPLES[name])
+
+
+def _frictions(pins: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of pins that differ, with the usual friction of the `kind` of bearing in its place."""
+    tables = dict(pins)
+    for name, entry in pins.items():
+        if isinstance(entry, Mapping) and "kind" in entry:
+            with refusal_prefix(f"machine.pins.{name}.kind: ", f"machine.pins.{name}.kind"):
+                friction = friction_of(entry["kind"])
+            tables[name] = friction | {key: value for key, value in entry.items() if key != "kind"}
+    return tables
 
 
 @cache

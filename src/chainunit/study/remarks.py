@@ -453,6 +453,12 @@ _HAPPENINGS = {
             remedy="More rods are nearer to a chain.",
         ),
         warning(
+            "bar-overloaded",
+            "The bar between the rockers passes its permitted stress: {where}.",
+            remedy="Take a thicker bar (machine.bar.diameter), or bring the load towards the middle.",
+            sizes={("N/m2", "stress"): "bar_stress_peak"},
+        ),
+        warning(
             "current-limit",
             "The motor runs into its current limit of {passed}: {where}.",
             sizes={"A": "passed"},
@@ -503,6 +509,8 @@ def _happenings(runs: StudyRuns, name: str) -> Iterator[tuple[str, str, dict[str
     is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and is_pushed:
         yield "rod-end-pushed", "", {}
+    if (stress := answers.bar_stress_peak) is not None and stress > drive.machine.p.bar.limit:
+        yield "bar-overloaded", number(stress, "N/m2", "stress"), {"bar_stress_peak": stress}
     largest = drive.motor.current_limit(drive.parameters)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current-limit", "", {}

@@ -20,7 +20,7 @@ from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
 from .file_section import MOST_FILES
-from .keys import Key, KeyTable, entry_tables, key_tables
+from .keys import NAME, Key, KeyTable, entry_tables, key_tables
 from .parts import FMU, LINKAGE, LONGEST_FILE
 from .rules import all_rules, machine_is, motor_is
 from .sections import all_sections
@@ -167,8 +167,12 @@ class _Schema:
         for key in table.keys:
             *tables, name = key.name.split(".")
             place, form = properties, self._form(key, table)
+            holder: dict[str, Any] = {}
             for part in tables:
-                place = _object(place, part)["properties"]
+                if part == NAME and not holder["additionalProperties"]:
+                    del holder["additionalProperties"]
+                holder = _object(*((holder, "additionalProperties") if part == NAME else (place, part)))
+                place = holder["properties"]
             if table.of:
                 form["description"] = f"{table.of}: {form['description']}"
             other = place.setdefault(name, form)

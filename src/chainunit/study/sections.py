@@ -14,6 +14,7 @@ from ..drives.contactor import StarDelta
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.motor import Motor
+from ..machines.across import PLACES
 from ..machines.paper_ratios import Ratios
 from ..mechanism.models import MachineModel
 from ..system import NAMES
@@ -304,7 +305,22 @@ def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
         "motor": motor.Parameters,
     }
     places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}
-    return {
+    no_width = "a load has a place across rockers that stand a width apart; give machine.width"
+    places["feed"] = {f"{side}.{place}": no_width for side in machine.sides for place in PLACES.values()}
+    sections = {
         name: FileSection(declaration, places=places.get(name, {}))
         for name, declaration in declarations.items()
-    } | all_sections()
+    }
+    if machine.layers:
+        sections["feed"] = replace(sections["feed"], completed=_of_material)
+    return sections | all_sections()
+
+
+def _of_material(feed: Any, reading: Any) -> Any:
+    """The feed whose processing force is where its material is, on each side for which the file gives no place of
+    the force."""
+    sides = reading.machine.model.sides if reading.machine else ()
+    loads = {
+        side: getattr(feed, side) for side in sides if f"{side}.force_across" not in reading.given["feed"]
+    }
+    return replace(feed, **{side: replace(x, force_across=x.across) for side, x in loads.items()})

@@ -27,6 +27,9 @@ class ChainsCapability(Capability):
             has_sides() & ~CHAINS.is_chosen,
             'is of organs that are chains; add organ = "chain", or leave it out',
         )
+        yield Rule(
+            "machine.width", CHAINS.is_chosen, "is of organs with two bars; leave it out, or the key organ"
+        )
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Chains at constant speed."""

@@ -8,6 +8,7 @@ from ...core.engines import numpy_
 from ...core.planar import Vec2
 from ...groups.chain import pins
 from ...groups.loads import Resistance
+from ...machines.across import BEARINGS
 from ...machines.api import ChainedUnit
 from ...machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
 from ...mechanism.machine import MachineState
@@ -46,7 +47,7 @@ def organ_motion(drive: Drive) -> Supplement:
             if link in (names.wall, names.web)
         },
         # their arrows would hide the arrows of the rocker
-        hidden=("crank_pin", "coupler_pin"),
+        hidden=("crank_pin", "coupler_pin", *(output for _, output, _ in BEARINGS)),
     )
 
 

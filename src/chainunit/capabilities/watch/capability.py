@@ -90,6 +90,10 @@ class WatchCapability(Capability):
             given("driveline"),
             "takes the shaft between motor and machine for rigid; leave out [driveline] or [observer]",
         )
+        for table in ("observer", "watch"):
+            yield Rule(
+                table, given("machine.pins"), "has one law of all pins; leave out it or [machine.pins]"
+            )
         yield Rule(
             "observer",
             FLYWHEEL_BEHIND,

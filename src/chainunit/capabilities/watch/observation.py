@@ -34,7 +34,7 @@ def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) ->
     passed = np.asarray(turn.crank_torque) / drive.ratio
     torque = passed + lost_torque(np, p.gear.loss, passed, speed) + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
-    values = drive.machine.by_name | of_shaft(p) | weights(signals)
+    values = drive.machine.in_plane | of_shaft(p) | weights(signals)
     values |= tuning(table, feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}
@@ -107,7 +107,7 @@ def false_imbalance_of(
     loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
     feed = Layout(type(usual)).from_names(loads, usual)
     machine_values = {name.removeprefix("machine."): x for name, x in values.items()}
-    parameters = drive.machine.by_name | machine_values | usual_loads(feed)
+    parameters = drive.machine.in_plane | machine_values | usual_loads(feed)
     parameters |= {"gear.loss": drive.fmu_parameters.gear.loss}
     return false_imbalance(parameters, list(machine_values), estimates.covariance, crank_speed)
 

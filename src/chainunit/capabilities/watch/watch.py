@@ -317,7 +317,7 @@ def _parameters(
 ) -> dict[str, float]:
     """The parameters of the observer by name, by the `begin` of the recording."""
     recording, columns = begin.recording, begin.recording.columns
-    values = dict(drive.machine.by_name)
+    values = dict(drive.machine.in_plane)
     if is_of_shaft(columns):
         ratio, torque = 1.0, rms(columns["crank.tau"])
         values |= {

@@ -11,14 +11,7 @@ from ...core.quantities import Layout, Value, declaration, declared_class, field
 from ...mechanism.assur import PRISMATIC, REVOLUTE
 from ...mechanism.driver_ports import AddedInertia
 from ...mechanism.models import names_of
-from ..parts import Force, GuideLaw, Pin
-
-
-@declaration
-class PinLaw(Pin):
-    """The pins with their damping."""
-
-    damping: Value = quantity("N.m.s/rad", "viscous damping of each", default=0.0, min=0.0, tunable=True)
+from ..parts import Force, GuideLaw, PinLaw
 
 
 @declaration

@@ -15,16 +15,11 @@ from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
 from ...core.quantities import Layout, Variable
 from ...mechanism.expressions import CONSTANTS, WORDS, expression
+from ..differing import PLAIN, friction_of
 from .declarations import LOSSES, CommonParameters
 from .entries import EntryReader
 from .loads import MOTION
 from .names import words_in
-
-PLAIN, ROLLING = "plain", "rolling"
-"""Kinds of bearings in a pin."""
-ROLLING_FRICTION = 0.0015
-"""Usual coefficient of friction of a rolling bearing, on half of its mean diameter (makers' catalogues: 0.0010 to
-0.0024)."""
 
 
 class ParameterReader(EntryReader):
@@ -84,7 +79,9 @@ class ParameterReader(EntryReader):
                     self.fault(key, f"has the name of a key of [{table}]; give the joint another name")
                     continue
                 self.keys(key, entry, (*shared, "kind") if table == "pins" else (*shared,))
-                values = shared | self.bearing(key, entry)
+                values = dict(shared)
+                with self.at(f"{key}.kind"):
+                    values |= friction_of(entry.get("kind", PLAIN))
                 for variable in Layout(declared).variables:
                     if (value := entry.get(variable.name)) is not None:
                         with self.at(f"{key}.{variable.name}"):
@@ -92,13 +89,6 @@ class ParameterReader(EntryReader):
                             values[variable.name] = self.admitted(full, value)
                 laws.setdefault(table, {})[name] = values
         return laws
-
-    def bearing(self, key: str, entry: Mapping[str, Any]) -> dict[str, float]:
-        """The usual friction of the `kind` of bearing that an entry names."""
-        kind = entry.get("kind", PLAIN)
-        if kind not in (PLAIN, ROLLING):
-            self.fault(f"{key}.kind", f"is {shown(kind)}; must be {PLAIN} or {ROLLING}")
-        return {"friction": ROLLING_FRICTION} if kind == ROLLING else {}
 
     def about(self) -> dict[str, str]:
         """Who made the machine, as its FMUs say it."""
