@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 from event_tables import event_line
+from records import changed
 
 from chainunit import InputError
 from chainunit.core.engines import MATH
@@ -252,25 +253,18 @@ def test_a_load_that_holds_the_motor_in_star_is_named(tmp_path):
 def test_an_inertia_beyond_the_standard_is_a_warning(tmp_path):
     """0.04 P^0.9 p^2.5 of IEC 60034-12, by hand; it stood in the list of what is not checked alone."""
     study = run_study(parse(STAR % "3 s"), tmp_path)
-    plate = study.setup.plate.nameplate
+    plate, whole = study.setup.plate.nameplate, study.setup.drive
     most = 0.04 * (plate.power / 1e3) ** 0.9 * (plate.poles / 2.0) ** 2.5
-    inertia = (
-        float(np.mean(study.runs.steady["machine.J"])) + study.setup.drive.fmu_parameters.rotor.J - plate.J
-    )
+    inertia = float(np.mean(study.runs.steady["machine.J"])) + whole.fmu_parameters.rotor.J - plate.J
     for added, expected in (
         (0.0, inertia > most),
         (1.01 * most - inertia, True),
         (0.99 * most - inertia, False),
     ):
-        study.setup.drive = dataclasses.replace(
-            study.setup.drive, added_inertia=study.setup.drive.added_inertia + added
-        )
-        study.findings.remarks.clear()
-        _on_inertia(study)
-        assert [remark.code for remark in study.findings.remarks] == ["heavy-to-start"] * expected
-        study.setup.drive = dataclasses.replace(
-            study.setup.drive, added_inertia=study.setup.drive.added_inertia - added
-        )
+        drive = dataclasses.replace(whole, added_inertia=whole.added_inertia + added)
+        heavier = changed(study, drive=drive, remarks=[])
+        _on_inertia(heavier)
+        assert [remark.code for remark in heavier.findings.remarks] == ["heavy-to-start"] * expected
 
 
 @pytest.mark.slow

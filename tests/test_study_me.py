@@ -85,7 +85,7 @@ def test_the_coupling_opens_at_the_instant_at_which_its_torque_is_reached(studie
         assert 0.0 <= times[name] - times["me"] < WAYS[name][1] + 1e-3
     coasting = studies["me"].runs.series["blocked_coasting"]
     assert float(coasting["machine.w"][0]) == pytest.approx(
-        float(studies["me"].runs["blocked"]["machine.w0"][-1])
+        float(studies["me"].runs.series["blocked"]["machine.w0"][-1])
     )
 
 

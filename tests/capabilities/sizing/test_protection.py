@@ -411,7 +411,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     assert all(each.coupling_torque == pytest.approx(each.quasi_static, rel=1e-12) for each in starts)
     transient = max(each.coupling_transient for each in starts)
     # the rows of the start-up are two milliseconds apart and miss some of the peak
-    assert 0.9 * transient < largest(on_line.runs, "start_up") < 1.001 * transient
+    assert 0.9 * transient < largest(on_line, "start_up") < 1.001 * transient
     assert transient > max(setting.overloads.values()) > setting.least > 1.2 * setting.start
     words = sentence(on_line)
     assert words.startswith("Recommended torque limiter: ") and "puts on it by load and acceleration" in words
@@ -518,7 +518,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     # the study reads the torque at its communication steps: one that just reaches the setting may open there or not
     near = {n for n in opened if trial.runs.answers[n].crank_torque_peak < 1.02 * numbers.setting}
     assert opened - near == set(each.opens) - near and opened - near
-    assert largest(trial.runs, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
+    assert largest(trial, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
     assert not [warning for warning in trial.findings.warnings if warning.code == "coupling-opens-in-start"]
 
 
@@ -707,10 +707,7 @@ def test_a_coupling_that_starts_open_ends_the_study(on_line, tmp_path, monkeypat
     study = ran(heavy() + coupling, tmp_path, monkeypatch)
     message = str(study.findings.failure)
     assert "opens in the start-up" in message and "held" not in message
-    assert (
-        f"up to {largest(on_line.runs, 'start_up'):.0f} N m on it" in message
-        and "milliseconds" not in message
-    )
+    assert f"up to {largest(on_line, 'start_up'):.0f} N m on it" in message and "milliseconds" not in message
     # a setting that load and acceleration keep, through rigid shafts
     coupling = f"[coupling]\ntrip_torque = {sizing_of(on_line).setting.least}\n"
     message = str(ran(heavy() + coupling, tmp_path / "least", monkeypatch).findings.failure)
@@ -1099,7 +1096,7 @@ def test_a_start_under_load_opens_a_given_coupling(tmp_path):
     study = run_study(config.parse(starts + run + "[coupling]\ntrip_torque = 46\n"), tmp_path)
     assert study.findings.failure is None
     opened = {n for n, a in study.runs.answers.items() if a.coupling_trip_time is not None}
-    assert opened == {"start_loaded_right"} and largest(study.runs, "start_up") < 46.0
+    assert opened == {"start_loaded_right"} and largest(study, "start_up") < 46.0
     (warning,) = [warning for warning in study.findings.warnings if warning.code == "coupling-opens-in-start"]
     assert "start with all feed on the right" in warning.text
     study = run_study(config.parse(starts + run + "[coupling]\ntrip_torque = 60\n"), tmp_path / "higher")
@@ -1116,8 +1113,8 @@ def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, mon
     sized = run_study(
         config.parse(empty + "[sizing]\ncandidates = 1\n[run]\nturns = 2\n"), tmp_path / "sized"
     )
-    first = largest(sized.runs, "start_up", end=sized.runs.started.rig.fed_from)
-    fed = largest(sized.runs, "start_up", sized.runs.started.rig.fed_from, sized.runs.steady_begin)
+    first = largest(sized, "start_up", end=sized.runs.started.rig.fed_from)
+    fed = largest(sized, "start_up", sized.runs.started.rig.fed_from, sized.runs.steady_begin)
     assert sized.findings.failure is None and sizing_of(sized).setting.least_in_running < min(first, fed)
     assert fed <= sizing_of(sized).setting.start < first
     assert transient_of_starts(sized).transient == pytest.approx(first)
