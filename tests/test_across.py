@@ -380,11 +380,12 @@ def test_a_study_shows_the_corner_that_a_lump_overloads(tmp_path):
     text = PLACED.replace("[feed]", "[machine.bar]\ndiameter = '40 mm'\nlimit = '50 MPa'\n[feed]")
     (tmp_path / "study.toml").write_text(text, "utf-8")
     study = Study.from_file(tmp_path / "study.toml").run().record
-    jam, run = study.answers["jam_left"], study.runs["jam_left"]
+    jam, run = study.runs.answers["jam_left"], study.runs.series["jam_left"]
     assert jam.back_pivot_peak > 1.5 * jam.front_pivot_peak
     peak = float(np.max(np.hypot(run["machine.back.pivot.fx"], run["machine.back.pivot.fy"])))
     assert jam.back_pivot_peak == pytest.approx(peak)
-    (remark,) = (remark for remark in study.remarks if remark.code == "bar-overloaded")
+    (remark,) = (remark for remark in study.findings.remarks if remark.code == "bar-overloaded")
     assert (
-        remark.runs == ("jam_left",) and jam.bar_stress_peak > 5e7 > study.answers["steady"].bar_stress_peak
+        remark.runs == ("jam_left",)
+        and jam.bar_stress_peak > 5e7 > study.runs.answers["steady"].bar_stress_peak
     )

@@ -97,7 +97,7 @@ def test_each_key_of_a_table_is_refused_in_toml_forms(table, shift):
         return "switch" if key.variable is not None and key.variable.type == "Boolean" else key.sort
 
     lines = [
-        f"{key.name} = {value if value != right.get(sort(key)) and key.name != 'date' else 3}"
+        f"{key.name.replace('NAME', 'A')} = {value if value != right.get(sort(key)) and key.name != 'date' else 3}"
         for key, value in zip(keys, wrong, strict=True)
     ]
     text = _head(table) + "\n".join(lines)

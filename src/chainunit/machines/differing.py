@@ -29,14 +29,18 @@ def with_pins(machine: InverseMachine, names: frozenset[str]) -> InverseMachine:
     InputError
         for a pin that the machine does not have.
     """
-    pins = {name.split(".")[1]: name for name in sorted(names) if name.startswith("pins.")}
-    for pin, name in pins.items():
-        if pin not in machine.pin_names:
-            raise InputError(
-                f"pins.{pin}: is no pin of this machine{near_name(pin, machine.pin_names)}; its pins are "
-                f"{', '.join(machine.pin_names)}",
-                name,
-            )
+    pins = sorted({name.split(".")[1] for name in names if name.startswith("pins.")})
+    faults = [
+        InputError(
+            f"pins.{pin}: is no pin of this machine{near_name(pin, machine.pin_names)}; its pins are "
+            f"{', '.join(machine.pin_names)}",
+            f"pins.{pin}",
+        )
+        for pin in pins
+        if pin not in machine.pin_names
+    ]
+    if faults:
+        raise InputError.joined(faults)
     return _differing(machine, tuple(pin for pin in machine.pin_names if pin in pins)) if pins else machine
 
 

@@ -172,8 +172,9 @@ def with_inertia(tables: DriveTables, drive: Drive, added: float) -> Drive:
     each peak of the load, where the flywheel has to slow down to give its energy: with one there is none, unless the
     file gives it, or a droop in its place."""
     drive = replace(drive, added_inertia=added)
-    kept = SLIP in tables.given or tables.starter.droop
-    if not added or tables.start != "inverter" or drive.rated_current is None or kept:
+    if not added or tables.start != "inverter" or drive.rated_current is None:
+        return drive
+    if SLIP in tables.given or tables.starter.droop:
         return drive
     inverter = replace(drive.parameters.inverter, slip=0.0)
     return replace(drive, parameters=replace(drive.parameters, inverter=inverter))

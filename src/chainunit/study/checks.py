@@ -39,7 +39,10 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
     with faults.collected():
         parts = parts_of(data, source)
     usable_parts = parts or Parts(MACHINES["ChamberForces"], MOTORS["DcMotor"])
-    readable = data if parts else {name: x for name, x in data.items() if name not in _OF_MACHINE}
+    readable: Mapping[str, Any] = {name: x for name, x in data.items() if name not in _OF_MACHINE}
+    if parts:
+        faults.add(parts.faults)
+        readable = without(data, parts.faults)
     places = {
         f"{table}.{key}": x
         for table, section in usable_parts.sections.items()

@@ -59,6 +59,7 @@ from .parts import (
     linkage_lines,
     motor_is_left,
     over_example,
+    with_frictions,
     with_linkage,
 )
 from .proposal import DriveRequest, motor_choice
@@ -290,8 +291,9 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
 def _of_tables(data: Mapping[str, Any], source: str) -> Config:
     """See `of_tables`. Faults of single values are refused together with those of the whole study that do not depend
     on them."""
-    in_system = with_linkage(data)
+    in_system, kind_faults = with_frictions(with_linkage(data))
     parts, faults = check_values(in_system, source)
+    faults = [*kind_faults, *faults]
     if parts is None:
         # a key that the file has, not the one that stands for it
         same = in_system.get("system") is data.get("system")

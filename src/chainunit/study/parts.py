@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from functools import cache, lru_cache
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from ..core.errors import Faults, InputError, each_refusal, near_name, refusal_prefix, shown
+from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..core.inputs import TOML, file_text
 from ..drives.motor import FOREIGN, Motor
 from ..machines.differing import friction_of
@@ -81,6 +81,8 @@ class Parts:
     """file of a motor that is a foreign FMU; empty for another motor"""
     unusual: tuple[UnusualValue, ...] = ()
     """the values of an unusual size in the linkage file of the machine"""
+    faults: tuple[InputError, ...] = ()
+    """the refusals of further parameters that the machine cannot have"""
 
     @property
     def named_motor(self) -> str:
@@ -158,9 +160,10 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
         if _is_fmu(motor):
             beside(motor, source)
     with faults.collected():
-        machine, unusual = _machine_model(table, source, _names(named_table(data, "machine")))
+        machine, unusual = _machine_model(table, source)
     faults.refuse()
-    parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual)
+    machine, wrong = _with_further(machine, [*_names(data.get("machine"))])
+    parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual, faults=wrong)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
     if not motor:
@@ -177,19 +180,30 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(table in data for table in choosing_tables())
 
 
-def _names(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    """The full names of all keys in a table."""
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _names(value, f"{prefix}{name}.")
-        yield prefix + name
+def _names(value: Any, prefix: str = "") -> Iterator[str]:
+    """The full names of all keys in a table; a value that is none has no names."""
+    if isinstance(value, Mapping):
+        for name, entry in value.items():
+            yield prefix + name
+            yield from _names(entry, f"{prefix}{name}.")
 
 
-def _machine_model(
-    table: Any, source: str, names: Iterable[str]
-) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
-    """The machine that the table [system] names, with the parameters of these `names`, and the unusual values of its
-    linkage file."""
+def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineModel, tuple[InputError, ...]]:
+    """The machine with its further parameters among `names`, and the refusals of those that it cannot have."""
+    try:
+        return machine.having(names), ()
+    except InputError as error:
+        keys = tuple(fault.key for fault in error.faults)
+        left = [name for name in names if not f"{name}.".startswith(tuple(f"{key}." for key in keys))]
+        machine, more = _with_further(machine, left)
+        return machine, (
+            *(InputError(f"machine.{fault}", f"machine.{fault.key}") for fault in error.faults),
+            *more,
+        )
+
+
+def _machine_model(table: Any, source: str) -> tuple[MachineModel, tuple[UnusualValue, ...]]:
+    """The machine that the table [system] names, and the unusual values of its linkage file."""
     if table.machine.lower().endswith(LINKAGE):
         with refusal_prefix("system.machine: ", "system.machine"):
             model, unusual = linkage_in(beside(table.machine, source))
@@ -208,8 +222,7 @@ def _machine_model(
             return model, unusual
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
-            with each_refusal(lambda fault: InputError(f"machine.{fault}", f"machine.{fault.key}")):
-                return MACHINES[table.machine].having(names), ()
+            return MACHINES[table.machine], ()
         raise InputError(
             f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file "
             ".toml, or a file .fmu" + near_name(table.machine, MACHINES),
@@ -230,18 +243,14 @@ def linkage_lines(data: Mapping[str, Any], source: str) -> tuple[str, Mapping[st
 
 
 def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The tables of a file; the machine that ``linkage`` in [machine] names stands in [system], as every machine, and
-    the friction of a pin in place of its kind.
+    """The tables of a file; the machine that ``linkage`` in [machine] names stands in [system], as every machine.
 
     Raises
     ------
     InputError
-        for a name that is none of a linkage file, a second machine, or another kind.
+        for a name that is none of a linkage file, or a second machine.
     """
     machine = data.get("machine")
-    if isinstance(machine, Mapping) and isinstance(machine.get("pins"), Mapping):
-        machine = {**machine, "pins": _frictions(machine["pins"])}
-        data = {**data, "machine": machine}
     if not isinstance(machine, Mapping) or "linkage" not in machine:
         return data
     system, name = named_table(data, "system"), machine["linkage"]
@@ -264,15 +273,21 @@ def example(name: str = "chain-unit") -> str:
     return packaged(EXAMPLES[name])
 
 
-def _frictions(pins: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables of pins that differ, with the usual friction of the `kind` of bearing in its place."""
-    tables = dict(pins)
+def with_frictions(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[InputError]]:
+    """The tables of a file with the usual friction of a pin that differs in place of its kind of bearing, and the
+    refusals of kinds that are none."""
+    machine, faults = data.get("machine"), Faults()
+    if not isinstance(machine, Mapping) or not isinstance(machine.get("pins"), Mapping):
+        return data, []
+    pins = dict(machine["pins"])
     for name, entry in pins.items():
         if isinstance(entry, Mapping) and "kind" in entry:
-            with refusal_prefix(f"machine.pins.{name}.kind: ", f"machine.pins.{name}.kind"):
+            friction: Mapping[str, float] = {}
+            key = f"machine.pins.{name}.kind"
+            with faults.collected(), refusal_prefix(f"{key}: ", key):
                 friction = friction_of(entry["kind"])
-            tables[name] = friction | {key: value for key, value in entry.items() if key != "kind"}
-    return tables
+            pins[name] = {**friction, **{key: value for key, value in entry.items() if key != "kind"}}
+    return {**data, "machine": {**machine, "pins": pins}}, faults.errors
 
 
 @cache
