@@ -117,7 +117,7 @@ def study_of(name, folder, text=""):
         machines = str(EXAMPLES / "loads").replace("\\", "/")
         (folder / f"{name}.toml").write_text(text.replace("loads/", f"{machines}/"), "utf-8")
         arguments = [str(folder / f"{name}.toml")]
-    process = chainunit("study", *arguments, "-o", str(folder / "out"))
+    process = chainunit("study", *arguments, "-o", str(folder / "out"), cwd=folder)
     assert process.returncode == 0, process.stderr
     return ResultEntries(json.loads((folder / "out" / "result.json").read_text("utf-8")))
 

@@ -480,7 +480,7 @@ def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]
             "weight": Weight(p.g),
             **processing,
             "stop": Block("rocker", u.stop),
-            "pins": PinLosses(p.pin, p.joint_damping, laws_of(p, PIN_NAMES)),
+            "pins": PinLosses(p.pin, p.joint_damping, laws_of(getattr(p, "pins", None), PIN_NAMES)),
         },
     )
 

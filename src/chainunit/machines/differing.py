@@ -60,20 +60,15 @@ def _differing(machine: InverseMachine, pins: tuple[str, ...]) -> InverseMachine
     )
 
 
-def laws_of(p: Any, pin_names: Mapping[str, Joint]) -> dict[Joint, Any]:
-    """The laws of the pins that differ, by joint, of a machine with the parameters `p`."""
-    pins = getattr(p, "pins", None)
+def laws_of(pins: Any, pin_names: Mapping[str, Joint]) -> dict[Joint, Any]:
+    """The laws of the `pins` that differ, by joint, from their parameters; empty for None."""
     return {} if pins is None else {pin_names[pin]: law for pin, law in vars(pins).items()}
 
 
-def completed(machine: MachineModel, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The `values` of parameters of a machine by name. What they leave out of the law of a pin is as that of all
-    pins."""
-    layout = machine.parameter_layout
-    start = layout.by_name(machine.Parameters())
-    laws = [name for name in layout.names if machine.pin_names and name.startswith("pins.")]
-    sources = {name: SHARED[name.rpartition(".")[2]] for name in laws}
-    return {name: values.get(source, start[source]) for name, source in sources.items()} | dict(values)
+def shared_by_law(machine: MachineModel) -> dict[str, str]:
+    """By parameter of a pin that differs, the parameter of all pins that stands for it if it is left out."""
+    laws = [name for name in machine.parameter_layout.names if name.startswith("pins.")]
+    return {name: SHARED[name.rpartition(".")[2]] for name in laws if machine.pin_names}
 
 
 def friction_of(kind: Any) -> dict[str, float]:

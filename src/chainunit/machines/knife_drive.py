@@ -243,7 +243,7 @@ def _linkage(xp: Any, p: Any, u: Any) -> Linkage:
             "weight": Weight(p.g),
             "cut": Cut("blade", u.cut_force, p.stack),
             "push": Push("blade", Vec2(u.blade.fx, u.blade.fy)),
-            "pins": PinLosses(p.pin, p.joint_damping, laws_of(p, PIN_NAMES)),
+            "pins": PinLosses(p.pin, p.joint_damping, laws_of(getattr(p, "pins", None), PIN_NAMES)),
         },
     )
 

@@ -15,7 +15,7 @@ from ..core.errors import InputError, check_kind, shown
 from ..core.quantities import Variable, complaint
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine, MachineModel
-from .differing import completed
+from .differing import shared_by_law
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,7 +65,13 @@ class Machine:
         check_kind("parameters", parameters, Mapping | None, _NAMED)
         values = {**(parameters or {}), **values}
         self.model = model.having(values)
-        self.p: Any = self._checked(completed(self.model, values), self.model.Parameters())
+        self.p: Any = self._checked(self._completed(values), self.model.Parameters())
+
+    def _completed(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The `values` by name, with the values of all pins for what they leave out of the law of one."""
+        start = self.model.parameter_layout.by_name(self.model.Parameters())
+        shared = shared_by_law(self.model).items()
+        return {name: values.get(source, start[source]) for name, source in shared} | dict(values)
 
     def _checked(self, values: Mapping[str, Any], base: Any) -> Any:
         """The checked parameters `base` with other values by name."""
@@ -80,9 +86,9 @@ class Machine:
     def replace(self, parameters: Mapping[str, Any] | None = None, /, **values: Any) -> Self:
         """The same machine with new values of some parameters; the arguments are as of the constructor."""
         machine, values = copy.copy(self), {**(parameters or {}), **values}
-        machine.model, base = self.model.having(values), self.p
+        machine.model, base = self.model.having([*values]), self.p
         if machine.model is not self.model:
-            values, base = completed(machine.model, self.by_name | values), machine.model.Parameters()
+            values, base = machine._completed(self.by_name | values), machine.model.Parameters()
         machine.p = machine._checked(values, base)
         return machine
 

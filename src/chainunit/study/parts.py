@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from functools import cache, lru_cache
 from pathlib import Path
@@ -162,7 +162,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     with faults.collected():
         machine, unusual = _machine_model(table, source)
     faults.refuse()
-    machine, wrong = _with_further(machine, [*_names(data.get("machine"))])
+    machine, wrong = _with_further(machine, _names(data, "machine"))
     parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual, faults=wrong)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
@@ -180,12 +180,14 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(table in data for table in choosing_tables())
 
 
-def _names(value: Any, prefix: str = "") -> Iterator[str]:
-    """The full names of all keys in a table; a value that is none has no names."""
-    if isinstance(value, Mapping):
-        for name, entry in value.items():
-            yield prefix + name
-            yield from _names(entry, f"{prefix}{name}.")
+def _names(data: Mapping[str, Any], table: str) -> list[str]:
+    """The names of all keys in a table of a file, those of its inner tables in full; none of what is no table."""
+    names, tables = [], [("", data.get(table))]
+    for prefix, inner in tables:
+        if isinstance(inner, Mapping):
+            names += [prefix + name for name in inner]
+            tables += [(f"{prefix}{name}.", entry) for name, entry in inner.items()]
+    return names
 
 
 def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineModel, tuple[InputError, ...]]:
