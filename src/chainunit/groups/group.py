@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import zip_longest
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .block import GroupMatrix
 from .body import Bar, Load
-from .joints import SLIDES, UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Seat, Third
+from .joints import SLIDES, UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Rail, Seat, Third
 
 
 class SolvedGroup:
@@ -86,6 +86,15 @@ def _rate(z: Sequence[Any], link: int) -> Third:
     return Vec2(x, y), turn
 
 
+class Outline(NamedTuple):
+    """A closed curve that a picture shows, fixed to a link: the pin from which its points count, the `frame` in which
+    they do, of which the direction matters, and their coordinates [m]."""
+
+    pin: str
+    frame: Rail
+    points: tuple[Any, Any]
+
+
 class Group:
     """A group as data."""
 
@@ -116,6 +125,11 @@ class Group:
     def circles(self) -> tuple[tuple[str, str], ...]:
         """The circles that a picture of it shows, each by the pins at its centre and on its rim."""
         return ()
+
+    @property
+    def outlines(self) -> Mapping[str, Outline]:
+        """The curves that a picture of it shows, by name."""
+        return {}
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """Numbers that follow from its lengths; `before` gives the linkage before the group at a crank angle

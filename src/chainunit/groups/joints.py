@@ -50,7 +50,7 @@ class Rail(NamedTuple):
 
 
 class LinkageInMotion(Protocol):
-    """A linkage at one position: its `pins` with points, and its `links`, by name."""
+    """A linkage at one position: its `pins` with points, its `links`, and its `slides`, by name."""
 
     @property
     def pins(self) -> Mapping[str, Motion]:
@@ -59,6 +59,10 @@ class LinkageInMotion(Protocol):
     @property
     def links(self) -> Mapping[str, Link]:
         """Links by name."""
+
+    @property
+    def slides(self) -> Mapping[Joint, Slide]:
+        """The motion in each joint that slides."""
 
 
 class JointData(Protocol):
@@ -169,12 +173,15 @@ class GuideData(NamedTuple):
 
 class Slide(NamedTuple):
     """The motion in a sliding joint: the direction `d` of its line, the way `s` of the link that its reaction acts on
-    along it, and the derivatives of that by q [m, m/rad, m/rad2]."""
+    along it, and the derivatives of that by q [m, m/rad, m/rad2]. In a contact, which has no way, `turn` and `growth`
+    are the derivatives of the angle of its normal and of the lever of that about the start of the link."""
 
     d: Vec2
     s: Any
     s1: Any
     s2: Any
+    turn: Any = 0.0
+    growth: Any = 0.0
 
 
 class GuideForce(Vec2):

@@ -39,6 +39,7 @@ from .body import Bar, Mass
 from .group import Group, SolvedGroup
 from .joints import JointData, LinkageInMotion
 from .legs import LEGS, Leg, LegAt, PlacedLeg, RodLeg, rods_at
+from .series import series_of, values_of
 
 SAMPLES = 20
 """Number of crank angles at which a triad is followed once around."""
@@ -159,14 +160,7 @@ class Triad(Group):
                 pose._replace(theta=pose.theta - self.turns * q)
                 for pose, q in zip(poses, angles, strict=True)
             ]
-        series = []
-        for values in zip(*poses, strict=True):
-            series.append(sum(values) / SAMPLES)
-            for n in range(1, HARMONICS + 1):
-                for wave in (math.cos, math.sin):
-                    series.append(
-                        sum(v * (2.0 / SAMPLES * wave(n * q)) for v, q in zip(values, angles, strict=True))
-                    )
+        series = [x for values in zip(*poses, strict=True) for x in series_of(values, angles, HARMONICS)]
         # the misfit as in a run, at angles halfway between the samples
         misfit, first, least = 0.0, None, None
         for q in angles:
@@ -184,13 +178,7 @@ class Triad(Group):
 def pose_of_series(series: Sequence[Any], cos: Any, sin: Any) -> Pose:
     """The pose that the series gives, from cosine and sine of the crank angle."""
     size = 2 * HARMONICS + 1
-    sums = [series[k * size] for k in range(3)]
-    c, s = cos, sin
-    for n in range(1, HARMONICS + 1):
-        for k in range(3):
-            sums[k] = sums[k] + series[k * size + 2 * n - 1] * c + series[k * size + 2 * n] * s
-        c, s = c * cos - s * sin, s * cos + c * sin
-    return Pose(*sums)
+    return Pose(*values_of([series[k * size : (k + 1) * size] for k in range(3)], cos, sin))
 
 
 def requirements(legs: tuple[str, ...], assembly: tuple[str, ...]) -> tuple[Requirement, Requirement]:

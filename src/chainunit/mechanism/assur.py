@@ -28,7 +28,7 @@ class FreeLinksError(InputError):
 
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
-    contain. `alone` is the kind of the group that a single link forms by it and a revolute joint."""
+    contain. `alone` is the kind of the group that a single link forms by it and a joint of one of the kinds `seats`."""
 
     name: str
     kind: str
@@ -37,6 +37,7 @@ class JointOf(NamedTuple):
     third: str = ""
     equations: int = 2
     alone: str = ""
+    seats: tuple[str, ...] = (REVOLUTE,)
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -54,8 +55,8 @@ class AssurGroup(NamedTuple):
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
-    the joints are the outer ones of the legs, then their inner ones. Of a single link the revolute one
-    stands first.
+    the joints are the outer ones of the legs, then their inner ones. Of a single link the pin
+    or the guide stands first.
     """
 
     kind: str
@@ -255,8 +256,8 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
         link: [j for j in joints if link in (j.on, j.by) and j.other_link(link) in placed] for link in part
     }
     if len(part) == 1 and len(outer[part[0]]) == 2:
-        pair = sorted(outer[part[0]], key=lambda joint: joint.kind != REVOLUTE)
-        if pair[0].kind == REVOLUTE and pair[1].alone and {*pair[1].links} <= {*part} | placed:
+        pair = sorted(outer[part[0]], key=lambda joint: bool(joint.alone))
+        if pair[1].alone and pair[0].kind in pair[1].seats and {*pair[1].links} <= {*part} | placed:
             return AssurGroup(pair[1].alone, part, tuple(pair))
     if len(part) == 2 and len(inner) == 1 and all(len(link_joints) == 1 for link_joints in outer.values()):
         return _dyad(part, inner[0], {link: link_joints[0] for link, link_joints in outer.items()})

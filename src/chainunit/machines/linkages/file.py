@@ -33,9 +33,10 @@ from .checks import (
     study_fault,
 )
 from .entries import is_among, is_given, sized, usual_distance, usual_inertia
-from .further import BACK, LawCourse, splines
+from .further import BACK
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
+from .laws import LawCourse, splines
 from .load_entries import LoadReader
 from .model import machine_of
 from .names import model_name, name_fault, words_in
@@ -47,14 +48,14 @@ from .way import WHOLE
 
 TABLES = (
     "title", "name", "about", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "drivers",
-    "links", "joints", "loads", "pins", "guides", "start", "groups",
+    "links", "joints", "loads", "pins", "guides", "cams", "start", "groups",
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _LAW_PLACES = 96
 """Places of the first driver at which a law is checked."""
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
-_DRIVES = ("belt", "chain", "cam", "rack", "rolling")
+_DRIVES = ("belt", "chain", "rolling")
 """Kinds of joints of other programs."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 _FURTHER_KEYS = (*_DRIVER_KEYS, "phi", "by", "start")
@@ -352,7 +353,7 @@ class _LinkageReader(LoadReader):
         kind_name = kind_of(table)
         kind = KINDS.get(str(kind_name))
         if kind is None:
-            drive = "; a belt or a cam between links is not possible yet" * (kind_name in _DRIVES)
+            drive = "; a belt between links is not possible yet" * (kind_name in _DRIVES)
             possible = " or ".join(f'"{possible_name}"' for possible_name in KINDS)
             self.fault(f"{key}.type", f"is {shown(kind_name)}; must be {possible}{drive}")
             return None
@@ -565,6 +566,8 @@ class _LinkageReader(LoadReader):
                 low, high = (f"{math.degrees(end):g} deg" for end in span)
                 raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)
+        for joint in joints:
+            self.all(KINDS[joint["type"]].law_faults(joint, number, values, splines(tables, span is None)))
         for entry in drivers:
             if "law" in entry:
                 self.law(entry, value, values, splines(tables, span is None), span)

@@ -259,8 +259,8 @@ class GearKind(SingleLinkKind):
             )
         return float(rate)
 
-    def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
-        """The wheel `link`, which turns on the arm in its `pin` and meshes with another wheel in the gear `joint`. If
+    def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
+        """The wheel `link`, which turns on the arm in its pin `first` and meshes with another wheel in the gear `joint`. If
         the other wheel is itself driven by a gear on the same arm, it is an idler: the turn then follows from the
         wheel that drives it, by the product of both ratios."""
         other, arm = joint.other_link(link), joint.third
@@ -268,7 +268,7 @@ class GearKind(SingleLinkKind):
         rolling = Rolling(_moving(arm), _moving(other), _ratio(joint, link))
         if idler is not None and idler.rolling.arm == rolling.arm:
             rolling = idler.rolling._replace(ratio=rolling.ratio * idler.rolling.ratio)
-        bar, mesh = parts.hung(link, pin), parts.pin(arm, joint.name)
+        bar, mesh = parts.hung(link, first), parts.pin(arm, joint.name)
         parts.receive(joint, mesh, link)
         structure, centre = parts.structure, parts.pin(other, joint.at(other))
         return GearedLink(

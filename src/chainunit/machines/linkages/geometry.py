@@ -17,6 +17,7 @@ from ...groups.body import Mass
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import value_of
 from .joint_kind import Entry, JointEntry
+from .joint_kinds import SINGLES
 from .structure import CYLINDER, LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
@@ -112,8 +113,8 @@ class LinkGeometry:
 
 
 def start_sides(geometry: LinkGeometry) -> dict[str, float]:
-    """The assembly mode of each dyad that has two, by its first link, from the rough poses of the structure; the
-    `geometry` has numbers.
+    """The assembly mode of each dyad that has two, by its first link, and what the start tells of single links, from the
+    rough poses of the structure; the `geometry` has numbers.
 
     Raises
     ------
@@ -131,13 +132,16 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
         link, start = joint.by
         return place(link, joint.toward) - place(link, start)
 
-    sides = {}
+    sides: dict[str, float] = {}
     for group in structure.groups:
+        if group.kind in SINGLES:
+            first, joint = (structure.joints[joint.name] for joint in group.joints)
+            sides |= SINGLES[group.kind].start(first, joint, place, line)
         if group.kind not in TWO_WAYS:
             continue
-        first, last = group.links[0], group.links[-1]
+        one, last = group.links[0], group.links[-1]
         outer, inner, other = (structure.joints[joint.name] for joint in group.joints)
-        start = place(outer.other_link(first), outer.at(outer.other_link(first)))
+        start = place(outer.other_link(one), outer.at(outer.other_link(one)))
         if group.kind == "RRP":
             value = (place(last, inner.at(last)) - start).dot(line(other))
         else:
@@ -148,9 +152,9 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
                 value = (end - start).cross(place(last, inner.at(last)) - start)
         if abs(value) < 1e-9:
             raise InputError(
-                f"the start pose does not tell how {first} is assembled: it stands in a dead position; give the "
+                f"the start pose does not tell how {one} is assembled: it stands in a dead position; give the "
                 "start at another place of the driver",
                 key="start",
             )
-        sides[first] = math.copysign(1.0, value)
+        sides[one] = math.copysign(1.0, value)
     return sides

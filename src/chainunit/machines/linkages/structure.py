@@ -89,20 +89,21 @@ def groups_of(
     ]
     first = int(driving[0] in cylinders)
     groups[first:first] = alone
-    triad = next((group for group in groups if group.kind == "triad"), None)
-    if triad is not None and any(entry.is_free for entry in drivers):
+    followed = next((group for group in groups if group.kind in FOLLOWED), None)
+    if followed is not None:
+        (link, *others), kind = followed.links, FOLLOWED[followed.kind]
+        who = f"the links {', '.join((link, *others))} form" if others else f"the link {link} forms"
+    if followed is not None and any(entry.is_free for entry in drivers):
         raise InputError(
-            f"the links {', '.join(triad.links)} form a triad, and two drivers are inputs: a triad needs one; give "
+            f"{who} {kind}, and two drivers are inputs: {kind} needs one; give "
             'the other one a law, phi = "..."',
-            key=triad.links[0],
+            key=link,
         )
-    if triad is not None and (driver.linear or driver.swings):
+    if followed is not None and (driver.linear or driver.swings):
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
         raise InputError(
-            f"the links {', '.join(triad.links)} form a triad, and the driver {moves}: a triad needs a driver that "
-            f"{remedy} drive another link",
-            key=triad.links[0],
+            f"{who} {kind}, and the driver {moves}: {kind} needs a driver that {remedy} drive another link", key=link
         )
     return groups
 
@@ -192,6 +193,8 @@ class Structure:
         )
 
 
+FOLLOWED = {"triad": "a triad", "cam follower": "a cam follower"}
+"""Kinds of groups that are followed over a turn of the driver, in words."""
 CYLINDER = "cylinder"
 """Kind of the group of a cylinder that is pinned at both ends, with the lever that it swings: barrel, rod, lever."""
 DRIVER = "driver"
