@@ -172,7 +172,9 @@ class Contact(Placed):
         if self._roller is not None:
             normal_turn = self._cam.t1 + self._at.curvature * along1
             growth = (normal_turn - follower) * self._arm.dot(n)
-            return Slide(t, None, along1 - self._roller * turn1, along2 - self._roller * turn2, normal_turn, growth)
+            return Slide(
+                t, None, along1 - self._roller * turn1, along2 - self._roller * turn2, normal_turn, growth
+            )
         growth = along1 - turn1 / self._at.curvature
         return Slide(t, None, along1, along2 - turn1 * turn1 * self._reach, follower, growth)
 
@@ -348,4 +350,3 @@ class CamFollower(Group):
         arm = self.arm if self.arm is ZERO else rotated(self.arm, u)
         contact = Contact(cam, start, arm, world, self.roller if self.face is None else None)
         return SolvedGroup([pose], (first, contact), margin)
-

@@ -55,13 +55,21 @@ class CamKind(SingleLinkKind):
                 if parsed.extremes:
                     raise InputError(f"has {parsed.extremes[0]}, which depends on it; give a number")
                 reader.count(parsed)
-        roller, pitch, face = reader.entry(f"{key}.roller", table.get("roller", 0.0), "m"), table.get("pitch", False), ""
+        roller, pitch, face = (
+            reader.entry(f"{key}.roller", table.get("roller", 0.0), "m"),
+            table.get("pitch", False),
+            "",
+        )
         if not isinstance(roller, str) and roller < 0.0:
-            reader.fault(f"{key}.roller", f"is {shown(table['roller'])}; must be >= 0, the radius of the roller")
+            reader.fault(
+                f"{key}.roller", f"is {shown(table['roller'])}; must be >= 0, the radius of the roller"
+            )
         if not isinstance(pitch, bool):
             reader.fault(f"{key}.pitch", f"is {shown(pitch)}; must be true or false")
         if on == GROUND:
-            reader.fault(f"{key}.on", f"is ground.{point}; must be a point of the follower, and `by` one of the cam")
+            reader.fault(
+                f"{key}.on", f"is ground.{point}; must be a point of the follower, and `by` one of the cam"
+            )
         if "face" in table:
             face, others = table["face"], [name for name in reader.points[on] if name != point]
             if face not in others:
@@ -70,7 +78,9 @@ class CamKind(SingleLinkKind):
                     f"is {shown(face)}; must be another point of {on} on its face: {', '.join(others) or 'add one'}",
                 )
             for other in {"roller", "pitch"} & {*table}:
-                reader.fault(f"{key}.{other}", "belongs to a roller, and the follower has a face; take one of both out")
+                reader.fault(
+                    f"{key}.{other}", "belongs to a roller, and the follower has a face; take one of both out"
+                )
         joint |= {"radius": radius, "roller": roller, "pitch": pitch, "face": face}
 
     def start_faults(
@@ -79,7 +89,10 @@ class CamKind(SingleLinkKind):
         """The fault of a face without a direction."""
         (on, point), face = joint["on"], joint["face"]
         if face and math.dist(points[on][point], points[on][face]) == 0.0:
-            yield f"joints.{joint['name']}.face", f"{point} and {face} are in one place, so that the face has no line"
+            yield (
+                f"joints.{joint['name']}.face",
+                f"{point} and {face} are in one place, so that the face has no line",
+            )
 
     def law_faults(
         self, joint: Mapping[str, Any], number: Callable[[Any], float], values: Mapping[str, Any],
@@ -107,7 +120,9 @@ class CamKind(SingleLinkKind):
                 yield f"{key}.radius", f"its {what} differs at phi = 0 and 360 deg; {_REMEDY}"
                 return
             for order, what in enumerate(("radius", "slope", "second derivative")):
-                place = _jump(lambda at, order=order: rates(at)[order], course[order], course[order + 1], size[order])
+                place = _jump(
+                    lambda at, order=order: rates(at)[order], course[order], course[order + 1], size[order]
+                )
                 if place is not None:
                     yield f"{key}.radius", f"its {what} jumps at phi = {_degrees(place)}; {_REMEDY}"
                     return
@@ -138,7 +153,11 @@ class CamKind(SingleLinkKind):
         return 1.0
 
     def start(
-        self, first: JointEntry, joint: JointEntry, place: Callable[[str, str], Vec2], line: Callable[[JointEntry], Vec2]
+        self,
+        first: JointEntry,
+        joint: JointEntry,
+        place: Callable[[str, str], Vec2],
+        line: Callable[[JointEntry], Vec2],
     ) -> dict[str, float]:
         """See `SingleLinkKind`: the angle of the contact from the pin or the line of the follower, and on which side of
         its face the cam lies."""

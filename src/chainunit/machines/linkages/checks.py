@@ -27,7 +27,10 @@ _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
 
 def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
     """The fault of a table of guides or cams if the linkage has none."""
-    for table, kind, none in (("guides", PRISMATIC, "no joint of the linkage slides"), ("cams", CAM, "there is no cam")):
+    for table, kind, none in (
+        ("guides", PRISMATIC, "no joint of the linkage slides"),
+        ("cams", CAM, "there is no cam"),
+    ):
         if table in data and not any(joint["type"] == kind for joint in joints):
             yield table, f"{none}; leave the table out"
 

@@ -152,7 +152,9 @@ def common_parameters(linear: bool, kinds: Collection[str], starts: Mapping[str,
     the losses of the `kinds` of its joints, and with the given start values by name."""
     parameters = WayParameters if linear else CommonParameters
     without = [table for table, (kind, _) in LOSSES.items() if kind not in (*kinds, REVOLUTE)]
-    return with_starts(declared_class(parameters.__name__, (), fields_of(parameters, without=without)), starts)
+    return with_starts(
+        declared_class(parameters.__name__, (), fields_of(parameters, without=without)), starts
+    )
 
 
 def with_starts(declared: type, starts: Mapping[str, float]) -> type:

@@ -181,7 +181,11 @@ class SingleLinkKind(JointKind):
     """A kind of joint by which, and a pin or a guide, a single link forms a group of the kind `alone`."""
 
     def start(
-        self, first: JointEntry, joint: JointEntry, place: Callable[[str, str], Vec2], line: Callable[[JointEntry], Vec2]
+        self,
+        first: JointEntry,
+        joint: JointEntry,
+        place: Callable[[str, str], Vec2],
+        line: Callable[[JointEntry], Vec2],
     ) -> dict[str, float]:
         """What the start tells of the group, by names, from the rough `place` of points and the `line` of guides."""
         return {}

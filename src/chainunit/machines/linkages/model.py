@@ -285,7 +285,9 @@ class LinkageDescription(LinkageOutputs):
                 for joint in self.data["joints"]
                 if "length" in joint
             }
-            sliding = dict.fromkeys(cams, p.cams if cams else None) | laws.get("cams", {}) | laws.get("guides", {})
+            sliding = (
+                dict.fromkeys(cams, p.cams if cams else None) | laws.get("cams", {}) | laws.get("guides", {})
+            )
             usual = getattr(p, "guides", None) or p.cams
             loads["guides"] = GuideLosses(usual, usual.damping, lengths, sliding)
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)

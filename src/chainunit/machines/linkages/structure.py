@@ -103,7 +103,8 @@ def groups_of(
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
         raise InputError(
-            f"{who} {kind}, and the driver {moves}: {kind} needs a driver that {remedy} drive another link", key=link
+            f"{who} {kind}, and the driver {moves}: {kind} needs a driver that {remedy} drive another link",
+            key=link,
         )
     return groups
 
