@@ -369,7 +369,7 @@ def on_one_centre():
         ),
         (changed(type="revolute"), "joints.mesh.teeth", "belongs to a gear joint, and this one is a pin"),
         (changed(toward="O2"), "joints.mesh.toward", "belongs to a prismatic joint, and this one is a gear"),
-        (changed(type="belt"), "joints.mesh.type", 'or "gear"; a belt or a cam'),
+        (changed(type="belt"), "joints.mesh.type", 'or "cam"; a belt between'),
         (changed(on="wheel.B"), "joints.mesh", "wheel.B and crank.O1 must be pinned to one link"),
         (changed(by="ground.O1"), "joints.mesh", "wheel.O2 and ground.O1 must be pinned to one link"),
         (changed(teeth=[20, 30]), "links.wheel", "drive the slower of the two wheels"),

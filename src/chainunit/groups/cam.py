@@ -1,13 +1,9 @@
-"""A cam and its follower: a link that turns about a pin or slides on a line, and lies with a roller or with a flat
-face on a profile that is fixed to a link before it.
+"""A cam and its follower: a link on a pin or on a rail, with a roller or a flat face on a profile of a link before it.
 
-The profile is a closed curve about its centre: a radius over the angle. The centre of a roller runs on its pitch
-curve, at the distance of the radius of the roller. At the contact neither link moves into the other one: this row
-has the normal of the profile and its lever about the start of the follower, and its multiplier is the force of the
-contact. Up to the third derivatives the profile counts by its curvature and the change of that.
-
-The angle of the profile at which the follower lies on it has no closed form. It is followed once around, as the pose
-of a triad, and Newton's method makes it exact from the series. All else follows from it in closed form.
+The profile is a radius over the angle about its centre; the centre of a roller runs on its pitch curve. The row of the
+contact has the normal of the profile and its lever about the start of the follower. The angle at which the follower
+lies on the profile is followed once around, as the pose of a triad; the rest is closed form. Up to third derivatives
+a profile counts by its curvature and the change of that.
 """
 
 from __future__ import annotations
@@ -17,42 +13,32 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
+from ..core.engines import numpy_
 from ..core.jets import Jet
 from ..core.planar import ZERO, Link, Vec2, mirrored, rotated
 from .block import Row
 from .body import Bar, Load
 from .driver import Course
 from .group import Group, Outline, SolvedGroup
-from .joints import (
-    Guide,
-    GuideData,
-    GuideForce,
-    Hinge,
-    HingeData,
-    JointData,
-    LinkageInMotion,
-    Placed,
-    Rail,
-    Rates,
-    Slide,
-    Third,
-)
+from .joints import Guide, GuideData, GuideForce, Hinge, HingeData, JointData, LinkageInMotion, Placed, Rail
+from .joints import Rates, Slide, Third
 from .series import series_of, values_of
 
 SAMPLES, HARMONICS = 48, 16
-"""Number of places of the driver at which a follower is followed once around, and order of the series."""
-_STEPS = (3, 2)
-"""Steps of Newton's method with the profile about the first angle, and about the one that they give."""
-_FIRST = (4, 4, 4)
+"""Places of the driver at which a follower is followed once around, and the order of the series."""
+_FIRST, _FURTHER, _LAST = (4, 4, 4), (3,), (3, 2)
+"""Steps of Newton's method at the first place, at a further one, and from the series: by the number of times that the
+profile is taken anew about the angle."""
 _MISFIT = 1e-9
-"""Misfit of the contact, in parts of its size, at which the margin is 0: Newton's method has failed."""
-_LINES = 144
+"""Misfit of a contact, in parts of its size, at which the margin is 0: the follower is lost."""
 
 
 class ProfilePoint(NamedTuple):
-    """A point of a profile, which is run through counter-clockwise: its `place` from the centre [m], its `normal` to
-    the outside, a unit vector, its `speed` by the angle [m/rad], its `curvature`, positive where it bulges [1/m], and
-    the `change` of that by the length [1/m2]."""
+    """A point of a profile that is run through counter-clockwise: its `place` from the centre [m], its unit `normal` to
+    the outside, its `speed` by the angle [m/rad], its `curvature`, above 0 where it bulges [1/m], and the `change` of
+    that by the length [1/m2]."""
 
     place: Vec2
     normal: Vec2
@@ -61,31 +47,25 @@ class ProfilePoint(NamedTuple):
     change: Any
 
     @classmethod
-    def of(cls, xp: Any, rates: Sequence[Any], angle: Any) -> ProfilePoint:
-        """The point at an angle, from the radius there and its derivatives up to the third."""
+    def at(cls, xp: Any, rates: Sequence[Any], angle: Any) -> ProfilePoint:
+        """The point at an angle [rad], from the radius there and its derivatives up to the third."""
         r, r1, r2, r3 = rates
         u, square = Vec2(xp.cos(angle), xp.sin(angle)), r * r + r1 * r1
-        speed = xp.sqrt(square)
-        tangent, bulge = (u * r1 + u.turned() * r) * (1.0 / speed), square + r1 * r1 - r * r2
+        speed, bulge = xp.sqrt(square), square + r1 * r1 - r * r2
+        normal, cube = (u * r - u.turned() * r1) * (1.0 / speed), square * speed
         change = (2.0 * r * r1 + 3.0 * r1 * r2 - r * r3) * square - 3.0 * bulge * (r + r2) * r1
-        cube = square * speed
-        return cls(u * r, -tangent.turned(), speed, bulge / cube, change / (cube * cube))
+        return cls(u * r, normal, speed, bulge / cube, change / (cube * cube))
 
     def beside(self, gap: Any) -> ProfilePoint:
-        """The point of the curve at a distance outward, at the same angle."""
+        """The point of the curve at a distance outward [m], at the same angle."""
         growth = 1.0 + gap * self.curvature
-        per = 1.0 / growth
-        place, change = self.place.plus(self.normal, gap), self.change * per * per * per
-        return ProfilePoint(place, self.normal, self.speed * growth, self.curvature * per, change)
-
-    def turned(self, u: Vec2) -> ProfilePoint:
-        """The point of the profile that is turned by the angle of a unit vector."""
-        return self._replace(place=rotated(self.place, u), normal=rotated(self.normal, u))
+        k, change = self.curvature / growth, self.change / (growth * growth * growth)
+        return ProfilePoint(self.place.plus(self.normal, gap), self.normal, self.speed * growth, k, change)
 
 
 class ContactData(GuideData):
-    """The contact of a follower as data: the centre of its roller, or a point of its face, as `pin`; the follower as
-    `link`; and in `by` the centre of the profile, and the direction of its angle 0, in the link of the cam."""
+    """The contact of the follower `link` as data: the centre of its roller, or a point of its face, is `pin`; `by` has
+    the centre of the profile and the direction of its angle 0."""
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
         """See `JointData`: the normal turns, and its lever changes."""
@@ -99,63 +79,49 @@ class ContactData(GuideData):
 
 
 class Contact(Placed):
-    """The contact at one position: the frame `cam` of the profile; `base` is the start of the follower, and `arm` goes
-    from there to the centre of its roller of the radius `roller`, or to a point of its face, where this is None; `at`
-    is the point of the pitch curve, or of the profile, from its centre."""
+    """The contact at one position: the frame `cam` of the profile, the start `base` of the follower, and from there the
+    `arm` to the centre of its roller of the radius `roller`, or to a point of its face, where this is None; `at` is the
+    point of the pitch curve, or of the profile, turned with the cam."""
 
-    __slots__ = ("_arm", "_at", "_base", "_cam", "_reach", "_roller")
+    __slots__ = ("_arm", "_at", "_base", "_cam", "_lever", "_reach", "_roller")
 
     def __init__(self, cam: Link, base: Vec2, arm: Vec2, at: ProfilePoint, roller: Any) -> None:
         self._cam, self._base, self._arm, self._at, self._roller = cam, base, arm, at, roller
-        # from the point of the face to the contact, along the face
-        seen = base + arm - cam.pin.p
-        self._reach = 0.0 if roller is not None else at.normal.turned().dot(at.place - seen)
-
-    @property
-    def _lever(self) -> Any:
-        return self._arm.cross(self._at.normal) - self._reach
+        # along the face, from its point to the contact
+        face = at.normal.turned().dot(at.place - (base + arm - cam.pin.p))
+        self._reach = face if roller is None else 0.0
+        self._lever = arm.cross(at.normal) - self._reach
 
     def rows(self) -> list[Row]:
         """Its row: of the point at the contact along the normal."""
-        n = self._at.normal
-        return [{0: n.x, 1: n.y, 2: self._lever}]
+        return [{0: self._at.normal.x, 1: self._at.normal.y, 2: self._lever}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Joint`: the derivative of the gap while the next derivatives of the follower are 0."""
-        seen, turn = self._seen(rates, len(rates) + 1, before)
-        n, at = self._at.normal, self._at
+        """See `Placed`: what the gap loses while the next derivatives of the follower are 0."""
+        (seen, turn), at = self._seen(rates, len(rates) + 1, before), self._at
+        n, t, k = at.normal, at.normal.turned(), at.curvature
         if self._roller is not None:
-            along = seen.dot(n.turned())
-            along = Jet(0.0, *along.parts[1:])
-            square = along * along
-            gap = seen.dot(n) + square * (0.5 * at.curvature) + square * along * (at.change / 6.0)
+            along = Jet(0.0, *seen.dot(t).parts[1:])
+            gap = seen.dot(n) + along * along * (0.5 * k + along * (at.change / 6.0))
         else:
-            # the distance of a tangent from the centre over its angle
-            height, foot, radius = at.place.dot(n), at.place.dot(n.turned()), 1.0 / at.curvature
-            cubic = -(at.change * radius * radius * radius + foot) / 6.0
-            square = turn * turn
-            tangent = turn * foot + square * (0.5 * (radius - height)) + square * turn * cubic
-            gap = seen.dot(rotated(_direction(turn), n)) - tangent
+            # less the distance of a tangent of the profile from its centre, over the angle
+            foot, bend = at.place.dot(t), 1.0 / k - at.place.dot(n)
+            cubic = -(at.change / (k * k * k) + foot) / 6.0
+            gap = seen.dot(rotated(_direction(turn), n)) - turn * (turn * (turn * cubic + 0.5 * bend) + foot)
         return [-gap.parts[-1]]
 
     def _seen(self, rates: Rates, order: int, before: Third | None = None) -> tuple[Vec2, Jet]:
-        """The point of the follower from the centre, as the cam sees it, and the angle of the follower less that of
-        the cam, up to an `order` of derivatives; those of the follower beyond `rates` are 0."""
-        centre, cam = self._cam.pin, [self._cam.t1, self._cam.t2]
-        places = [centre.p1, centre.p2]
+        """The point of the follower from the centre, as the cam sees it, and the angle of the follower less that of the
+        cam, up to an `order` of derivatives; those of the follower beyond `rates` are 0."""
+        centre, known = self._cam.pin, [(self._cam.t1, self._cam.pin.p1), (self._cam.t2, self._cam.pin.p2)]
         if before is not None:
-            places.append(before[0])
-            cam.append(before[1])
-        rest = [0.0] * (order - len(rates))
-        x, y, angle = (Jet(*([z[k] for z in rates] + rest)) for k in range(3))
-        arm = rotated(_direction(Jet(0.0, *angle.parts)), self._arm)
-        turn = Jet(0.0, *cam[:order])
-        start = self._base - centre.p
-        from_centre = Vec2(
-            Jet(start.x, *x.parts) - Jet(0.0, *(p.x for p in places[:order])) + arm.x,
-            Jet(start.y, *y.parts) - Jet(0.0, *(p.y for p in places[:order])) + arm.y,
-        )
-        return rotated(from_centre, _direction(-turn)), Jet(0.0, *angle.parts) - turn
+            known.append((before[1], before[0]))
+        start, rest = self._base - centre.p, [0.0] * (order - len(rates))
+        x, y, angle = (Jet(0.0, *(z[k] for z in rates), *rest) for k in range(3))
+        cam = Jet(0.0, *(t for t, _ in known[:order]))
+        moved = Vec2(*(Jet(0.0, *(getattr(p, axis) for _, p in known[:order])) for axis in "xy"))
+        point = rotated(_direction(angle), self._arm) + Vec2(x + start.x, y + start.y) - moved
+        return rotated(point, _direction(-cam)), angle - cam
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
         """The force of the contact, above 0 where it presses."""
@@ -163,65 +129,56 @@ class Contact(Placed):
         return GuideForce.along(self._at.normal, force, force * self._lever), None
 
     def slide(self, rates: Rates) -> Slide:
-        """The motion of the follower along the profile, where both touch; the way along it has no meaning."""
+        """The motion of the follower past the cam at the contact."""
         seen, turn = self._seen(rates, 2)
-        n, follower = self._at.normal, rates[0][2]
-        t = n.turned()
-        _, along1, along2 = seen.dot(t).parts
-        _, turn1, turn2 = turn.parts
-        if self._roller is not None:
-            normal_turn = self._cam.t1 + self._at.curvature * along1
-            growth = (normal_turn - follower) * self._arm.dot(n)
-            return Slide(
-                t, None, along1 - self._roller * turn1, along2 - self._roller * turn2, normal_turn, growth
-            )
-        growth = along1 - turn1 / self._at.curvature
-        return Slide(t, None, along1, along2 - turn1 * turn1 * self._reach, follower, growth)
+        n, follower, k = self._at.normal, rates[0][2], self._at.curvature
+        (_, s1, s2), (_, turn1, turn2) = seen.dot(n.turned()).parts, turn.parts
+        if self._roller is None:
+            return Slide(n.turned(), None, s1, s2 - turn1 * turn1 * self._reach, follower, s1 - turn1 / k)
+        turned = self._cam.t1 + k * s1
+        growth = (turned - follower) * self._arm.dot(n)
+        return Slide(n.turned(), None, s1 - self._roller * turn1, s2 - self._roller * turn2, turned, growth)
 
 
 def _direction(turn: Jet) -> Vec2:
-    """Cosine and sine of an angle that is 0 at first, up to its third derivative."""
+    """Cosine and sine of an angle that is 0 at first, up to the third derivatives."""
     square = turn * turn
     return Vec2(1.0 - square * 0.5, turn - square * turn * (1.0 / 6.0))
 
 
 class _Sight(NamedTuple):
-    """What the cam sees before the follower: its own frame, the start of the follower, or its line, as a link, and in
-    its frame the pin of the follower, or a point of its line, the direction of that line, and the direction from which
-    the angle of the contact counts."""
+    """What the cam sees before the follower: its own frame, that of the start of the follower, in its frame the pin of
+    the follower, or a point of its rail, and the direction of that rail."""
 
     cam: Link
     base: Link
     point: Vec2
     along: Vec2 | None
-    zero: Vec2
 
 
 @dataclass
 class CamFollower(Group):
-    """A follower on a pin or on a `rail` that moves in a known way: its bar, whose `pin` is the centre of its roller or
-    a point of its face, at `arm` in its frame; the centre and the angle 0 of the profile, `cam`, in a link before it,
-    and its radius over the angle, `curve`; the radius of the `roller`, with which the profile `grows` to the pitch
-    curve; `face` is the normal of a flat face, away from the cam, in the frame of the bar. `guide` is the pin at which
-    the force of the rail acts.
+    """A follower on a pin or on a `rail` that moves in a known way. The centre of its roller or a point of its face is
+    `pin`, at `arm` in the frame of its bar; the frame of one on a pin has the direction of this arm, or of the normal of
+    its face, that of one on a rail starts at `pin`. `cam` is the centre of the profile, the pin `centre`, with the
+    direction of its angle 0; `curve` the radius over the angle; `roller` the radius of the roller, with which the
+    profile `grows` to the pitch curve; `face` the normal of a face, away from the cam. `guide` is the pin at which the
+    force of the rail acts. The angle of the contact counts from the pin of the follower, or from its rail; it is `near`
+    to its value at the place `start` of the driver.
 
-    The frame of a follower on a pin starts there, towards the centre of its roller or along the normal of its face; the
-    frame of one on a rail starts at `pin`. The angle of the contact counts from the pin of the follower, or from the
-    direction of its rail; `near` is a rough one at the place `start` of the driver. The margin is the sine of the angle
-    between the force and its lever, or the cosine of the pressure angle; below 0 an undercut profile."""
+    The margin is the cosine of the pressure angle, below 0 where the profile is undercut."""
 
     bar: Bar
     pin: str
     arm: Vec2
     cam: Rail
+    centre: str
     curve: Callable[[Any, Any], Course]
     roller: Any
     grows: bool
     face: Vec2 | None
     rail: Rail | None
     guide: str
-    name: str
-    centre: str
     near: float
     start: float
 
@@ -238,115 +195,89 @@ class CamFollower(Group):
     @property
     def outlines(self) -> Mapping[str, Outline]:
         """The profile, and the roller."""
-        import numpy as np
-
-        from ..core.engines import numpy_
-
-        xp, angles = numpy_(), np.linspace(0.0, 2.0 * math.pi, _LINES + 1)
-        at = self._at(xp, self._rates(xp, angles), angles)
-        place = at.place if self.roller is None else at.place.plus(at.normal, -self.roller)
-        outlines = {self.name: Outline(self.centre, self.cam, (place.x, place.y))}
+        xp, name, angles = numpy_(), self.pin.partition(".")[0], np.linspace(0.0, 2.0 * math.pi, 181)
+        radius, rates = self.curve(xp, angles)
+        at = self._at(xp, (radius, *rates), angles, 0.0)
+        outlines = {name: Outline(self.centre, self.cam, at.place.plus(at.normal, -(self.roller or 0.0)))}
         if self.roller:
-            x, y = (self.roller * wave(angles) for wave in (np.cos, np.sin))
-            outlines[f"{self.name} roller"] = Outline(self.pin, self.cam, (x, y))
+            circle = Vec2(np.cos(angles), np.sin(angles)) * self.roller
+            outlines[f"{name} roller"] = Outline(self.pin, self.cam, circle)
         return outlines
 
-    def clear(self, xp: Any, at: ProfilePoint) -> Any:
-        """1 at a point of the pitch curve that is clear, and -1 at one that is undercut, as the radius of the roller
-        exceeds its radius of curvature; under a flat face, as the profile does not bulge."""
-        room = at.curvature if self.roller is None else 1.0 - self.roller * at.curvature
-        return room / (xp.abs(room) + 1e-9)
-
-    def _rates(self, xp: Any, angle: Any) -> tuple[Any, ...]:
-        """The radius and its derivatives at an angle, within a turn."""
-        radius, rates = self.curve(xp, angle)
-        return radius, *rates
-
-    def _at(self, xp: Any, rates: Sequence[Any], angle: Any, more: Any = None) -> ProfilePoint:
-        """The point of the pitch curve, or of the profile under a face, at an angle, or `more` beyond it."""
-        if more is not None:
-            r, r1, r2, r3 = rates
-            rates = (
-                r + more * (r1 + more * (0.5 * r2 + more * (r3 / 6.0))), r1 + more * (r2 + more * (0.5 * r3)),
-                r2 + more * r3, r3,
-            )  # fmt: skip
-            angle = angle + more
-        at = ProfilePoint.of(xp, rates, angle)
+    def _at(self, xp: Any, rates: Sequence[Any], angle: Any, more: Any) -> ProfilePoint:
+        """The point of the pitch curve, or of the profile under a face, by `more` beyond an angle."""
+        r, r1, r2, r3 = rates
+        r, r1 = r + more * (r1 + more * (0.5 * r2 + more * (r3 / 6.0))), r1 + more * (r2 + more * (0.5 * r3))
+        at = ProfilePoint.at(xp, (r, r1, r2 + more * r3, r3), angle + more)
         return at.beside(self.roller) if self.roller is not None and self.grows else at
 
     def _sight(self, linkage: LinkageInMotion) -> _Sight:
-        cam = self.cam.at_position(linkage.links)
-        back = mirrored(cam.u)
-        if self.rail is None:
-            pin = linkage.pins[self.bar.pin]
-            point = rotated(pin.p - cam.pin.p, back)
-            return _Sight(cam, Link(pin, cam.u, 0.0, 0.0), point, None, point)
-        rail = self.rail.at_position(linkage.links)
-        along = rotated(rail.u, back)
-        return _Sight(cam, rail, rotated(rail.pin.p - cam.pin.p, back), along, along)
+        cam, pin = self.cam.at_position(linkage.links), linkage.pins.get(self.bar.pin)
+        base = Link(pin, cam.u, 0.0, 0.0) if self.rail is None else self.rail.at_position(linkage.links)
+        point, along = (rotated(v, mirrored(cam.u)) for v in (base.pin.p - cam.pin.p, base.u))
+        return _Sight(cam, base, point, None if self.rail is None else along)
 
     def _gap(self, xp: Any, sight: _Sight, at: ProfilePoint) -> tuple[Any, Any, Any, Any]:
-        """What the follower misses on the profile at a point of it, the slope of that by the angle, the size of it,
-        and the margin."""
-        n, v, along = at.normal, at.place - sight.point, sight.along
-        lever = n.turned().dot(v)
-        if self.face is None:
-            if along is None:
-                l = self.arm.x
-                return 0.5 * (v.squared() - l * l), at.speed * lever, l * l, lever / l
-            cosine = along.dot(n)
-            return along.cross(v), at.speed * cosine, at.speed, cosine
-        spin = at.speed * at.curvature
-        if along is None:
-            return n.dot(v) - self.arm.x, spin * lever, at.speed, lever / xp.sqrt(v.squared())
-        m = rotated(self.face, along)
-        return n.turned().dot(m), -spin * n.dot(m), 1.0, self.face.x
-
-    def _found(
-        self, xp: Any, sight: _Sight, near: Any, steps: Sequence[int]
-    ) -> tuple[Any, ProfilePoint, Any, Any]:
-        """The angle of the contact by Newton's method from a near one, the point there, what it misses, and the
+        """What the follower misses on the profile at a point of it, the slope of that by the angle, its size, and the
         margin."""
-        zero = xp.atan2(sight.zero.y, sight.zero.x)
+        n, v, along = at.normal, at.place - sight.point, sight.along
+        lever, bend, l = n.turned().dot(v), at.speed * at.curvature, self.arm.x
+        if along is None and self.face is None:
+            return 0.5 * (v.squared() - l * l), at.speed * lever, l * l, lever / l
+        if along is None:
+            return n.dot(v) - l, bend * lever, at.speed, lever / xp.sqrt(v.squared())
+        if self.face is None:
+            return along.cross(v), at.speed * along.dot(n), at.speed, along.dot(n)
+        m = rotated(self.face, along)
+        return n.turned().dot(m), -bend * n.dot(m), 1.0, self.face.x
+
+    def _found(self, xp: Any, sight: _Sight, near: Any, steps: Sequence[int]) -> tuple[Any, ProfilePoint]:
+        """The angle of the contact by Newton's method from a near one, and the point there."""
+        zero = sight.point if sight.along is None else sight.along
+        zero_angle = xp.atan2(zero.y, zero.x)
         for count in steps:
-            turned = zero + near
-            angle = xp.atan2(-xp.sin(turned), -xp.cos(turned)) + math.pi
-            rates, more = self._rates(xp, angle), 0.0
+            angle = zero_angle + near
+            # a profile is given within a turn
+            angle, more = xp.atan2(-xp.sin(angle), -xp.cos(angle)) + math.pi, 0.0
+            radius, rates = self.curve(xp, angle)
             for _ in range(count):
-                gap, slope, *_ = self._gap(xp, sight, self._at(xp, rates, angle, more))
+                gap, slope, *_ = self._gap(xp, sight, self._at(xp, (radius, *rates), angle, more))
                 more = more - gap / slope
             near = near + more
-        at = self._at(xp, rates, angle, more)
-        gap, _, size, margin = self._gap(xp, sight, at)
-        return near, at, gap / size, margin
+        return near, self._at(xp, (radius, *rates), angle, more)
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """See `derived_count`."""
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
-        found: list[Any] = []
-        for q in angles:
-            near = self.near if not found else found[-1] if len(found) < 2 else 2.0 * found[-1] - found[-2]
-            found.append(self._found(xp, self._sight(before(q)), near, (3,) if found else _FIRST)[0])
-        return series_of(found, angles, HARMONICS)
+        course = [self._found(xp, self._sight(before(self.start)), self.near, _FIRST)[0]]
+        for q in angles[1:]:
+            near = 2.0 * course[-1] - course[max(len(course) - 2, 0)]
+            course.append(self._found(xp, self._sight(before(q)), near, _FURTHER)[0])
+        return series_of(course, angles, HARMONICS)
 
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The follower on the profile, near the angle that the series `derived` gives."""
         sight, (near,) = self._sight(linkage), values_of([derived], xp.cos(q), xp.sin(q))
-        _, at, gap, margin = self._found(xp, sight, near, _STEPS)
-        cam, base, miss = sight.cam, sight.base, gap * (1.0 / _MISFIT)
-        margin = margin * self.clear(xp, at) * (1.0 - miss * miss)
-        world, first, start = at.turned(cam.u), Hinge(0, base=base.pin), base.pin.p
-        if self.rail is None:
-            reach = at.place - sight.point
-            u = world.normal if self.face is not None else rotated(reach * (1.0 / self.arm.x), cam.u)
-            pose: Any = base.pin, u
+        _, at = self._found(xp, sight, near, _LAST)
+        gap, _, size, margin = self._gap(xp, sight, at)
+        miss, room = gap / (size * _MISFIT), at.curvature
+        if self.face is None:
+            room = 1.0 - self.roller * at.curvature
+        margin = margin * (1.0 - miss * miss) * room / (xp.abs(room) + 1e-9)
+        cam, base, u = sight.cam, sight.base, sight.base.u
+        start, world = (
+            base.pin.p,
+            at._replace(normal=rotated(at.normal, cam.u), place=rotated(at.place, cam.u)),
+        )
+        first: Placed = Hinge(0, base=base.pin)
+        if self.rail is not None:
+            n = u if self.face is None else rotated(self.face, u)
+            s = n.dot(cam.pin.p + world.place - start) / n.dot(u)
+            start, first = start + u * s, Guide(0, u, s, u * s, base)
+        elif self.face is None:
+            u = rotated((at.place - sight.point) * (1.0 / self.arm.x), cam.u)
         else:
-            u, place = base.u, cam.pin.p + world.place - start
-            n = None if self.face is None else rotated(self.face, u)
-            s = u.dot(place) if n is None else n.dot(place) / n.dot(u)
-            way = u * s
-            start, first = start + way, Guide(0, u, s, way, base)
-            pose = start, u
+            u = world.normal
         arm = self.arm if self.arm is ZERO else rotated(self.arm, u)
-        contact = Contact(cam, start, arm, world, self.roller if self.face is None else None)
-        return SolvedGroup([pose], (first, contact), margin)
+        pose = (base.pin if self.rail is None else start), u
+        return SolvedGroup([pose], (first, Contact(cam, start, arm, world, self.roller)), margin)

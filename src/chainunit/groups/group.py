@@ -87,12 +87,11 @@ def _rate(z: Sequence[Any], link: int) -> Third:
 
 
 class Outline(NamedTuple):
-    """A closed curve that a picture shows, fixed to a link: the pin from which its points count, the `frame` in which
-    they do, of which the direction matters, and their coordinates [m]."""
+    """A closed curve that a picture shows: its `points` [m] count from a pin, in the direction of a `frame`."""
 
     pin: str
     frame: Rail
-    points: tuple[Any, Any]
+    points: Vec2
 
 
 class Group:

@@ -7,7 +7,6 @@ Each entry that is a quantity is a number in SI units, a text with a unit ("80 m
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,7 +18,7 @@ from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_
 from ...core.inputs import TOML, file_text
 from ...mechanism.assur import DYADS, FURTHER_DRIVERS, GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.curves import TableCurve
-from ...mechanism.expressions import expression, value_of
+from ...mechanism.expressions import value_of
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
@@ -62,8 +61,6 @@ _FURTHER_KEYS = (*_DRIVER_KEYS, "phi", "by", "start")
 _GEAR, _MOTOR = "gear", "motor"
 _RANGES = '["-20 deg", "75 deg"]', "[0.2, 0.6]"
 """Examples of the range of a driver that turns and of one that slides."""
-_DEGREES = re.compile(r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*(?:deg\b|°)")
-"""An angle in degrees inside an expression."""
 
 
 def read_linkage(file: Path) -> InverseMachine:
@@ -429,16 +426,7 @@ class _LinkageReader(LoadReader):
                 f'is {shown(by)}; must be "{_GEAR}", if the first driver drives it, or "{_MOTOR}", if it has one of '
                 "its own",
             )
-        named = isinstance(law, str) and words_in(_DEGREES.sub("", law))
-        text = _DEGREES.sub(r"(\1 * deg)", law) if named else law
-        motion = {"phi": "m" if first.get("linear") else "rad", **self.table_units}
-        entry["law"] = self.entry(f"{key}.phi", text, unit, motion)
-        if isinstance(entry["law"], str):
-            parsed = expression(entry["law"])
-            if parsed.extremes:
-                self.fault(f"{key}.phi", f"has {parsed.extremes[0]}, which depends on it; give a number")
-            with self.at(f"{key}.phi"):
-                self.count(parsed)
+        entry["law"] = self.law_entry(f"{key}.phi", law, unit, "m" if first.get("linear") else "rad")
         return entry | {"geared": by == _GEAR}
 
     def driver(
@@ -567,7 +555,7 @@ class _LinkageReader(LoadReader):
                 raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)
         for joint in joints:
-            self.all(KINDS[joint["type"]].law_faults(joint, number, values, splines(tables, span is None)))
+            self.all(KINDS[joint["type"]].law_faults(joint, values, splines(tables, span is None)))
         for entry in drivers:
             if "law" in entry:
                 self.law(entry, value, values, splines(tables, span is None), span)

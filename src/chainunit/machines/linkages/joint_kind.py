@@ -12,7 +12,6 @@ from ...groups.body import Bar
 from ...groups.group import Group
 from ...groups.joints import Rail
 from ...mechanism.assur import PRISMATIC, REVOLUTE, AssurGroup
-from ...mechanism.curves import TableCurve
 
 if TYPE_CHECKING:
     from .entries import EntryReader
@@ -60,7 +59,12 @@ class JointEntry(NamedTuple):
 
 
 class JointParts(Protocol):
-    """What a kind of joint needs of the parts of a linkage."""
+    """What a kind of joint needs of the parts of a linkage: the links with numbers, the frames of links in their groups,
+    and what the start tells of groups, by link."""
+
+    geometry: Any
+    frames: Any
+    sides: Any
 
     @property
     def groups(self) -> Sequence[Group]:
@@ -70,26 +74,14 @@ class JointParts(Protocol):
     def structure(self) -> Any:
         """The linkage without numbers."""
 
-    @property
-    def geometry(self) -> Any:
-        """The links with numbers."""
-
-    @property
-    def frames(self) -> Mapping[str, Any]:
-        """The frame of each link in its group."""
-
-    @property
-    def sides(self) -> Mapping[str, float]:
-        """The assembly modes, and what else the start tells of groups."""
-
     def slider(self, link: str, rail: JointEntry, start: str) -> tuple[Bar, Rail, str]:
         """The bar of a block that starts from its point `start` on its rail, the rail, and the pin of its force."""
 
     def pin(self, link: str, point: str) -> str:
         """The name of a point in the linkage."""
 
-    def hung(self, link: str, joint: JointEntry) -> Bar:
-        """The bar of a link that starts from the pin of a joint, along its own x axis."""
+    def hung(self, link: str, joint: JointEntry, along: Vec2 = ...) -> Bar:
+        """The bar of a link that starts from the pin of a joint, in the direction `along`, by default its x axis."""
 
     def receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
@@ -125,11 +117,9 @@ class JointKind:
         return iter(())
 
     def law_faults(
-        self, joint: Mapping[str, Any], number: Callable[[Any], float], values: Mapping[str, Any],
-        tables: Mapping[str, TableCurve],
-    ) -> Iterator[tuple[str, str]]:  # fmt: skip
-        """Faults of its laws by key at the start `values` of the parameters, with the `tables` over phi; `number` is the
-        value of an entry."""
+        self, joint: Mapping[str, Any], values: Mapping[str, Any], tables: Mapping[str, Any]
+    ) -> Iterator[tuple[str, str]]:
+        """Faults of its laws by key at the start `values` of the parameters, with the `tables` over phi as curves."""
         return iter(())
 
 
@@ -196,7 +186,7 @@ class SingleLinkKind(JointKind):
 
     def rate(self, joint: JointEntry, link: str) -> float:
         """How often the link turns, at most, while the links before it turn once."""
-        raise NotImplementedError
+        return 1.0
 
     def dead(self, group: AssurGroup, where: str) -> str:
         """The sentence on the group in its dead position."""

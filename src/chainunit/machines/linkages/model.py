@@ -244,7 +244,7 @@ class LinkageDescription(LinkageOutputs):
         derived = getattr(p, "derived", ())
         values |= zip(self.extremes, derived[-len(self.extremes) :], strict=False) if self.extremes else ()
         values |= {f"table {name}": curve for name, curve in self.curves.items()}
-        values |= {f"spline {name}": curve for name, curve in self.further.tables.items()}
+        values["splines"] = self.further.tables
         values |= {"g": p.g, "ratio": p.ratio}
         for name, text in self.data.get("derived", ()):
             values[name] = value_of(xp, text, values)
