@@ -195,14 +195,18 @@ class CamFollower(Group):
     @property
     def outlines(self) -> Mapping[str, Outline]:
         """The profile, and the roller."""
-        xp, name, angles = numpy_(), self.pin.partition(".")[0], np.linspace(0.0, 2.0 * math.pi, 181)
-        radius, rates = self.curve(xp, angles)
-        at = self._at(xp, (radius, *rates), angles, 0.0)
-        outlines = {name: Outline(self.centre, self.cam, at.place.plus(at.normal, -(self.roller or 0.0)))}
-        if self.roller:
-            circle = Vec2(np.cos(angles), np.sin(angles)) * self.roller
-            outlines[f"{name} roller"] = Outline(self.pin, self.cam, circle)
-        return outlines
+        angles, name = np.linspace(0.0, 2.0 * math.pi, 181), self.pin.partition(".")[0]
+
+        def profile() -> Vec2:
+            radius, rates = self.curve(numpy_(), angles)
+            at = self._at(numpy_(), (radius, *rates), angles, 0.0)
+            return at.place.plus(at.normal, -(self.roller or 0.0))
+
+        curves = {name: Outline(self.centre, self.cam, profile)}
+        if self.face is None:
+            circle = Vec2(np.cos(angles), np.sin(angles))
+            curves[f"{name}.roller"] = Outline(self.pin, self.cam, lambda: circle * self.roller)
+        return curves
 
     def _at(self, xp: Any, rates: Sequence[Any], angle: Any, more: Any) -> ProfilePoint:
         """The point of the pitch curve, or of the profile under a face, by `more` beyond an angle."""
