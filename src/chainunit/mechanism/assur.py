@@ -55,8 +55,8 @@ class AssurGroup(NamedTuple):
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
-    the joints are the outer ones of the legs, then their inner ones. Of a single link the pin
-    or the guide stands first.
+    the joints are the outer ones of the legs, then their inner ones. Of a single link the pin or
+    the guide stands first.
     """
 
     kind: str

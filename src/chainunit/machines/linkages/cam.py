@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +15,8 @@ from ...groups.cam import CamFollower, ProfilePoint
 from ...groups.group import Group
 from ...groups.joints import Rail
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup
-from ...mechanism.expressions import value_of
-from .joint_kind import CAM, JointEntry, JointParts, JointTable, SingleLinkKind
-from .laws import LawCourse
+from ...mechanism.expressions import LawCourse, value_of
+from .joint_kind import CAM, JointEntry, JointParts, JointTable, Seen, SingleLinkKind
 
 if TYPE_CHECKING:
     from .entries import EntryReader
@@ -80,7 +79,6 @@ class CamKind(SingleLinkKind):
         self, joint: Mapping[str, Any], values: Mapping[str, Any], tables: Mapping[str, Any]
     ) -> Iterator[tuple[str, str]]:
         """The fault of a radius that is none, that jumps, or with which the profile is undercut."""
-        key = f"joints.{joint['name']}"
         with np.errstate(all="ignore"):
             radius, rates = LawCourse(joint["radius"], values, tables)(numpy_(), _ANGLES)
             course = np.array([np.broadcast_to(x, _ANGLES.shape) for x in (radius, *rates)], float)
@@ -90,52 +88,42 @@ class CamKind(SingleLinkKind):
             misses = np.abs(np.column_stack([misses, course[:3, -1] - course[:3, 0]]))
             jumps = misses > _JUMP * np.abs(course[:3]).max(axis=1, keepdims=True) + 1e-9
             k = ProfilePoint.at(numpy_(), course, _ANGLES).curvature
+        of, message = "radius", ""
         if wrong.any():
             place = int(np.argmax(wrong))
-            yield (
-                f"{key}.radius",
-                f"is {course[0, place]:.4g} m at phi = {_degrees(place)}; must be > 0 all around",
-            )
+            message = f"is {course[0, place]:.4g} m at phi = {_degrees(place)}; must be > 0 all around"
         elif jumps.any():
             order, place = divmod(int(np.argmax(jumps)), len(_ANGLES))
-            yield (
-                f"{key}.radius",
+            message = (
                 f"its {('size', 'slope', 'second derivative')[order]} jumps at phi = {_degrees(place)}; a profile is "
                 "smooth up to the second derivative: take a table [tables.NAME] over phi, which is splined, or rises "
-                "such as step(phi - 60 * deg, 80 * deg)",
+                "such as step(phi - 60 * deg, 80 * deg)"
             )
-        elif joint["face"] and not k.min() > 0.0:
-            yield (
-                key,
-                f"the profile is hollow or straight at phi = {_degrees(int(np.argmin(k)))}, and a flat face bridges it "
-                f"there; take a roller, {_SLOWER}",
-            )
-        elif not joint["face"]:
-            sharp, roller = k if joint["pitch"] else -k, value_of(MATH, joint["roller"], values)
+        elif joint["face"]:
+            if not k.min() > 0.0:
+                message = (
+                    f"is hollow or straight at phi = {_degrees(int(np.argmin(k)))}, and a flat face bridges it there; "
+                    f"take a roller, {_SLOWER}"
+                )
+        else:
+            of, roller, sharp = "roller", value_of(MATH, joint["roller"], values), k if joint["pitch"] else -k
             worst = int(np.argmax(sharp))
             if roller * sharp[worst] >= 1.0:
-                what, limit = (
+                what, most = (
                     "pitch curve bulges" if joint["pitch"] else "profile is hollow",
                     1e3 / sharp[worst],
                 )
-                yield (
-                    f"{key}.roller",
-                    f"is {1e3 * roller:.4g} mm, and the {what} with a radius of {limit:.4g} mm at phi = "
-                    f"{_degrees(worst)}, so that the cam is undercut there; take a roller of less than {limit:.4g} mm, "
-                    f"{_SLOWER}",
+                message = (
+                    f"is {1e3 * roller:.4g} mm, and the {what} with a radius of {most:.4g} mm at phi = {_degrees(worst)}: "
+                    f"the cam is undercut there; take a roller of less than {most:.4g} mm, {_SLOWER}"
                 )
+        if message:
+            yield f"joints.{joint['name']}.{of}", message
 
-    def start(
-        self,
-        first: JointEntry,
-        joint: JointEntry,
-        place: Callable[[str, str], Vec2],
-        line: Callable[[JointEntry], Vec2],
-    ) -> dict[str, float]:
+    def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
         """The angle of the contact from the pin or the line of the follower, and on which side of its face the cam
         lies."""
-        (link, point), centre, side = joint.on, place(*joint.by), 1.0
-        other = first.other_link(link)
+        (link, point), centre, side, other = joint.on, place(*joint.by), 1.0, first.other_link(joint.on[0])
         zero = place(other, first.at(other)) - centre if first.kind == REVOLUTE else line(first)
         towards = place(link, point) - centre
         if face := joint.table["face"]:
@@ -154,44 +142,32 @@ class CamKind(SingleLinkKind):
                 key=f"links.{link}",
             )
         frame, face, rail, guide, arm = parts.frames[cam], None, None, "", ZERO
+        roller, values = geometry.number(table["roller"]), geometry.values
         if table["face"]:
-            face = geometry.span(link, point, table["face"])[0].axis.turned() * parts.sides[f"{link}.face"]
+            face, roller = geometry.span(link, point, table["face"])[0].axis.turned(), None
+            face = face * parts.sides[f"{link}.face"]
         if first.kind == REVOLUTE:
-            along = geometry.span(link, first.at(link), point)[0].axis if face is None else face
-            bar = parts.hung(link, first, along)
+            bar = parts.hung(link, first, face or geometry.span(link, first.at(link), point)[0].axis)
             arm = parts.frames[link].coordinates(geometry.point(link, point))
         else:
             bar, rail, guide = parts.slider(link, first, point)
+        zero = frame.coordinates(geometry.point(cam, centre)), frame.components(Vec2(1.0, 0.0))
         # a pin of its own: the guide of the follower may have its force at the same point
         pin = f"{joint.name}.{point}"
         parts.receive(joint, pin, link)
         return CamFollower(
-            bar._replace(points={**bar.points, pin: (arm.x, arm.y)}),
-            pin,
-            arm,
-            Rail(
-                None if cam == GROUND else cam,
-                frame.coordinates(geometry.point(cam, centre)),
-                frame.components(Vec2(1.0, 0.0)),
-            ),
-            parts.pin(cam, centre),
-            LawCourse(table["radius"], geometry.values, geometry.values["splines"]),
-            geometry.number(table["roller"]) if face is None else None,
-            not table["pitch"],
-            None if face is None else parts.frames[link].components(face),
-            rail,
-            guide,
-            parts.sides[link],
-            parts.structure.start,
-        )
+            bar._replace(points={**bar.points, pin: (arm.x, arm.y)}), pin, arm,
+            Rail(None if cam == GROUND else cam, *zero), parts.pin(cam, centre),
+            LawCourse(table["radius"], values, values["splines"]), roller, not table["pitch"],
+            face and parts.frames[link].components(face), rail, guide, parts.sides[link], parts.structure.start,
+        )  # fmt: skip
 
     def dead(self, group: AssurGroup, where: str) -> str:
         """See `SingleLinkKind`."""
         (link,), joint = group.links, group.joints[1]
         return (
-            f"the force of {joint.name} does not move {link} at {where}, as its pressure angle is 90 deg, or {link} does "
-            f"not stay on the profile; take {_SLOWER}, move the pin or the line of {link}, or give a start near the "
-            "profile"
+            f"the force of {joint.name} does not move {link} at {where}, as its pressure angle is 90 deg, or {link} is not "
+            f"on the profile; take {_SLOWER}, move the pin or the line of {link}, or give a start nearer to the profile"
         )
 
 

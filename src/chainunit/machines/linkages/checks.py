@@ -27,12 +27,9 @@ _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
 
 def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
     """The fault of a table of guides or cams if the linkage has none."""
-    for table, kind, none in (
-        ("guides", PRISMATIC, "no joint of the linkage slides"),
-        ("cams", CAM, "there is no cam"),
-    ):
+    for table, kind, has in (("guides", PRISMATIC, "slides"), ("cams", CAM, "is a cam")):
         if table in data and not any(joint["type"] == kind for joint in joints):
-            yield table, f"{none}; leave the table out"
+            yield table, f"no joint of the linkage {has}; leave the table out"
 
 
 def study_fault(data: Mapping[str, Any]) -> None:

@@ -150,11 +150,11 @@ def with_differing(common: type, table: str, laws: Mapping[str, Mapping[str, flo
 def common_parameters(linear: bool, kinds: Collection[str], starts: Mapping[str, float]) -> type:
     """The parameters that a linkage has whatever its file says: of a driver that slides (`linear`) or turns, with
     the losses of the `kinds` of its joints, and with the given start values by name."""
-    parameters = WayParameters if linear else CommonParameters
-    without = [table for table, (kind, _) in LOSSES.items() if kind not in (*kinds, REVOLUTE)]
-    return with_starts(
-        declared_class(parameters.__name__, (), fields_of(parameters, without=without)), starts
+    declared = WayParameters if linear else CommonParameters
+    fields = fields_of(
+        declared, without=[name for name, (kind, _) in LOSSES.items() if kind not in (REVOLUTE, *kinds)]
     )
+    return with_starts(declared_class(declared.__name__, (), fields), starts)
 
 
 def with_starts(declared: type, starts: Mapping[str, float]) -> type:

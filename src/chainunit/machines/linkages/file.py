@@ -18,7 +18,7 @@ from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_
 from ...core.inputs import TOML, file_text
 from ...mechanism.assur import DYADS, FURTHER_DRIVERS, GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.curves import TableCurve
-from ...mechanism.expressions import value_of
+from ...mechanism.expressions import LawCourse, splines, value_of
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
@@ -35,10 +35,9 @@ from .entries import is_among, is_given, sized, usual_distance, usual_inertia
 from .further import BACK
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
-from .laws import LawCourse, splines
 from .load_entries import LoadReader
 from .model import machine_of
-from .names import model_name, name_fault, words_in
+from .names import model_name, name_fault
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
@@ -554,11 +553,12 @@ class _LinkageReader(LoadReader):
                 low, high = (f"{math.degrees(end):g} deg" for end in span)
                 raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)
+        curves = splines(tables, span is None)
         for joint in joints:
-            self.all(KINDS[joint["type"]].law_faults(joint, values, splines(tables, span is None)))
+            self.all(KINDS[joint["type"]].law_faults(joint, values, curves))
         for entry in drivers:
             if "law" in entry:
-                self.law(entry, value, values, splines(tables, span is None), span)
+                self.law(entry, value, values, curves, span)
         self.refuse()
         for entry, place in ((driver, value), *((entry, entry["start"]) for entry in drivers)):
             if entry["linear"]:

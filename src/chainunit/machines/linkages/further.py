@@ -19,9 +19,8 @@ from ...groups.driver import Course
 from ...mechanism.curves import TableCurve
 from ...mechanism.driven import Free, StateOfDrivers, driven_from
 from ...mechanism.driver_ports import ROTATING, SLIDING, DriverPort
-from ...mechanism.expressions import expression
+from ...mechanism.expressions import LawCourse, expression, held
 from ...mechanism.machine import MachineState
-from .laws import LawCourse, held
 from .structure import DriverEntry
 from .way import WHOLE
 

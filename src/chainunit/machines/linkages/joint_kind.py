@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .entries import EntryReader
 
 CAM = "cam"
+Seen = Callable[..., Vec2]
 Entry = float | str
 """A number, or the text of an expression."""
 JointTable = dict[str, Any]
@@ -170,13 +171,7 @@ class GuideKind(JointKind):
 class SingleLinkKind(JointKind):
     """A kind of joint by which, and a pin or a guide, a single link forms a group of the kind `alone`."""
 
-    def start(
-        self,
-        first: JointEntry,
-        joint: JointEntry,
-        place: Callable[[str, str], Vec2],
-        line: Callable[[JointEntry], Vec2],
-    ) -> dict[str, float]:
+    def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
         """What the start tells of the group, by names, from the rough `place` of points and the `line` of guides."""
         return {}
 

@@ -32,7 +32,7 @@ from ...mechanism.curves import TableCurve
 from ...mechanism.driven import StateOfDrivers
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
-from ...mechanism.expressions import expression, value_of
+from ...mechanism.expressions import expression, splines, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import DirectMachine, InverseMachine, names_of, slopes, words_on_motion
@@ -43,7 +43,6 @@ from .further import BACK, FurtherDrivers
 from .geometry import LinkGeometry, start_sides
 from .joint_kind import CAM
 from .joint_kinds import KINDS
-from .laws import splines
 from .loads import (
     ForceLaw,
     SpringDamper,
@@ -285,11 +284,12 @@ class LinkageDescription(LinkageOutputs):
                 for joint in self.data["joints"]
                 if "length" in joint
             }
-            sliding = (
-                dict.fromkeys(cams, p.cams if cams else None) | laws.get("cams", {}) | laws.get("guides", {})
+            usual, of_cams = (
+                getattr(p, "guides", None) or p.cams,
+                dict.fromkeys(cams, getattr(p, "cams", None)),
             )
-            usual = getattr(p, "guides", None) or p.cams
-            loads["guides"] = GuideLosses(usual, usual.damping, lengths, sliding)
+            differing = of_cams | laws.get("cams", {}) | laws.get("guides", {})
+            loads["guides"] = GuideLosses(usual, usual.damping, lengths, differing)
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)
         return DescribedLinkage(
             parts.ground, parts.driver, tuple(parts.groups), loads, parts, extremes=extremes

@@ -90,22 +90,18 @@ def groups_of(
     first = int(driving[0] in cylinders)
     groups[first:first] = alone
     followed = next((group for group in groups if group.kind in FOLLOWED), None)
-    if followed is not None:
-        (link, *others), kind = followed.links, FOLLOWED[followed.kind]
-        who = f"the links {', '.join((link, *others))} form" if others else f"the link {link} forms"
-    if followed is not None and any(entry.is_free for entry in drivers):
-        raise InputError(
-            f"{who} {kind}, and two drivers are inputs: {kind} needs one; give "
-            'the other one a law, phi = "..."',
-            key=link,
-        )
-    if followed is not None and (driver.linear or driver.swings):
+    if followed is None:
+        return groups
+    kind, many, link = f"a {followed.kind}", len(followed.links) > 1, followed.links[0]
+    who = f"the link{'s' * many} {', '.join(followed.links)} form{'s' * (not many)} {kind}"
+    if any(entry.is_free for entry in drivers):
+        law = 'give the other one a law, phi = "..."'
+        raise InputError(f"{who}, and two drivers are inputs: {kind} needs one; {law}", key=link)
+    if driver.linear or driver.swings:
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
-        raise InputError(
-            f"{who} {kind}, and the driver {moves}: {kind} needs a driver that {remedy} drive another link",
-            key=link,
-        )
+        needed = f"{kind} needs a driver that {remedy} drive another link"
+        raise InputError(f"{who}, and the driver {moves}: {needed}", key=link)
     return groups
 
 
@@ -194,8 +190,8 @@ class Structure:
         )
 
 
-FOLLOWED = {"triad": "a triad", "cam follower": "a cam follower"}
-"""Kinds of groups that are followed over a turn of the driver, in words."""
+FOLLOWED = ("triad", "cam follower")
+"""Kinds of groups that are followed over a turn of the driver."""
 CYLINDER = "cylinder"
 """Kind of the group of a cylinder that is pinned at both ends, with the lever that it swings: barrel, rod, lever."""
 DRIVER = "driver"
