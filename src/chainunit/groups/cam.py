@@ -31,8 +31,8 @@ _MISFIT = 1e-9
 
 
 class ProfilePoint(NamedTuple):
-    """A point of a profile: its `place` from the centre [m], its unit `normal` to the outside, its `speed` by the angle
-    [m/rad], its `curvature`, above 0 where it bulges [1/m], and the `change` of that by the length [1/m2]."""
+    """A point of a profile: its `place` from the centre [m], its `normal` to the outside, a unit vector, its `speed` by
+    the angle [m/rad], its `curvature`, above 0 where it bulges [1/m], and the `change` of that by the length [1/m2]."""
 
     place: Vec2
     normal: Vec2
@@ -59,13 +59,13 @@ class ProfilePoint(NamedTuple):
 
 @dataclass
 class CamFollower(Group):
-    """A follower on a pin or on a `rail` that moves in a known way. The centre of its roller or a point of its face is
-    `pin`, at `arm` in the frame of its bar; that of one on a pin has the direction of this arm, or of the normal of its
-    face, that of one on a rail starts at `pin`. `cam` is the centre of the profile, the pin `centre`, with its angle 0;
-    `curve` the radius over the angle; `roller` the radius of the roller, with which the profile `grows` to the pitch
-    curve; `face` the normal of a face, away from the cam. `guide` is the pin at which the force of the rail acts. The
-    angle of the contact counts from the pin of the follower, or from its rail; it is `near` to its value at the place
-    `start` of the driver. The margin is the cosine of the pressure angle, below 0 of an undercut profile."""
+    """A follower on a pin or on a `rail` that moves in a known way. The centre of its roller or a point of its face
+    is `pin`, at `arm` in the frame of its bar; that of one on a pin has the direction of this arm, or of the normal of
+    its face, that of one on a rail starts at `pin`. `cam` is the centre of the profile, the pin `centre`, with its
+    angle 0; `curve` the radius over the angle; `roller` the radius of the roller, with which the profile `grows` to the
+    pitch curve; `face` the normal of a face, away from the cam. `guide` is the pin of the force of the rail. The angle
+    of the contact, from the pin of the follower or from its rail, is `near` to its value at the place `start` of the
+    driver. The margin is the cosine of the pressure angle, below 0 of an undercut profile."""
 
     bar: Bar
     pin: str
@@ -115,8 +115,8 @@ class CamFollower(Group):
         return at.beside(self.roller) if self.roller is not None and self.grows else at
 
     def _sight(self, linkage: LinkageInMotion) -> tuple[Link, Link, Vec2, Vec2 | None]:
-        """The frame of the cam, that of the start of the follower, and what the cam sees of this one: its pin, or a point
-        of its rail, and the direction of the rail."""
+        """The frame of the cam, that of the start of the follower, and what the cam sees of this one: its pin, or a
+        point of its rail, and the direction of the rail."""
         cam, pin = self.cam.at_position(linkage.links), linkage.pins.get(self.bar.pin)
         base = Link(pin, cam.u, 0.0, 0.0) if self.rail is None else self.rail.at_position(linkage.links)
         point, along = (rotated(v, mirrored(cam.u)) for v in (base.pin.p - cam.pin.p, base.u))

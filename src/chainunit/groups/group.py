@@ -87,8 +87,8 @@ def _rate(z: Sequence[Any], link: int) -> Third:
 
 
 class Outline(NamedTuple):
-    """A closed curve that a picture shows: its `points` [m], once lengths are numbers, count from a pin, in the direction
-    of a `frame`."""
+    """A closed curve that a picture shows: its `points` [m], if lengths are numbers, count from a pin, in the
+    direction of a `frame`."""
 
     pin: str
     frame: Rail

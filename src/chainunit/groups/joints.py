@@ -129,8 +129,8 @@ class HingeData(NamedTuple):
 
 
 class GuideData(NamedTuple):
-    """A sliding joint, or the contact with a cam, as data: the pin at which its reaction counts, the link on which this
-    acts, and the other link of the same group, or a line of a link before it; of a cam its centre and its angle 0."""
+    """A sliding joint, or the contact with a cam, as data: the pin at which its reaction counts, the link on which
+    this acts, and the other link of the same group, or a line of a link before it; of a cam its centre and angle 0."""
 
     pin: str
     link: str
@@ -174,8 +174,8 @@ class GuideData(NamedTuple):
 
 class Slide(NamedTuple):
     """The motion in a sliding joint: the direction `d` of its line, the way `s` of the link that its reaction acts on
-    along it, the derivatives of that by q [m, m/rad, m/rad2], and of the angle of the line. The lever of a contact,
-    which has no way, about the start of the link has the derivative `growth`, as the normal `d` turned by 90 deg has."""
+    along it, the derivatives of that by q [m, m/rad, m/rad2], and of the angle of the line. A contact has no way;
+    `growth` is the derivative of the lever of `d`, turned by 90 degrees, about the start of the link."""
 
     d: Vec2
     s: Any
@@ -397,7 +397,7 @@ class Guide(Hinge):
 class Contact(Placed):
     """The contact of a follower with a cam at one position: the frame `cam` of the profile, the start `base` of the
     follower, the `arm` from there to the centre of its roller, or to a point of its face, the radius of the `roller`,
-    None for a face, and the `ProfilePoint` of the pitch curve, or of the profile under a face, turned with the cam."""
+    None for a face, and the point of the pitch curve, or of the profile under a face, turned with the cam."""
 
     __slots__ = ("_arm", "_at", "_base", "_cam", "_lever", "_reach", "_roller")
 
@@ -413,8 +413,8 @@ class Contact(Placed):
         return [{0: self._at.normal.x, 1: self._at.normal.y, 2: self._lever}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
-        """See `Placed`: what the gap loses while the next derivatives of the follower are 0. A profile counts up to its
-        third order: by its curvature and the change of that."""
+        """See `Placed`: what the gap loses while the next derivatives of the follower are 0. A profile counts by its
+        curvature and the change of that."""
         (seen, turn), at = self._seen(rates, len(rates) + 1, before), self._at
         n, t, k = at.normal, at.normal.turned(), at.curvature
         if self._roller is not None:
@@ -427,8 +427,8 @@ class Contact(Placed):
         return [(distance - seen.dot(rotated(_direction(turn), n))).parts[-1]]
 
     def _seen(self, rates: Rates, order: int, before: Third | None = None) -> tuple[Vec2, Jet]:
-        """The point of the follower from the centre, as the cam sees it, and the angle of the follower less that of the
-        cam, up to an `order` of derivatives; those of the follower beyond `rates` are 0."""
+        """The point of the follower from the centre, as the cam sees it, and the angle of the follower less that of
+        the cam, up to an `order` of derivatives; those of the follower beyond `rates` are 0."""
         cam, point = self._cam, self._base - self._cam.pin.p
         known = [(cam.pin.p1, cam.t1), (cam.pin.p2, cam.t2), *([] if before is None else [before])][:order]
         x, y, angle = (Jet(0.0, *(z[k] for z in rates), *[0.0] * (order - len(rates))) for k in range(3))

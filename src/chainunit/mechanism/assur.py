@@ -28,7 +28,7 @@ class FreeLinksError(InputError):
 
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
-    contain. `alone` is the kind of the group that a single link forms by it and a joint of one of the kinds `seats`."""
+    contain. `alone` is the kind of the group that a single link forms by it and a joint of the kinds `seats`."""
 
     name: str
     kind: str

@@ -207,7 +207,7 @@ class InverseMachine(LinkageModel, MachineModel):
         self, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
     ) -> list[tuple[Variable, Any]]:
         """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; the places of all
-        pins, ``x(A)`` and ``y(A)``; and the angle of the line of each sliding block or cam, ``line(ram)``. A machine whose
+        pins, ``x(A)`` and ``y(A)``; and the angle of each sliding block or cam, ``line(ram)``. A machine whose
         outputs depend on states has no places here."""
         from .sketch import directions
 

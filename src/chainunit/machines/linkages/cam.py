@@ -102,8 +102,8 @@ class CamKind(SingleLinkKind):
         elif joint["face"]:
             if not k.min() > 0.0:
                 message = (
-                    f"is hollow or straight at phi = {_degrees(int(np.argmin(k)))}, and a flat face bridges it there; "
-                    f"take a roller, {_SLOWER}"
+                    f"is hollow or straight at phi = {_degrees(int(np.argmin(k)))}, and a flat face bridges it; take "
+                    f"a roller, {_SLOWER}"
                 )
         else:
             of, roller, sharp = "roller", value_of(MATH, joint["roller"], values), k if joint["pitch"] else -k
@@ -114,8 +114,8 @@ class CamKind(SingleLinkKind):
                     1e3 / sharp[worst],
                 )
                 message = (
-                    f"is {1e3 * roller:.4g} mm, and the {what} with a radius of {most:.4g} mm at phi = {_degrees(worst)}: "
-                    f"the cam is undercut there; take a roller of less than {most:.4g} mm, {_SLOWER}"
+                    f"is {1e3 * roller:.4g} mm, and the {what} with a radius of {most:.4g} mm at phi = "
+                    f"{_degrees(worst)}: the cam is undercut; take a roller of less than {most:.4g} mm, {_SLOWER}"
                 )
         if message:
             yield f"joints.{joint['name']}.{of}", message
@@ -166,8 +166,8 @@ class CamKind(SingleLinkKind):
         """See `SingleLinkKind`."""
         (link,), joint = group.links, group.joints[1]
         return (
-            f"the force of {joint.name} does not move {link} at {where}, as its pressure angle is 90 deg, or {link} is not "
-            f"on the profile; take {_SLOWER}, move the pin or the line of {link}, or give a start nearer to the profile"
+            f"the force of {joint.name} does not move {link} at {where}, as its pressure angle is 90 deg, or {link} is "
+            f"not on the profile; take {_SLOWER}, move the pin or the line of {link}, or give a start on the profile"
         )
 
 

@@ -113,8 +113,8 @@ class LinkGeometry:
 
 
 def start_sides(geometry: LinkGeometry) -> dict[str, float]:
-    """The assembly mode of each dyad that has two, by its first link, and what the start tells of single links, from the
-    rough poses of the structure; the `geometry` has numbers.
+    """The assembly mode of each dyad that has two, by its first link, and what the start tells of single links, from
+    the rough poses of the structure; the `geometry` has numbers.
 
     Raises
     ------

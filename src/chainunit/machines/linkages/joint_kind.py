@@ -60,8 +60,8 @@ class JointEntry(NamedTuple):
 
 
 class JointParts(Protocol):
-    """What a kind of joint needs of the parts of a linkage: the links with numbers, the frames of links in their groups,
-    and what the start tells of groups, by link."""
+    """What a kind of joint needs of the parts of a linkage: the links with numbers, the frames of links in their
+    groups, and what the start tells of groups, by link."""
 
     geometry: Any
     frames: Any

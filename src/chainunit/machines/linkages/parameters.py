@@ -65,7 +65,7 @@ class ParameterReader(EntryReader):
     def differing(
         self, joints: Sequence[Mapping[str, Any]], common: Mapping[str, float]
     ) -> dict[str, dict[str, dict[str, float]]]:
-        """By table ("pins", "guides", "cams") and joint, the start values of the losses of joints that differ from the
+        """By table of losses and joint, the start values of the losses of joints that differ from the
         others, which have the `common` ones."""
         laws: dict[str, dict[str, dict[str, float]]] = {}
         for table, (kind, declared) in LOSSES.items():
