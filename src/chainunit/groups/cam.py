@@ -31,8 +31,8 @@ _MISFIT = 1e-9
 
 
 class ProfilePoint(NamedTuple):
-    """A point of a profile: its `place` from the centre [m], its `normal` to the outside, a unit vector, its `speed` by
-    the angle [m/rad], its `curvature`, above 0 where it bulges [1/m], and the `change` of that by the length [1/m2]."""
+    """A point of a profile: its `place` from the centre [m], its `normal` to the outside, a unit vector, its `speed`
+    by the angle [m/rad], its `curvature`, above 0 where it bulges [1/m], and its `change` by the way [1/m2]."""
 
     place: Vec2
     normal: Vec2
@@ -60,12 +60,12 @@ class ProfilePoint(NamedTuple):
 @dataclass
 class CamFollower(Group):
     """A follower on a pin or on a `rail` that moves in a known way. The centre of its roller or a point of its face
-    is `pin`, at `arm` in the frame of its bar; that of one on a pin has the direction of this arm, or of the normal of
-    its face, that of one on a rail starts at `pin`. `cam` is the centre of the profile, the pin `centre`, with its
-    angle 0; `curve` the radius over the angle; `roller` the radius of the roller, with which the profile `grows` to the
-    pitch curve; `face` the normal of a face, away from the cam. `guide` is the pin of the force of the rail. The angle
-    of the contact, from the pin of the follower or from its rail, is `near` to its value at the place `start` of the
-    driver. The margin is the cosine of the pressure angle, below 0 of an undercut profile."""
+    is `pin`, at `arm` in the frame of its bar; that of one on a pin has the direction of this arm, or of the normal
+    of its face, that of one on a rail starts at `pin`. `cam` is the centre of the profile, the pin `centre`, with its
+    angle 0; `curve` the radius over the angle; `roller` that of the roller, with which the profile `grows` to the
+    pitch curve; `face` the normal of a face, away from the cam. `guide` is the pin of the force of the rail. The
+    angle of the contact, from the pin of the follower or its rail, is `near` at the place `start` of the driver. The
+    margin is the cosine of the pressure angle, below 0 of an undercut profile."""
 
     bar: Bar
     pin: str

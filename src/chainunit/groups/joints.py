@@ -130,7 +130,7 @@ class HingeData(NamedTuple):
 
 class GuideData(NamedTuple):
     """A sliding joint, or the contact with a cam, as data: the pin at which its reaction counts, the link on which
-    this acts, and the other link of the same group, or a line of a link before it; of a cam its centre and angle 0."""
+    this acts, and the other link of the same group, or a line of a link before; of a cam its centre and angle 0."""
 
     pin: str
     link: str

@@ -110,6 +110,8 @@ class MachineModel(Model):
     side have the same name."""
     cuts: bool = False
     """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
+    contacts: tuple[str, ...] = ()
+    """The outputs with the forces of contacts, which lift off where these are below 0."""
     never_repeats: str = ""
     """The reason, in words, why no turn of its runs is like the one before; empty if steady turns are alike."""
 

@@ -83,8 +83,7 @@ class Animation:
     circles: tuple[tuple[str, str], ...] = ()
     """circles, each by the joints at its centre and on its rim"""
     outlines: Mapping[str, Any] = field(default_factory=dict)
-    """closed curves by name, each with the joint at which it lies and its points from there [m]; `blocks` of a run have
-    their angles"""
+    """closed curves by name, each with its joint and its points from there [m]; `blocks` of a run have its angle"""
     groups: tuple[str, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     """the labels of joints whose label differs from their name"""

@@ -450,6 +450,12 @@ _HAPPENINGS = {
             remedy="More rods are nearer to a chain.",
         ),
         warning(
+            "lifts-off",
+            "The force of a cam on its follower falls below 0: the follower would lift off: {where}.",
+            remedy="Take a stronger spring, less mass, a slower rise, or a groove that guides the roller.",
+            sizes={"N": "least"},
+        ),
+        warning(
             "current-limit",
             "The motor runs into its current limit of {passed}: {where}.",
             sizes={"A": "passed"},
@@ -502,6 +508,13 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and is_pushed:
         yield "rod-end-pushed", "", {}
+    for contact in study.drive.machine.model.contacts:
+        if (least := float(study.runs[name][f"machine.{contact}"].min())) < 0.0:
+            yield (
+                "lifts-off",
+                f"{contact.removesuffix('.normal')} with {number(least, 'N')}",
+                {"least": least},
+            )
     largest = study.drive.motor.current_limit(study.drive.parameters)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current-limit", "", {}

@@ -166,7 +166,7 @@ class CamKind(SingleLinkKind):
         """See `SingleLinkKind`."""
         (link,), joint = group.links, group.joints[1]
         return (
-            f"the force of {joint.name} does not move {link} at {where}, as its pressure angle is 90 deg, or {link} is "
+            f"the force of {joint.name} does not move {link} at {where}: its pressure angle is 90 deg, or {link} is "
             f"not on the profile; take {_SLOWER}, move the pin or the line of {link}, or give a start on the profile"
         )
 

@@ -260,7 +260,7 @@ class GearKind(SingleLinkKind):
         return float(rate)
 
     def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
-        """The wheel `link`, which turns on the arm in its pin `first` and meshes with another wheel in the `joint`. If
+        """The wheel `link`, which turns on the arm in its pin `first` and meshes with another one in the `joint`. If
         the other wheel is itself driven by a gear on the same arm, it is an idler: the turn then follows from the
         wheel that drives it, by the product of both ratios."""
         other, arm = joint.other_link(link), joint.third

@@ -505,6 +505,9 @@ class LinkageDescription(LinkageOutputs):
             Outputs=self.outputs,
             joints={variable: receivers[name][0] for name, variable in variables.items()},
             pins=variables,
+            contacts=tuple(
+                f"{variables[j.name]}.normal" for j in self.structure.joints.values() if j.kind == CAM
+            ),
             usual_speed=(0.05, 200.0),
             described_by=self,
             linkage=self.linkage,
