@@ -508,8 +508,9 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and is_pushed:
         yield "rod-end-pushed", "", {}
+    run = study.steady if name == STEADY else study.runs[name]
     for contact in study.drive.machine.model.contacts:
-        if (least := float(study.runs[name][f"machine.{contact}"].min())) < 0.0:
+        if (least := float(run[f"machine.{contact}"].min())) < 0.0:
             yield (
                 "lifts-off",
                 f"{contact.removesuffix('.normal')} with {number(least, 'N')}",
