@@ -128,12 +128,9 @@ class Multibody:
         point, slope, bend = r * u, r1 * u + r * t, (r2 - r) * u + 2.0 * r1 * t
         cam, (on, _) = joint["by"][0], joint["on"]
         turn = rotation(self.angle(x, cam)[0])
-        (f, f_by), (c, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+        f, f_by = self.place(x, *self.end(joint, "on"))
         if joint["face"]:
-            (h, h_by), (angle, angle_by) = (
-                self.place(x, on, self.points[on][joint["face"]]),
-                self.angle(x, on),
-            )
+            h, h_by = self.place(x, on, self.points[on][joint["face"]])
             m, m_by = turned(h - f), np.array([-(h_by - f_by)[1], (h_by - f_by)[0]])
             q, q_by = self.place(x, cam, self.points[cam][joint["by"][1]] + point)
             d, d_by = turn @ slope, np.outer(turned(turn @ slope), self.angle(x, cam)[1])

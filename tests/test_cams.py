@@ -11,9 +11,11 @@ import math
 import fmpy
 import numpy as np
 import pytest
+from javascript_hosts import node
 from multibody import Multibody
 from scipy.interpolate import CubicSpline
 from test_linkage_random import by_the_machine, deviations
+from test_live import check_turn, varied
 
 from chainunit.core.errors import InputError
 from chainunit.core.native.compilers import compiler
@@ -22,6 +24,11 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
+from chainunit.report.drawing import drawing
+from chainunit.report.live.machine import of_linkage
+from chainunit.study import config
+from chainunit.study.linkage_turn import linkage_findings
+from chainunit.study.run import run_study
 
 
 def link(mass, **points):
@@ -94,7 +101,8 @@ def flat_tappet():
         "joints": {
             "guide": {"on": "tappet.T", "by": "ground.G", "toward": "G2", "angle": -0.1},
             "lobe": {
-                "on": "tappet.F", "by": "shaft.O1", "face": "F2", "radius": "base + lift * sin(phi) + 0.2 * lift * cos(2 * phi)"
+                "on": "tappet.F", "by": "shaft.O1", "face": "F2",
+                "radius": "base + lift * sin(phi) + 0.2 * lift * cos(2 * phi)",
             },
         },
         "parameters": {"base": "30 mm", "lift": "4 mm"},
@@ -180,8 +188,8 @@ def test_against_an_independent_solution(name):
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_torque_inertia_and_slopes_belong_together(name):
-    """Torque by the contact and by virtual work; the inertia is that of the kinetic energy; slopes against differences
-    of eighth order, with friction in pins, guides and at the cam."""
+    """Torque by the contact and by virtual work; the inertia is that of the kinetic energy; slopes against
+    differences of eighth order, with friction in pins, guides and at the cam."""
     data = MACHINES[name][0]() | {"cams": {"friction": 0.12}, "pins": {"friction": 0.1, "diameter": 0.03}}
     if "guide" in data["joints"]:
         data["guides"] = {"friction": 0.05}
@@ -210,3 +218,291 @@ def test_torque_inertia_and_slopes_belong_together(name):
         assert here[slope] == pytest.approx(differences, abs=1e-8 * np.max(np.abs(differences)) + 1e-12), (
             slope
         )
+
+
+@pytest.mark.second
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
+@pytest.mark.parametrize("name", MACHINES)
+def test_fmus(name, make, tmp_path):
+    """The same numbers through the FMU, before and after a step."""
+    model, body, h = machine_of(described(name)), independent(name), 0.01
+    if make == "python":
+        file = export_python(model, tmp_path / "unit.fmu")
+    else:
+        file = export(model, tmp_path / "unit.fmu", fmi=int(make[-1]))
+    for q, w, a in STATES[:2]:
+        wanted = body.solution(body.followed(q), q, w, a)
+        rows = fmpy.simulate_fmu(
+            str(file), stop_time=h, step_size=h, output=[*wanted], fmi_type="CoSimulation",
+            start_values={"phi": q, "w": w, "a": a},
+        )  # fmt: skip
+        end = q + h * w + 0.5 * h * h * a, w + h * a, a
+        for row, values in ((rows[0], wanted), (rows[-1], body.solution(body.followed(end[0]), *end))):
+            found = {key: float(row[key]) for key in values}
+            key, worst = max(deviations(found, values), key=lambda pair: pair[1])
+            assert worst < 1e-11, (q, key, worst)
+
+
+@node
+@pytest.mark.second
+@pytest.mark.parametrize("name", ["offset_roller", "flat_lever"])
+def test_live_pages(name):
+    """A turn in JavaScript is that of Python, also with other lengths and loads."""
+    machine = Machine(machine_of(described(name)))
+    live = of_linkage(machine, 5.0, f"{name}.toml")
+    check_turn(live, machine, 5.0, machine.model.Feed(), varied(live, 4, 1))
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_friction_of_the_contact_takes_its_slip(name):
+    """Power of the friction by the forces and by the speeds of both links at the contact, taken from differences of
+    their places; the driver gives all of it."""
+    data, joint = MACHINES[name][0](), MACHINES[name][1]
+    with_loss = Machine(
+        machine_of(description_of(data | {"cams": {"friction": 0.2, "v_smooth": 1e-9}}, name))
+    )
+    without = Machine(machine_of(description_of(data, name)))
+    q, w = np.linspace(0.1, 6.0, 12), 3.0
+    reaction = without.evaluate({"phi": q, "w": w})
+    normal = np.array([reaction[f"{joint}.fx"], reaction[f"{joint}.fy"]]) / reaction[f"{joint}.normal"]
+    entry = described(name)["joints"]
+    entry = next(each for each in entry if each["name"] == joint)
+    (follower, point), (cam, centre) = entry["on"], entry["by"]
+    here = without.evaluate({"phi": q})
+    place = np.array([here[f"{follower}.{point}.{axis}"] for axis in "xy"])
+    middle = np.array([here[f"{cam}.{centre}.{axis}"] for axis in "xy"])
+    if entry["face"]:
+        # the contact at the angle of the profile that the independent solution has
+        _, _, _, radius = MACHINES[name]
+        contacts = []
+        for k, angle in enumerate(q):
+            body = independent(name)
+            s, pose = body.followed(angle)[-1], body.followed(angle)
+            turn = pose[body.columns(cam)][2] + s
+            contacts.append(middle[:, k] + radius(s)[0] * np.array([math.cos(turn), math.sin(turn)]))
+        contact = np.array(contacts).T
+    else:
+        contact = place - float(entry["roller"]) * normal
+
+    def speed(link, at, origin):
+        velocity = [without.evaluate({"phi": q, "w": w})[f"{link}.{origin}.v{axis}"] for axis in "xy"]
+        start = np.array([here[f"{link}.{origin}.{axis}"] for axis in "xy"])
+        spin = without.evaluate({"phi": q, "w": w})[f"{link}.w"]
+        return np.array(velocity) + spin * np.array([-(at - start)[1], (at - start)[0]])
+
+    slip = np.abs(
+        np.sum((speed(follower, contact, point) - speed(cam, contact, centre)) * [-normal[1], normal[0]], 0)
+    )
+    wanted = 0.2 * np.abs(reaction[f"{joint}.normal"]) * slip
+    lost = with_loss.evaluate({"phi": q, "w": w})
+    assert (lost["tau"] - reaction["tau"]) * w == pytest.approx(wanted, rel=1e-6)
+    assert lost["dissipated_power"] - reaction["dissipated_power"] == pytest.approx(wanted, rel=1e-6)
+
+
+def test_an_eccentric_circle_is_a_linkage():
+    """A circle about a point beside the bearing: a roller on a slide is a slider-crank, one on a lever a four-bar,
+    and a flat face a yoke."""
+    circle = {"e": "8 mm", "R": "30 mm"}
+    radius = "e * cos(phi) + sqrt(R * R - e * e * sin(phi) * sin(phi))"
+    start = {"phi": 0.3, "points": {"P": [0.01, 0.045]}}
+
+    def machine(parts, joints):
+        data = offset_roller() | {
+            "start": start,
+            "joints": joints,
+            "parameters": circle if "cam" in joints else {},
+        }
+        data["links"] = {"shaft": link(2.0, O1=[0, 0], E=[0.008, 0])} | parts.pop("links")
+        data["ground"] |= parts.pop("ground", {})
+        data["loads"] = {"push": {"on": "follower.T", "force": [20, -80]}}
+        return Machine(machine_of(description_of(data | parts, "circle")))
+
+    guide = {"guide": {"on": "follower.P", "by": "ground.G", "toward": "G2"}}
+    cam = {"on": "follower.P", "by": "shaft.O1", "radius": radius, "roller": "12 mm"}
+    slide, lever = link(1.5, P=[0, 0], T=[0.01, 0.1]), link(1.2, O2=[0, 0], P=[-0.09, 0.03], T=[0.05, 0.0])
+    rod = {"rod": {"points": {"E": [0, 0], "P": [0.042, 0]}}}
+    pairs = [
+        ({"links": {"follower": slide}}, {"links": {**rod, "follower": slide}}, guide),
+        ({"links": {"follower": lever}, "ground": {"O2": [0.1, 0.02]}},
+         {"links": {**rod, "follower": lever}, "ground": {"O2": [0.1, 0.02]}}, {}),
+    ]  # fmt: skip
+    q = np.linspace(0.0, 6.0, 13)
+    for with_cam, with_rod, joints in pairs:
+        one = machine(copy.deepcopy(with_cam), joints | {"cam": cam}).evaluate({"phi": q, "w": 3.0, "a": 5.0})
+        other = machine(copy.deepcopy(with_rod), joints).evaluate({"phi": q, "w": 3.0, "a": 5.0})
+        assert one["tau"] == pytest.approx(other["tau"], abs=1e-12)
+        force = np.abs([one["cam.fx"], one["cam.fy"]])
+        assert force == pytest.approx(np.abs([other["P.fx"], other["P.fy"]]), abs=1e-10)
+        for slope in ("tau_bias_dphi", "tau_bias_dw", "dJ_dphi"):
+            assert one[slope] == pytest.approx(other[slope], abs=1e-10), slope
+    face = {"on": "follower.P", "by": "shaft.O1", "radius": radius, "face": "T"}
+    yoke = link(1.5, P=[0, 0], T=[0.1, 0.0])
+    flat = machine({"links": {"follower": yoke}}, guide | {"cam": face}).evaluate(
+        {"phi": q, "w": 3.0, "a": 5.0}
+    )
+    assert flat["follower.P.y"] == pytest.approx(0.03 + 0.008 * np.sin(q), abs=1e-15)
+    assert flat["follower.P.ay"] == pytest.approx(0.008 * (5.0 * np.cos(q) - 9.0 * np.sin(q)), abs=1e-14)
+
+
+def test_the_picture_has_the_profile_and_the_report_the_least_force():
+    machine = Machine(machine_of(described("offset_roller")))
+    picture = drawing(machine)
+    assert picture.count('stroke-dasharray="4 4"') == 3
+    findings = linkage_findings(machine, 20.0)
+    assert findings.sentence == "shaft + cam follower (plunger)"
+    q = np.linspace(0.0, 2.0 * math.pi, 721)
+    least = np.min(machine.evaluate({"phi": q, "w": 20.0})["lobes.normal"])
+    assert findings.joints["lobes"].least == pytest.approx(least, rel=1e-4)
+    assert findings.joints["guide"].least is None
+    outlines = machine.drive(0.0).linkage.outlines
+    assert [*outlines] == ["lobes", "lobes.roller"]
+    x, y = outlines["lobes"].points().x, outlines["lobes"].points().y
+    assert np.hypot(x, y)[0] == pytest.approx(0.04, rel=1e-12)
+
+
+@pytest.mark.second
+def test_a_study_warns_of_a_follower_that_lifts_off(tmp_path):
+    lines = """
+    title = "Plunger"
+    parameters = { base = "40 mm", lift = "6 mm" }
+    ground = { O1 = [0, 0], G = [0, 0], G2 = [0, 1] }
+    driver = { link = "shaft" }
+    links.shaft.points = { O1 = [0, 0] }
+    links.plunger = { points = { P = [0, 0] }, mass = "1 kg" }
+    joints.guide = { on = "plunger.P", by = "ground.G", toward = "G2" }
+    joints.cam = { on = "plunger.P", by = "shaft.O1", radius = "base + lift * cos(2 * phi)", roller = "10 mm" }
+    start.points = { P = [0, 0.05] }
+    """
+    (tmp_path / "plunger.toml").write_text("\n".join(line.strip() for line in lines.splitlines()))
+    study = """
+    [system]
+    machine = "plunger.toml"
+    motor = "IE3 4-pole 0.25 kW, 71M"
+    [run]
+    crank_speed = "%s rev/min"
+    settle_turns = 1
+    turns = 1
+    step = 0.001
+    """
+    codes = {}
+    for speed in (600, 120):
+        text = "\n".join(line.strip() for line in (study % speed).splitlines())
+        result = run_study(config.parse(text, str(tmp_path / "study.toml")), tmp_path)
+        codes[speed] = {remark.code: remark for remark in result.remarks}
+    assert "lifts-off" in codes[600] and "lifts-off" not in codes[120]
+    assert "cam with -" in codes[600]["lifts-off"].text
+
+
+def changed(make=offset_roller, cam=None, **tables):
+    data = copy.deepcopy(make()) | tables
+    name = "lobes" if "lobes" in data["joints"] else "lobe"
+    for key, value in (cam or {}).items():
+        if value is None:
+            del data["joints"][name][key]
+        else:
+            data["joints"][name][key] = value
+    return data
+
+
+def on_the_cam():
+    data = changed()
+    data["joints"]["lobes"] |= {"on": "shaft.O1", "by": "plunger.P"}
+    return data
+
+
+LARGE = {"parameters": {"base": "40 mm", "lift": "15 mm"}}
+SWING = {"driver": {"link": "shaft", "range": [-0.5, 0.5]}}
+
+
+@pytest.mark.parametrize(
+    ("data", "key", "words"),
+    [
+        (changed(cam={"radius": None, "type": "cam"}), "joints.lobes.radius", "is missing"),
+        (
+            changed(cam={"radius": "(base + lift) * phi"}),
+            "joints.lobes.radius",
+            "is 0 m at phi = 0 deg; must be > 0",
+        ),
+        (changed(cam={"radius": "base * cos(phi) + lift"}), "joints.lobes.radius", "must be > 0 all around"),
+        (
+            changed(cam={"radius": "base + lift * phi"}),
+            "joints.lobes.radius",
+            "its size jumps at phi = 0 deg",
+        ),
+        (
+            changed(cam={"radius": "base + lift * abs(sin(phi))"}),
+            "joints.lobes.radius",
+            "its slope jumps at phi = 180 deg",
+        ),
+        (
+            changed(cam={"radius": "base + lift * max(0, sin(phi)) * sin(phi)"}),
+            "joints.lobes.radius",
+            "its second derivative jumps at phi = 0 deg; a profile is smooth up to the second derivative: take a",
+        ),
+        (
+            changed(cam={"radius": "base + table(phi, 0, 0, 1, 1) * lift"}),
+            "joints.lobes.radius",
+            "jumps at phi =",
+        ),
+        (changed(cam={"roller": "-2 mm"}), "joints.lobes.roller", "must be >= 0"),
+        (
+            changed(cam={"roller": "120 mm"}, **LARGE),
+            "joints.lobes.roller",
+            "profile is hollow with a radius of 78.82 mm",
+        ),
+        (changed(cam={"roller": "120 mm"}, **LARGE), "joints.lobes.roller", "a roller of less than 78.82 mm"),
+        (
+            changed(cam={"roller": "42 mm", "pitch": True}),
+            "joints.lobes.roller",
+            "pitch curve bulges with a radius of",
+        ),
+        (changed(cam={"pitch": 1}), "joints.lobes.pitch", "must be true or false"),
+        (changed(cam={"face": "T"}), "joints.lobes.roller", "the follower has a face; take one of both out"),
+        (
+            changed(cam={"face": "Q", "roller": None}),
+            "joints.lobes.face",
+            "another point of plunger on its face: T",
+        ),
+        (
+            changed(flat_tappet, cam={"radius": "base + lift * cos(4 * phi)"}),
+            "joints.lobe.radius",
+            "flat face bridges it",
+        ),
+        (changed(cam={"type": "gear"}), "joints.lobes.", "belongs to a cam joint, and this one is a gear"),
+        (on_the_cam(), "links.plunger", "has the profile of lobes, and its follower shaft moves before it"),
+        (changed(**SWING), "links.plunger", "forms a cam follower, and the driver swings"),
+        (changed(cams={"friction": -1}), "cams.friction", "must be >= 0"),
+        (
+            changed(ground={"O1": [0, 0], "G": [0.09, 0], "G2": [0.09, 1], "S": [0, 1]}),
+            "links.plunger",
+            "pressure angle",
+        ),
+    ],
+    ids=lambda x: x if isinstance(x, str) and " " in x else "",
+)
+def test_what_is_refused(data, key, words):
+    with pytest.raises(InputError) as caught:
+        machine_of(description_of(data, "wrong"))
+    faults = [(fault.key or "", str(fault)) for fault in caught.value.faults]
+    assert any(found.startswith(key) and words in text for found, text in faults), faults
+
+
+def test_a_table_of_losses_needs_a_cam():
+    data = {name: entry for name, entry in flat_lever().items() if name != "joints"}
+    data["joints"] = {"arm": {"on": "lever.F", "by": "shaft.A"}}
+    with pytest.raises(InputError, match="no joint of the linkage is a cam; leave the table out"):
+        machine_of(description_of(data | {"cams": {"friction": 0.1}}, "none"))
+
+
+def test_a_cam_that_differs():
+    """A cam may have losses of its own."""
+    data = offset_roller() | {"cams": {"friction": 0.1, "lobes": {"friction": 0.3}}}
+    both = [
+        Machine(machine_of(description_of(offset_roller() | {"cams": {"friction": x}}, "one")))
+        for x in (0.1, 0.3)
+    ]
+    at = {"phi": np.linspace(0.0, 6.0, 9), "w": 3.0}
+    differing = Machine(machine_of(description_of(data, "differing"))).evaluate(at)["tau"]
+    common, own = (machine.evaluate(at)["tau"] for machine in both)
+    assert differing == pytest.approx(own, rel=1e-13) and np.max(np.abs(common - own)) > 1e-3
