@@ -66,9 +66,13 @@ class Multibody:
         self.wheels, self.phases = wheels or {}, {}
         if self.wheels:
             x = self.closed(self.start, self.rough)
-            self.phases = {
-                joint["name"]: self.lag(x, joint) for joint in self.joints if joint["type"] == "gear"
-            }
+            phases = {joint["name"]: self.lag(x, joint) for joint in self.joints if joint["type"] == "gear"}
+            for joint in self.joints:
+                if joint["type"] == "rack":
+                    d, radius = self.pitch_line(x, joint)
+                    (p, _), (c, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+                    phases[joint["name"]] = d @ (p - c) + radius * self.angle(x, joint["by"][0])[0]
+            self.phases = phases
 
     def number(self, entry, **more):
         """The value of an entry."""
@@ -117,6 +121,23 @@ class Multibody:
         distance = np.sqrt((e - c) @ (e - c))
         radius = distance * teeth[0] / (teeth[0] + (-1 if inner else 1) * teeth[1])
         return c + (e - c) / distance * radius, turned(e - c) / distance, radius
+
+    def pitch_line(self, x, joint):
+        """Of a rack in the ground: its direction, and how far to the left of the centre of its pinion it lies."""
+        guide = next(each for each in self.joints if each["name"] == joint["guide"])
+        d = self.line(x, guide)
+        (p, _), (c, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+        return d, turned(d) @ (p - c)
+
+    def at_the_start(self, x, joint):
+        """The gap of the wheel of a gear at the start, or of the rack, which has its rough place."""
+        wheel = self.wheels[joint["name"]]
+        if wheel == joint["by"][0]:
+            angle, row = self.angle(x, wheel)
+            return angle - self.rough[self.columns(wheel)][2], row
+        p, by = self.place(x, *self.end(joint, "on"))
+        d, _ = self.pitch_line(x, joint)
+        return d @ (p - self.place(self.rough, *self.end(joint, "on"))[0]), d @ by
 
     def contact(self, x, joint):
         """The gaps of a cam and its follower, and their derivatives by the unknowns."""
@@ -174,6 +195,15 @@ class Multibody:
                     gaps.append(angle - self.rough[self.columns(wheel)][2])
                 rows.append(row)
                 continue
+            if joint["type"] == "rack":
+                d, radius = self.pitch_line(x, joint)
+                (p, p_by), (c, c_by) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+                angle, by = self.angle(x, joint["by"][0])
+                rows.append(d @ (p_by - c_by) + radius * by)
+                gaps.append(d @ (p - c) + radius * angle - self.phases.get(joint["name"], 0.0))
+                if joint["name"] not in self.phases:
+                    gaps[-1], rows[-1] = self.at_the_start(x, joint)
+                continue
             if joint["type"] == "cam":
                 gap, row = self.contact(x, joint)
                 gaps, rows = [*gaps, *gap], [*rows, *row]
@@ -222,7 +252,7 @@ class Multibody:
         """The numbers of the equations of angles."""
         found, k = set(), 0
         for joint in self.joints:
-            k += 1 if joint["type"] == "gear" else 2
+            k += 1 if joint["type"] in ("gear", "rack") else 2
             if joint["type"] == "prismatic":
                 found.add(k - 1)
         return found | {k + n for n, driver in enumerate(self.drivers) if not driver["linear"]}
@@ -301,8 +331,10 @@ class Multibody:
         left = iter(factors)
         for joint in self.joints:
             one, name = next(left), joint["name"]
-            if joint["type"] == "gear":
-                force = self.mesh(x, joint)[1] * one
+            if joint["type"] in ("gear", "rack"):
+                force = (
+                    self.mesh(x, joint)[1] if joint["type"] == "gear" else self.pitch_line(x, joint)[0]
+                ) * one
                 found |= {f"{name}.fx": force[0], f"{name}.fy": force[1]}
                 continue
             two = next(left)

@@ -159,6 +159,49 @@ def wobbling_arm():
     return data
 
 
+def rack_of_a_press():
+    """The rack on an oblique slide of a crank turns a pinion, which lifts a weight on a lever by a rod."""
+    return {
+        "ground": {"O1": [0, 0], "G": [0, 0.3], "G2": [0.2, 1.3], "O2": [0.11, 0.5], "O3": [0.45, 0.45]},
+        "driver": {"link": "crank"},
+        "links": {
+            "crank": link(2.0, O1=[0, 0], A=[0.05, 0]),
+            "rod": link(1.0, A=[0, 0], B=[0.4, 0]),
+            "rack": link(3.0, B=[0, 0], T=[0.02, 0.06]),
+            "pinion": link(1.5, O2=[0, 0], D=[0.04, 0]),
+            "link": link(0.6, D=[0, 0], E=[0.3, 0]),
+            "lever": link(0.9, O3=[0, 0], E=[0.0, 0.15]),
+        },
+        "joints": {
+            "guide": {"on": "rack.B", "by": "ground.G", "toward": "G2", "angle": 0.2},
+            "teeth": {"type": "rack", "on": "rack.T", "by": "pinion.O2"},
+        },
+        "loads": {"weight": {"on": "lever.E", "force": [30, -150]}},
+        "start": {"phi": 0.3, "points": {"B": [0.02, 0.41], "E": [0.44, 0.6]}, "angles": {"pinion": 0.4}},
+    }
+
+
+def rack_of_a_lever():
+    """The rocker of a four-bar is the pinion of a rack, which a rod joins to a further slide."""
+    data = sector()
+    data["ground"] |= {"G": [0.0, 0.31], "G2": [1.0, 0.34], "H": [0.0, 0.5], "H2": [1.0, 0.5]}
+    for name in ("pinion", "rod", "ram"):
+        del data["links"][name]
+    data["links"] |= {
+        "rack": link(2.0, T=[0, 0], R=[0.1, 0.04]),
+        "rod": link(0.5, R=[0, 0], S=[0.35, 0]),
+        "ram": link(1.0, S=[0, 0]),
+    }
+    data["joints"] = {
+        "guide": {"on": "rack.T", "by": "ground.G", "toward": "G2", "angle": -0.1},
+        "teeth": {"type": "rack", "on": "rack.T", "by": "rocker.O2"},
+        "slide": {"on": "ram.S", "by": "ground.H", "toward": "H2"},
+    }
+    data["loads"] = {"lift": {"on": "ram.S", "force": [-200, 0]}}
+    data["start"] = {"points": {"B": [0.6, 0.0], "T": [0.55, 0.32], "S": [0.99, 0.5]}}
+    return data
+
+
 MACHINES = {
     made.__name__: (made, wheels)
     for made, wheels in (
@@ -169,8 +212,11 @@ MACHINES = {
         (idler, {"first": "idler", "second": "wheel"}),
         (sector, {"teeth": "pinion"}),
         (wobbling_arm, {"far": "twin", "near": "roller"}),
+        (rack_of_a_press, {"teeth": "pinion"}),
+        (rack_of_a_lever, {"teeth": "rack"}),
     )
 }
+RACKS = "rack_of_a_press", "rack_of_a_lever"
 STATES = [(0.3, 2.0, 5.0), (1.9, -3.0, 4.0), (4.4, 6.0, -20.0), (-7.7, 1.0, 0.0)]
 
 
@@ -188,7 +234,7 @@ def test_against_an_independent_solution(name):
     """Motion of every link and point, the pitch points among them, every reaction, torque and energies."""
     model, body = machine_of(described(name)), independent(name)
     kinds = [group.kind for group in model.described_by.structure.groups]
-    assert kinds.count("geared link") == len(MACHINES[name][1])
+    assert kinds.count("geared link") + kinds.count("rack and pinion") == len(MACHINES[name][1])
     for q, w, a in STATES:
         found, _, _ = by_the_machine(model, q, w, a)
         wanted = body.solution(body.followed(q), q, w, a)
@@ -201,7 +247,7 @@ def test_against_an_independent_solution(name):
 @pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
-@pytest.mark.parametrize("name", ["five_bar", "planetary", "sun_and_planet", "cardan", "sector"])
+@pytest.mark.parametrize("name", ["five_bar", "planetary", "sun_and_planet", "cardan", "sector", *RACKS])
 def test_fmus(name, make, tmp_path):
     """The same numbers through the FMU, before and after a step."""
     model, body, h = machine_of(described(name)), independent(name), 0.01

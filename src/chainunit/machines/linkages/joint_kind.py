@@ -68,6 +68,10 @@ class JointParts(Protocol):
     sides: Any
 
     @property
+    def ground(self) -> dict[str, Vec2]:
+        """Places of the ground pins [m]."""
+
+    @property
     def groups(self) -> Sequence[Group]:
         """The groups so far."""
 

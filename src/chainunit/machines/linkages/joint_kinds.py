@@ -7,10 +7,12 @@ from typing import Any
 
 from ...mechanism.assur import REVOLUTE, JointOf
 from .cam import CamKind
-from .gear import GearKind
+from .gear import GearKind, RackKind
 from .joint_kind import GuideKind, JointEntry, JointKind, PinKind, SingleLinkKind
 
-KINDS: Mapping[str, JointKind] = {kind.name: kind for kind in (PinKind(), GuideKind(), GearKind(), CamKind())}
+KINDS: Mapping[str, JointKind] = {
+    kind.name: kind for kind in (PinKind(), GuideKind(), GearKind(), RackKind(), CamKind())
+}
 """The kinds by their names."""
 SINGLES: Mapping[str, SingleLinkKind] = {
     kind.alone: kind for kind in KINDS.values() if isinstance(kind, SingleLinkKind)
