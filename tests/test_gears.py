@@ -453,3 +453,66 @@ def test_a_driver_that_swings_may_have_any_ratio():
     model = machine_of(description_of(data, "swinging"))
     angle = Machine(model).outputs(np.array([-0.6, 0.2, 0.9]), 1.0).wheel.angle
     assert angle == pytest.approx(0.7 - 1.5 * (np.array([-0.6, 0.2, 0.9]) - 0.2), abs=1e-14)
+
+
+def rack(**changes):
+    data = rack_of_a_press()
+    data["joints"]["teeth"] |= changes
+    return data
+
+
+def rack_that_turns_its_pinion_too_far():
+    data = rack_of_a_press()
+    data["ground"]["O2"] = [0.047, 0.5]
+    del data["links"]["link"], data["links"]["lever"], data["loads"]
+    data["start"]["points"].pop("E")
+    return data
+
+
+@pytest.mark.parametrize(
+    ("data", "key", "words"),
+    [
+        (
+            rack(on="rod.B"),
+            "joints.teeth",
+            "rod must slide in a guide of the ground, and pinion.O2 be pinned to",
+        ),
+        (rack(by="pinion.D"), "joints.teeth", "pinion.D be pinned to the ground"),
+        (rack(teeth=[20, 30]), "joints.teeth.teeth", "belongs to a gear joint, and this one is a rack"),
+        (
+            rack_that_turns_its_pinion_too_far(),
+            "links.pinion",
+            "the pinion of teeth has turned by nearly half a turn",
+        ),
+    ],
+)
+def test_what_is_refused_of_racks(data, key, words):
+    with pytest.raises(InputError) as caught:
+        machine_of(description_of(data, "wrong"))
+    assert any((fault.key or "").startswith(key) and words in str(fault) for fault in caught.value.faults)
+
+
+def test_a_rack_moves_as_far_as_the_pitch_circle():
+    """Way of the rack over the angle of its pinion, and the force of the teeth that holds a moment at the pinion."""
+    data = {
+        "ground": {"O1": [0, 0], "G": [-1, 0.05], "G2": [1, 0.05]},
+        "driver": {"link": "pinion", "range": [-1.2, 1.2]},
+        "links": {"pinion": link(1.0, O1=[0, 0]), "rack": link(2.0, T=[0, 0], R=[0.1, 0.0])},
+        "joints": {
+            "guide": {"on": "rack.R", "by": "ground.G", "toward": "G2"},
+            "mesh": {"type": "rack", "on": "rack.T", "by": "pinion.O1"},
+        },
+        "loads": {"push": {"on": "rack.R", "force": [-40, 0]}},
+        "start": {"points": {"T": [0.2, 0.05]}},
+    }
+    machine = Machine(machine_of(description_of(data, "rack")))
+    q = np.linspace(-1.1, 1.1, 7)
+    out = machine.outputs(q, 0.0)
+    assert out.rack.T.x == pytest.approx(0.2 - 0.05 * q, abs=1e-15)
+    assert np.broadcast_to(out.mesh.fx, q.shape) == pytest.approx(40.0, abs=1e-12)
+    # the force on the pinion, at 50 mm above its bearing, and the weight of it
+    assert out.tau == pytest.approx(-40.0 * 0.05 + 9.81 * (0.03 * np.cos(q) - 0.01 * np.sin(q)), abs=1e-12)
+    swung = machine_of(description_of(data | {"driver": {"link": "pinion", "range": [-2.9, 2.9]}}, "far"))
+    assert Machine(swung).outputs(2.8, 0.0).margin > 0.0
+    with pytest.raises(InputError, match="may swing by less than 168 deg"):
+        machine_of(description_of(data | {"driver": {"link": "pinion"}}, "round"))

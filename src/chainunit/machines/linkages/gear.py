@@ -334,10 +334,10 @@ class RackMesh(Placed):
 
 @dataclass
 class RackedLink(Group):
-    """A rack on a `rail` of the ground that a pinion moves, or a pinion on a pin of the ground that a rack turns, where
-    the rail is None: its bar, the point `mesh` of the rack on its pitch line, the other link `by`, and the direction
-    `d` of the rack, from which the pitch line lies to the left of the `centre` by the `radius`. At the place `start` of
-    the driver the rack is at `place` along d, the pinion at that angle. The margin is as that of a geared link."""
+    """A rack on a `rail` of the ground that a pinion moves, or without one a pinion on a pin of the ground that a
+    rack turns: its bar, the point `mesh` of the rack on its pitch line, the other link `by`, the direction `d` of the
+    rack. The pitch line lies by the `radius` to the left of the `centre`, seen along d. At the place `start` of the
+    driver the rack is at `place` along d, the pinion at that angle. The margin is as that of a geared link."""
 
     bar: Bar
     mesh: str
@@ -351,7 +351,8 @@ class RackedLink(Group):
     start: float
 
     derived_count: ClassVar[int] = 2
-    """The number of values that `derive` gives: at the start the direction of the pinion, or the place of the rack."""
+    """The number of values that `derive` gives: at the start the direction of the pinion, or the place of the
+    rack."""
 
     @property
     def joints(self) -> tuple[JointData, ...]:
@@ -440,8 +441,8 @@ class RackKind(SingleLinkKind):
         """See `SingleLinkKind`: half a turn of the pinion."""
         joint = group.joints[1]
         return (
-            f"{joint.by} has turned by nearly half a turn from its start at {where}, and a pinion swings by less than 168 "
-            f"deg about its start on the rack of {joint.name}; take a larger pinion, a shorter way, or a middle start"
+            f"the pinion of {joint.name} has turned by nearly half a turn from its start at {where}, and may swing "
+            "by less than 168 deg about that; take a larger pinion, a shorter way, or a start in its middle"
         )
 
 
