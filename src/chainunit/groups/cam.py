@@ -16,7 +16,6 @@ import numpy as np
 from ..core.engines import numpy_
 from ..core.planar import ZERO, Link, Vec2, mirrored, rotated
 from .body import Bar
-from .driver import Course
 from .group import Group, Outline, SolvedGroup
 from .joints import Contact, Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Placed, Rail
 from .series import series_of, values_of
@@ -41,7 +40,7 @@ class ProfilePoint(NamedTuple):
     change: Any
 
     @classmethod
-    def at(cls, xp: Any, rates: Sequence[Any], angle: Any) -> ProfilePoint:
+    def at(cls, xp: Any, rates: Any, angle: Any) -> ProfilePoint:
         """The point at an angle [rad], from the radius there and its derivatives up to the third."""
         r, r1, r2, r3 = rates
         u, square = Vec2(xp.cos(angle), xp.sin(angle)), r * r + r1 * r1
@@ -72,7 +71,7 @@ class CamFollower(Group):
     arm: Vec2
     cam: Rail
     centre: str
-    curve: Callable[[Any, Any], Course]
+    curve: Any
     roller: Any
     grows: bool
     face: Vec2 | None
@@ -117,8 +116,11 @@ class CamFollower(Group):
     def _sight(self, linkage: LinkageInMotion) -> tuple[Link, Link, Vec2, Vec2 | None]:
         """The frame of the cam, that of the start of the follower, and what the cam sees of this one: its pin, or a
         point of its rail, and the direction of the rail."""
-        cam, pin = self.cam.at_position(linkage.links), linkage.pins.get(self.bar.pin)
-        base = Link(pin, cam.u, 0.0, 0.0) if self.rail is None else self.rail.at_position(linkage.links)
+        cam = self.cam.at_position(linkage.links)
+        if self.rail is None:
+            base = Link(linkage.pins[self.bar.pin], cam.u, 0.0, 0.0)
+        else:
+            base = self.rail.at_position(linkage.links)
         point, along = (rotated(v, mirrored(cam.u)) for v in (base.pin.p - cam.pin.p, base.u))
         return cam, base, point, None if self.rail is None else along
 
