@@ -23,7 +23,7 @@ def links(linkage: Linkage) -> Iterator[DrawnLink]:
     shown = shown_pins(linkage)
     for name, carried in linkage.topology.links.items():
         # a contact has its pin at a point of its follower
-        pins = tuple(pin for pin in carried if pin in shown and pin.partition(".")[2] not in carried)
+        pins = tuple(pin for pin in carried if pin in shown and pin.partition(".")[0] not in linkage.outlines)
         crank, grounded = name == linkage.driver.bar.name, any(pin in linkage.ground for pin in pins)
         look = "crank" if crank else "heavy" if grounded else "light"
         yield DrawnLink(name, pins, look, closed=len(pins) > 2)

@@ -451,9 +451,9 @@ _HAPPENINGS = {
         ),
         warning(
             "lifts-off",
-            "The force of a cam on its follower falls below 0: the follower would lift off: {where}.",
+            "A follower would lift off its cam, as the force of the contact falls below 0: {where}.",
             remedy="Take a stronger spring, less mass, a slower rise, or a groove that guides the roller.",
-            sizes={"N": "least"},
+            sizes={("N", "", 3, "least force of the contact"): "least"},
         ),
         warning(
             "current-limit",

@@ -166,8 +166,9 @@ class CamKind(SingleLinkKind):
         """See `SingleLinkKind`."""
         (link,), joint = group.links, group.joints[1]
         return (
-            f"the force of {joint.name} does not move {link} at {where}: its pressure angle is 90 deg, or {link} is "
-            f"not on the profile; take {_SLOWER}, move the pin or the line of {link}, or give a start on the profile"
+            f"the force of {joint.name} does not move {link} at {where}, as its pressure angle is 90 deg, or the cam "
+            f"is undercut, or {link} is not on it; take {_SLOWER}, move the pin or the line of {link}, or start "
+            "nearer to the profile"
         )
 
 

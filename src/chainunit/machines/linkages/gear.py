@@ -14,11 +14,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from ...core.errors import InputError, shown
 from ...core.planar import ZERO, Link, Motion, Vec2, mirrored, rotated
 from ...groups.block import Row
 from ...groups.body import Bar, Load
-from ...groups.group import Group, SolvedGroup
+from ...groups.group import Group, Outline, SolvedGroup
 from ...groups.joints import (
     Guide,
     GuideData,
@@ -335,11 +337,12 @@ class RackMesh(Placed):
 @dataclass
 class RackedLink(Group):
     """A rack on a `rail` of the ground that a pinion moves, or without one a pinion on a pin of the ground that a
-    rack turns: its bar, the point `mesh` of the rack on its pitch line, the other link `by`, the direction `d` of the
-    rack. The pitch line lies by the `radius` to the left of the `centre`, seen along d. At the place `start` of the
-    driver the rack is at `place` along d, the pinion at that angle. The margin is as that of a geared link."""
+    rack turns: its bar, the `name` of the joint, the point `mesh` of the rack on its pitch line, the other link `by`.
+    The rack has the direction `d`, and the pitch line lies by the `radius` to the left of the `centre`. At the place
+    `start` of the driver the rack is at `place` along d, the pinion at that angle. The margin is as of a geared link."""
 
     bar: Bar
+    name: str
     mesh: str
     by: str
     centre: str
@@ -353,6 +356,13 @@ class RackedLink(Group):
     derived_count: ClassVar[int] = 2
     """The number of values that `derive` gives: at the start the direction of the pinion, or the place of the
     rack."""
+
+    @property
+    def outlines(self) -> Mapping[str, Outline]:
+        """The pitch circle of the pinion."""
+        angles = np.linspace(0.0, 2.0 * math.pi, 91)
+        circle = Vec2(np.cos(angles), np.sin(angles))
+        return {self.name: Outline(self.centre, Rail(None, ZERO, self.d), lambda: circle * abs(self.radius))}
 
     @property
     def joints(self) -> tuple[JointData, ...]:
@@ -412,12 +422,10 @@ class RackKind(SingleLinkKind):
 
     def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
         """The place of the rack along its guide."""
-        link, along = joint.on[0], place(*joint.on)
-        return (
-            {link: along.dot(line(first)) / math.sqrt(line(first).squared())}
-            if first.kind == PRISMATIC
-            else {}
-        )
+        if first.kind == REVOLUTE:
+            return {}
+        d = line(first)
+        return {joint.on[0]: place(*joint.on).dot(d) / math.sqrt(d.squared())}
 
     def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
         """The rack on its guide `first`, or the pinion on its pin."""
@@ -435,7 +443,7 @@ class RackKind(SingleLinkKind):
         parts.receive(joint, mesh, link)
         radius = d.cross(line - parts.ground[name])
         by, start = pinion if link == rack else rack, parts.structure.start
-        return RackedLink(bar, mesh, by, name, d, radius, rail, pin, place, start)
+        return RackedLink(bar, joint.name, mesh, by, name, d, radius, rail, pin, place, start)
 
     def dead(self, group: AssurGroup, where: str) -> str:
         """See `SingleLinkKind`: half a turn of the pinion."""
