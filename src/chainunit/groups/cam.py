@@ -40,7 +40,7 @@ class ProfilePoint(NamedTuple):
     change: Any
 
     @classmethod
-    def at(cls, xp: Any, rates: Any, angle: Any) -> ProfilePoint:
+    def placed(cls, xp: Any, rates: Any, angle: Any) -> ProfilePoint:
         """The point at an angle [rad], from the radius there and its derivatives up to the third."""
         r, r1, r2, r3 = rates
         u, square = Vec2(xp.cos(angle), xp.sin(angle)), r * r + r1 * r1
@@ -97,8 +97,8 @@ class CamFollower(Group):
 
         def profile() -> Vec2:
             radius, rates = self.curve(numpy_(), angles)
-            at = self._at(numpy_(), (radius, *rates), angles, 0.0)
-            return at.place.plus(at.normal, -(self.roller or 0.0))
+            spot = self._at(numpy_(), (radius, *rates), angles, 0.0)
+            return spot.place.plus(spot.normal, -(self.roller or 0.0))
 
         curves = {name: Outline(self.centre, self.cam, profile)}
         if self.face is None:
@@ -110,8 +110,8 @@ class CamFollower(Group):
         """The point of the pitch curve, or of the profile under a face, by `more` beyond an angle."""
         r, r1, r2, r3 = rates
         r, r1 = r + more * (r1 + more * (0.5 * r2 + more * (r3 / 6.0))), r1 + more * (r2 + more * (0.5 * r3))
-        at = ProfilePoint.at(xp, (r, r1, r2 + more * r3, r3), angle + more)
-        return at.beside(self.roller) if self.roller is not None and self.grows else at
+        spot = ProfilePoint.placed(xp, (r, r1, r2 + more * r3, r3), angle + more)
+        return spot.beside(self.roller) if self.roller is not None and self.grows else spot
 
     def _sight(self, linkage: LinkageInMotion) -> tuple[Link, Link, Vec2, Vec2 | None]:
         """The frame of the cam, that of the start of the follower, and what the cam sees of this one: its pin, or a
@@ -124,17 +124,17 @@ class CamFollower(Group):
         point, along = (rotated(v, mirrored(cam.u)) for v in (base.pin.p - cam.pin.p, base.u))
         return cam, base, point, None if self.rail is None else along
 
-    def _gap(self, xp: Any, sight: Any, at: ProfilePoint) -> tuple[Any, Any, Any, Any]:
+    def _gap(self, xp: Any, sight: Any, spot: ProfilePoint) -> tuple[Any, Any, Any, Any]:
         """What the follower misses on the profile at a point of it, the slope of that by the angle, its size, and the
         margin."""
-        n, v, along = at.normal, at.place - sight[2], sight[3]
-        lever, bend, l = n.turned().dot(v), at.speed * at.curvature, self.arm.x
+        n, v, along = spot.normal, spot.place - sight[2], sight[3]
+        lever, bend, l = n.turned().dot(v), spot.speed * spot.curvature, self.arm.x
         if along is None and self.face is None:
-            return 0.5 * (v.squared() - l * l), at.speed * lever, l * l, lever / l
+            return 0.5 * (v.squared() - l * l), spot.speed * lever, l * l, lever / l
         if along is None:
-            return n.dot(v) - l, bend * lever, at.speed, lever / xp.sqrt(v.squared())
+            return n.dot(v) - l, bend * lever, spot.speed, lever / xp.sqrt(v.squared())
         if self.face is None:
-            return along.cross(v), at.speed * along.dot(n), at.speed, along.dot(n)
+            return along.cross(v), spot.speed * along.dot(n), spot.speed, along.dot(n)
         m = rotated(self.face, along)
         return n.turned().dot(m), -bend * n.dot(m), 1.0, self.face.x
 
@@ -165,24 +165,22 @@ class CamFollower(Group):
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
         """The follower on the profile, near the angle that the series `derived` gives."""
         sight, (near,) = self._sight(linkage), values_of([derived], xp.cos(q), xp.sin(q))
-        _, at = self._found(xp, sight, near, _LAST)
-        gap, _, size, margin = self._gap(xp, sight, at)
-        miss, room = gap / (size * _MISFIT), at.curvature
+        _, spot = self._found(xp, sight, near, _LAST)
+        gap, _, size, margin = self._gap(xp, sight, spot)
+        miss, room = gap / (size * _MISFIT), spot.curvature
         if self.face is None:
-            room = 1.0 - self.roller * at.curvature
+            room = 1.0 - self.roller * spot.curvature
         margin = margin * (1.0 - miss * miss) * room / (xp.abs(room) + 1e-9)
         (cam, base, point, _), u = sight, sight[1].u
-        start, world = (
-            base.pin.p,
-            at._replace(normal=rotated(at.normal, cam.u), place=rotated(at.place, cam.u)),
-        )
+        start = base.pin.p
+        world = spot._replace(normal=rotated(spot.normal, cam.u), place=rotated(spot.place, cam.u))
         first: Placed = Hinge(0, base=base.pin)
         if self.rail is not None:
             n = u if self.face is None else rotated(self.face, u)
             s = n.dot(cam.pin.p + world.place - start) / n.dot(u)
             start, first = start + u * s, Guide(0, u, s, u * s, base)
         elif self.face is None:
-            u = rotated((at.place - point) * (1.0 / self.arm.x), cam.u)
+            u = rotated((spot.place - point) * (1.0 / self.arm.x), cam.u)
         else:
             u = world.normal
         arm = self.arm if self.arm is ZERO else rotated(self.arm, u)

@@ -399,30 +399,30 @@ class Contact(Placed):
     follower, the `arm` from there to the centre of its roller, or to a point of its face, the radius of the `roller`,
     None for a face, and the point of the pitch curve, or of the profile under a face, turned with the cam."""
 
-    __slots__ = ("_arm", "_at", "_base", "_cam", "_lever", "_reach", "_roller")
+    __slots__ = ("_arm", "_base", "_cam", "_lever", "_reach", "_roller", "_spot")
 
-    def __init__(self, cam: Link, base: Vec2, arm: Vec2, at: Any, roller: Any) -> None:
-        self._cam, self._base, self._arm, self._at, self._roller = cam, base, arm, at, roller
+    def __init__(self, cam: Link, base: Vec2, arm: Vec2, spot: Any, roller: Any) -> None:
+        self._cam, self._base, self._arm, self._spot, self._roller = cam, base, arm, spot, roller
         # along the face, from its point to the contact
-        face = at.normal.turned().dot(at.place - (base + arm - cam.pin.p))
+        face = spot.normal.turned().dot(spot.place - (base + arm - cam.pin.p))
         self._reach = face if roller is None else 0.0
-        self._lever = arm.cross(at.normal) - self._reach
+        self._lever = arm.cross(spot.normal) - self._reach
 
     def rows(self) -> list[Row]:
         """Its row: of the point at the contact along the normal."""
-        return [{0: self._at.normal.x, 1: self._at.normal.y, 2: self._lever}]
+        return [{0: self._spot.normal.x, 1: self._spot.normal.y, 2: self._lever}]
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
         """See `Placed`: what the gap loses while the next derivatives of the follower are 0. A profile counts by its
         curvature and the change of that."""
-        (seen, turn), at = self._seen(rates, len(rates) + 1, before), self._at
-        n, t, k = at.normal, at.normal.turned(), at.curvature
+        (seen, turn), spot = self._seen(rates, len(rates) + 1, before), self._spot
+        n, t, k = spot.normal, spot.normal.turned(), spot.curvature
         if self._roller is not None:
             along = Jet(0.0, *seen.dot(t).parts[1:])
-            return [-(seen.dot(n) + along * along * (0.5 * k + along * (at.change / 6.0))).parts[-1]]
+            return [-(seen.dot(n) + along * along * (0.5 * k + along * (spot.change / 6.0))).parts[-1]]
         # the distance of a tangent of the profile from its centre, over the angle
-        foot, bend = at.place.dot(t), 1.0 / k - at.place.dot(n)
-        cubic = -(at.change / (k * k * k) + foot) / 6.0
+        foot, bend = spot.place.dot(t), 1.0 / k - spot.place.dot(n)
+        cubic = -(spot.change / (k * k * k) + foot) / 6.0
         distance = turn * (turn * (turn * cubic + 0.5 * bend) + foot)
         return [(distance - seen.dot(rotated(_direction(turn), n))).parts[-1]]
 
@@ -430,22 +430,28 @@ class Contact(Placed):
         """The point of the follower from the centre, as the cam sees it, and the angle of the follower less that of
         the cam, up to an `order` of derivatives; those of the follower beyond `rates` are 0."""
         cam, point = self._cam, self._base - self._cam.pin.p
-        known = [(cam.pin.p1, cam.t1), (cam.pin.p2, cam.t2), *([] if before is None else [before])][:order]
+        motion = [(cam.pin.p1, cam.t1), (cam.pin.p2, cam.t2), *([] if before is None else [before])][:order]
         x, y, angle = (Jet(0.0, *(z[k] for z in rates), *[0.0] * (order - len(rates))) for k in range(3))
-        turn = Jet(0.0, *(t for _, t in known))
+        turn = Jet(0.0, *(t for _, t in motion))
         start = Vec2(
-            x + point.x - Jet(0.0, *(p.x for p, _ in known)), y + point.y - Jet(0.0, *(p.y for p, _ in known))
+            x + point.x - Jet(0.0, *(p.x for p, _ in motion)),
+            y + point.y - Jet(0.0, *(p.y for p, _ in motion)),
         )
         return rotated(start + rotated(_direction(angle), self._arm), _direction(-turn)), angle - turn
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
         """The force of the contact, along the normal where it presses."""
         force = next(multipliers)
-        return GuideForce.along(self._at.normal, force, force * self._lever), None
+        return GuideForce.along(self._spot.normal, force, force * self._lever), None
 
     def slide(self, rates: Rates) -> Slide:
         """The motion of the follower past the cam at the contact."""
-        (seen, turn), n, k, follower = self._seen(rates, 2), self._at.normal, self._at.curvature, rates[0][2]
+        (seen, turn), n, k, follower = (
+            self._seen(rates, 2),
+            self._spot.normal,
+            self._spot.curvature,
+            rates[0][2],
+        )
         (_, s1, s2), (_, turn1, turn2), t = seen.dot(n.turned()).parts, turn.parts, n.turned()
         if self._roller is None:
             return Slide(t, None, s1, s2 - turn1 * turn1 * self._reach, follower, turn1 / k - s1)

@@ -87,8 +87,8 @@ class CamKind(SingleLinkKind):
             misses = np.diff(course[:3]) - 0.5 * _ANGLES[1] * (course[1:, 1:] + course[1:, :-1])
             misses = np.abs(np.column_stack([misses, course[:3, -1] - course[:3, 0]]))
             jumps = misses > _JUMP * np.abs(course[:3]).max(axis=1, keepdims=True) + 1e-9
-            k = ProfilePoint.at(numpy_(), course, _ANGLES).curvature
-        of, message = "radius", ""
+            k = ProfilePoint.placed(numpy_(), course, _ANGLES).curvature
+        entry, message = "radius", ""
         if wrong.any():
             place = int(np.argmax(wrong))
             message = f"is {course[0, place]:.4g} m at phi = {_degrees(place)}; must be > 0 all around"
@@ -106,7 +106,11 @@ class CamKind(SingleLinkKind):
                     f"a roller, {_SLOWER}"
                 )
         else:
-            of, roller, sharp = "roller", value_of(MATH, joint["roller"], values), k if joint["pitch"] else -k
+            entry, roller, sharp = (
+                "roller",
+                value_of(MATH, joint["roller"], values),
+                k if joint["pitch"] else -k,
+            )
             worst = int(np.argmax(sharp))
             if roller * sharp[worst] >= 1.0:
                 what, most = (
@@ -118,7 +122,7 @@ class CamKind(SingleLinkKind):
                     f"{_degrees(worst)}: the cam is undercut; take a roller of less than {most:.4g} mm, {_SLOWER}"
                 )
         if message:
-            yield f"joints.{joint['name']}.{of}", message
+            yield f"joints.{joint['name']}.{entry}", message
 
     def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
         """The angle of the contact from the pin or the line of the follower, and on which side of its face the cam

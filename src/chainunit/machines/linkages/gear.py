@@ -313,12 +313,12 @@ class RackData(MeshData):
 
 class RackMesh(Placed):
     """The mesh of a rack along `d` at one position: its `row`, the signed pitch `radius`, and the derivatives by q of
-    the pin and of the angle that are known before, which are 0 of the link itself."""
+    the pin and of the angle of the `other` link."""
 
-    __slots__ = ("_d", "_known", "_radius", "_row")
+    __slots__ = ("_d", "_other", "_radius", "_row")
 
-    def __init__(self, row: Row, d: Vec2, radius: Any, known: Sequence[Third]) -> None:
-        self._row, self._d, self._radius, self._known = row, d, radius, known
+    def __init__(self, row: Row, d: Vec2, radius: Any, other: Sequence[Third]) -> None:
+        self._row, self._d, self._radius, self._other = row, d, radius, other
 
     def rows(self) -> list[Row]:
         """Its row: of the rack along its line, or of the pitch point of the pinion."""
@@ -326,7 +326,7 @@ class RackMesh(Placed):
 
     def right(self, rates: Rates, before: Third | None) -> list[Any]:
         """Its right side, from the other link."""
-        place, turn = self._known[len(rates)] if before is None else before
+        place, turn = self._other[len(rates)] if before is None else before
         return [self._d.dot(place) - self._radius * turn]
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
@@ -338,8 +338,8 @@ class RackMesh(Placed):
 class RackedLink(Group):
     """A rack on a `rail` of the ground that a pinion moves, or without one a pinion on a pin of the ground that a
     rack turns: its bar, the `name` of the joint, the point `mesh` of the rack on its pitch line, the other link `by`.
-    The rack has the direction `d`, and the pitch line lies by the `radius` to the left of the `centre`. At the place
-    `start` of the driver the rack is at `place` along d, the pinion at that angle. The margin is as of a geared link."""
+    The rack has the direction `d`; the pitch line lies by the `radius` to the left of the `centre`. At the place
+    `start` of the driver the rack is at `place`, the pinion at that angle. The margin is as that of `GearedLink`."""
 
     bar: Bar
     name: str
@@ -383,9 +383,9 @@ class RackedLink(Group):
         if self.rail is None:
             centre, rack = linkage.pins[self.bar.pin], linkage.pins[self.mesh]
             turned = d.dot(there - rack.p) / r
-            cosine, known = xp.cos(turned), [(rack.p1, 0.0), (rack.p2, 0.0)]
+            cosine, rates = xp.cos(turned), [(rack.p1, 0.0), (rack.p2, 0.0)]
             u = Vec2(xp.cos(turned + self.place), xp.sin(turned + self.place))
-            mesh = RackMesh({0: d.x, 1: d.y, 2: -r}, d, r, known)
+            mesh = RackMesh({0: d.x, 1: d.y, 2: -r}, d, r, rates)
             pose, first = (centre, u), Hinge(0, base=centre)
         else:
             pinion, rail = linkage.links[self.by], self.rail.at_position(linkage.links)
