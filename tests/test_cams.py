@@ -412,6 +412,9 @@ def on_the_cam():
 
 
 LARGE = {"parameters": {"base": "40 mm", "lift": "15 mm"}}
+ONE_PLACE = {
+    "links": {"shaft": link(1.0, O1=[0, 0]), "tappet": link(0.8, F=[0, 0], F2=[0.02, 0.001], T=[0, 0])}
+}
 SWING = {"driver": {"link": "shaft", "range": [-0.5, 0.5]}}
 
 
@@ -467,9 +470,14 @@ SWING = {"driver": {"link": "shaft", "range": [-0.5, 0.5]}}
         (
             changed(flat_tappet, cam={"radius": "base + lift * cos(4 * phi)"}),
             "joints.lobe.radius",
-            "flat face bridges it",
+            "a face bridges it",
         ),
         (changed(cam={"type": "gear"}), "joints.lobes.", "belongs to a cam joint, and this one is a gear"),
+        (
+            changed(flat_tappet, cam={"face": "T"}, **ONE_PLACE),
+            "joints.lobe",
+            "F and T of tappet are in one place",
+        ),
         (on_the_cam(), "links.plunger", "has the profile of lobes, and its follower shaft moves before it"),
         (changed(**SWING), "links.plunger", "forms a cam follower, and the driver swings"),
         (changed(cams={"friction": -1}), "cams.friction", "must be >= 0"),

@@ -54,7 +54,7 @@ class CamKind(SingleLinkKind):
             reader.fault(f"{key}.pitch", f"is {shown(joint['pitch'])}; must be true or false")
         if on == GROUND:
             reader.fault(
-                f"{key}.on", f"is ground.{point}; must be a point of the follower, and `by` one of the cam"
+                f"{key}.on", f"is ground.{point}; must be a point of the follower, in `by` one of the cam"
             )
         if "face" in table and joint["face"] not in others:
             must = f"another point of {on} on its face: {', '.join(others) or 'add one'}"
@@ -62,17 +62,6 @@ class CamKind(SingleLinkKind):
         for other in {"roller", "pitch"} & {*table} if "face" in table else ():
             reader.fault(
                 f"{key}.{other}", "belongs to a roller, and the follower has a face; take one of both out"
-            )
-
-    def start_faults(
-        self, joint: Mapping[str, Any], points: Mapping[str, Mapping[str, tuple[float, float]]]
-    ) -> Iterator[tuple[str, str]]:
-        """The fault of a face without a direction."""
-        (on, point), face = joint["on"], joint["face"]
-        if face and math.dist(points[on][point], points[on][face]) == 0.0:
-            yield (
-                f"joints.{joint['name']}.face",
-                f"{point} and {face} are in one place, so that the face has no line",
             )
 
     def law_faults(
@@ -99,27 +88,20 @@ class CamKind(SingleLinkKind):
                 "smooth up to the second derivative: take a table [tables.NAME] over phi, which is splined, or rises "
                 "such as step(phi - 60 * deg, 80 * deg)"
             )
-        elif joint["face"]:
-            if not k.min() > 0.0:
-                message = (
-                    f"is hollow or straight at phi = {_degrees(int(np.argmin(k)))}, and a flat face bridges it; take "
-                    f"a roller, {_SLOWER}"
-                )
-        else:
-            entry, roller, sharp = (
-                "roller",
-                value_of(MATH, joint["roller"], values),
-                k if joint["pitch"] else -k,
+        elif joint["face"] and not k.min() > 0.0:
+            hollow = _degrees(int(np.argmin(k)))
+            message = (
+                f"is hollow or straight at phi = {hollow}, where a face bridges it; take a roller, {_SLOWER}"
             )
+        elif not joint["face"]:
+            roller, sharp = value_of(MATH, joint["roller"], values), k if joint["pitch"] else -k
             worst = int(np.argmax(sharp))
             if roller * sharp[worst] >= 1.0:
-                what, most = (
-                    "pitch curve bulges" if joint["pitch"] else "profile is hollow",
-                    1e3 / sharp[worst],
-                )
+                entry, most = "roller", f"{1e3 / sharp[worst]:.4g} mm"
+                what = "pitch curve bulges" if joint["pitch"] else "profile is hollow"
                 message = (
-                    f"is {1e3 * roller:.4g} mm, and the {what} with a radius of {most:.4g} mm at phi = "
-                    f"{_degrees(worst)}: the cam is undercut; take a roller of less than {most:.4g} mm, {_SLOWER}"
+                    f"is {1e3 * roller:.4g} mm, and the {what} with a radius of {most} at phi = {_degrees(worst)}: "
+                    f"the cam is undercut; take a roller of less than {most}, {_SLOWER}"
                 )
         if message:
             yield f"joints.{joint['name']}.{entry}", message
@@ -127,24 +109,25 @@ class CamKind(SingleLinkKind):
     def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
         """The angle of the contact from the pin or the line of the follower, and on which side of its face the cam
         lies."""
+        cam = joint.by[0]
+        if cam in first.links:
+            state = f"{cam} has the profile of {joint.name}, and its follower {joint.on[0]} moves before it"
+            raise InputError(f"{state}: drive {cam}, or a link before it", key=f"links.{cam}")
         (link, point), centre, side, other = joint.on, place(*joint.by), 1.0, first.other_link(joint.on[0])
-        zero = place(other, first.at(other)) - centre if first.kind == REVOLUTE else line(first)
-        towards = place(link, point) - centre
-        if face := joint.table["face"]:
-            normal = (place(link, face) - place(link, point)).turned()
-            side = math.copysign(1.0, normal.dot(towards))
-            towards = normal * side
+        towards, face, turns = place(link, point) - centre, joint.table["face"], first.kind == REVOLUTE
+        arm = place(link, face or first.at(link)) - place(link, point)
+        if (face or turns) and not arm.squared() > 0.0:
+            state = f"{point} and {face or first.at(link)} of {link} are in one place; place them apart"
+            raise InputError(state, key=f"joints.{joint.name}")
+        if face:
+            side = math.copysign(1.0, arm.turned().dot(towards))
+            towards = arm.turned() * side
+        zero = place(other, first.at(other)) - centre if turns else line(first)
         return {link: math.atan2(zero.cross(towards), zero.dot(towards)), f"{link}.face": side}
 
     def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
         """The follower on its pin or on its guide `first`, and on the cam by `joint`."""
-        geometry, (cam, centre), (on, point), table = parts.geometry, joint.by, joint.on, joint.table
-        if on != link:
-            raise InputError(
-                f"{link} has the profile of {joint.name}, and its follower {on} moves before it: drive {link}, or a "
-                "link before it",
-                key=f"links.{link}",
-            )
+        geometry, (cam, centre), point, table = parts.geometry, joint.by, joint.on[1], joint.table
         frame, face, rail, guide, arm = parts.frames[cam], None, None, "", ZERO
         roller, values = geometry.number(table["roller"]), geometry.values
         if table["face"]:
