@@ -263,7 +263,7 @@ def test_the_friction_of_the_contact_takes_its_slip(name):
         machine_of(description_of(data | {"cams": {"friction": 0.2, "v_smooth": 1e-9}}, name))
     )
     without = Machine(machine_of(description_of(data, name)))
-    q, w = np.linspace(0.1, 6.0, 12), 3.0
+    q, w = np.linspace(0.1, 6.0, 6), 3.0
     reaction = without.evaluate({"phi": q, "w": w})
     normal = np.array([reaction[f"{joint}.fx"], reaction[f"{joint}.fy"]]) / reaction[f"{joint}.normal"]
     entry = described(name)["joints"]
