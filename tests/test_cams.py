@@ -514,3 +514,18 @@ def test_a_cam_that_differs():
     differing = Machine(machine_of(description_of(data, "differing"))).evaluate(at)["tau"]
     common, own = (machine.evaluate(at)["tau"] for machine in both)
     assert differing == pytest.approx(own, rel=1e-13) and np.max(np.abs(common - own)) > 1e-3
+
+
+@pytest.mark.second
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_a_coasting_cam_loses_its_energy_by_friction(tmp_path):
+    """The direct model without a torque: what kinetic and potential energy lose is what friction takes."""
+    data = offset_roller() | {"cams": {"friction": 0.05}}
+    file = export(machine_of(description_of(data, "coasting")).direct(), tmp_path / "direct.fmu", fmi=2)
+    rows = fmpy.simulate_fmu(
+        str(file), stop_time=1.0, output_interval=1e-3, start_values={"w_start": 30.0, "tau": 0.0},
+        output=["w", "kinetic_energy", "potential_energy", "dissipated_power"],
+    )  # fmt: skip
+    energy = rows["kinetic_energy"] + rows["potential_energy"]
+    lost = np.trapezoid(rows["dissipated_power"], rows["time"])
+    assert lost > 3.0 and energy[0] - energy[-1] == pytest.approx(lost, rel=2e-4)
