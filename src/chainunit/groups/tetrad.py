@@ -50,6 +50,7 @@ class _PlateAt(NamedTuple):
 
 
 def _plates_at(xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> Iterator[_PlateAt]:
+    """The plates at the coordinates `x`, from the pin or the rail that holds each of them."""
     for number, (base, place) in enumerate(zip(placed, x, strict=True), PLATE - 1):
         if isinstance(base, Motion):
             u = Vec2(xp.cos(place), xp.sin(place))
