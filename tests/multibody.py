@@ -3,7 +3,9 @@ multipliers, with numpy alone. It shares no line with the package: neither group
 
 The unknowns are x, y and angle of the frame of each link. A revolute joint closes two points; a sliding one holds the
 point of `on` on the line of `by`, and the angle between both links; two wheels in mesh move alike along their common
-tangent at the pitch point; each driver has an equation after all these. A multiplier is the force (of a sliding joint
+tangent at the pitch point; a cam has the angle of its profile at the contact as a further unknown, and two equations:
+that the centre of the roller lies on the pitch curve, or that the profile meets the face and has its direction there;
+each driver has an equation after all these. A multiplier is the force (of a sliding joint
 the force across its line and the moment about the point) on `on` from `by`.
 """
 
@@ -28,10 +30,11 @@ def rotation(angle):
 
 class Multibody:
     """A linkage from its description; `inputs` have values by name. `wheels` has the wheel of each gear that
-    has its rough angle at the start."""
+    has its rough angle at the start. `profiles` has for each cam the rough angle of its profile at the contact at the
+    start, and the radius over that angle with two derivatives, a function that takes complex numbers."""
 
-    def __init__(self, data, inputs=None, wheels=None):
-        self.data = data
+    def __init__(self, data, inputs=None, wheels=None, profiles=None):
+        self.data, self.profiles = data, profiles or {}
         self.values = {each["name"]: each["value"] for each in (*data["parameters"], *data["inputs"])}
         self.values |= {"g": data["common"].get("g", 9.81), "ratio": 1.0}
         for link in data["links"]:
@@ -59,12 +62,17 @@ class Multibody:
         self.joints = sorted(data["joints"], key=lambda joint: joint["name"] in driven)
         self.start = data["start"]["value"]
         self.rough = np.array([data["start"]["poses"][name] for name in self.names], float).ravel()
+        self.rough = np.append(self.rough, [angle for angle, _ in self.profiles.values()])
         self.wheels, self.phases = wheels or {}, {}
         if self.wheels:
             x = self.closed(self.start, self.rough)
-            self.phases = {
-                joint["name"]: self.lag(x, joint) for joint in self.joints if joint["type"] == "gear"
-            }
+            phases = {joint["name"]: self.lag(x, joint) for joint in self.joints if joint["type"] == "gear"}
+            for joint in self.joints:
+                if joint["type"] == "rack":
+                    d, radius = self.pitch_line(x, joint)
+                    (p, _), (c, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+                    phases[joint["name"]] = d @ (p - c) + radius * self.angle(x, joint["by"][0])[0]
+            self.phases = phases
 
     def number(self, entry, **more):
         """The value of an entry."""
@@ -114,6 +122,48 @@ class Multibody:
         radius = distance * teeth[0] / (teeth[0] + (-1 if inner else 1) * teeth[1])
         return c + (e - c) / distance * radius, turned(e - c) / distance, radius
 
+    def pitch_line(self, x, joint):
+        """Of a rack in the ground: its direction, and how far to the left of the centre of its pinion it lies."""
+        guide = next(each for each in self.joints if each["name"] == joint["guide"])
+        d = self.line(x, guide)
+        (p, _), (c, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+        return d, turned(d) @ (p - c)
+
+    def at_the_start(self, x, joint):
+        """The gap of the wheel of a gear at the start, or of the rack, which has its rough place."""
+        wheel = self.wheels[joint["name"]]
+        if wheel == joint["by"][0]:
+            angle, row = self.angle(x, wheel)
+            return angle - self.rough[self.columns(wheel)][2], row
+        p, by = self.place(x, *self.end(joint, "on"))
+        d, _ = self.pitch_line(x, joint)
+        return d @ (p - self.place(self.rough, *self.end(joint, "on"))[0]), d @ by
+
+    def contact(self, x, joint):
+        """The gaps of a cam and its follower, and their derivatives by the unknowns."""
+        k = x.size - len(self.profiles) + [*self.profiles].index(joint["name"])
+        s, radius = x[k], self.profiles[joint["name"]][1]
+        r, r1, r2 = radius(s)
+        u = np.array([np.cos(s), np.sin(s)])
+        t = turned(u)
+        point, slope, bend = r * u, r1 * u + r * t, (r2 - r) * u + 2.0 * r1 * t
+        cam, (on, _) = joint["by"][0], joint["on"]
+        turn = rotation(self.angle(x, cam)[0])
+        f, f_by = self.place(x, *self.end(joint, "on"))
+        if joint["face"]:
+            h, h_by = self.place(x, on, self.points[on][joint["face"]])
+            m, m_by = turned(h - f), np.array([-(h_by - f_by)[1], (h_by - f_by)[0]])
+            q, q_by = self.place(x, cam, self.points[cam][joint["by"][1]] + point)
+            d, d_by = turn @ slope, np.outer(turned(turn @ slope), self.angle(x, cam)[1])
+            q_by[:, k], d_by[:, k] = turn @ slope, turn @ bend
+            return [m @ (f - q), m @ d], [-m @ (q_by - f_by) - (q - f) @ m_by, m @ d_by + d @ m_by]
+        roller = 0.0 if joint["pitch"] else self.number(joint["roller"])
+        size = np.sqrt(slope @ slope)
+        n, n1 = -turned(slope) / size, -turned(bend) / size + turned(slope) * (slope @ bend) / size**3
+        q, q_by = self.place(x, cam, self.points[cam][joint["by"][1]] + point + roller * n)
+        q_by[:, k] = turn @ (slope + roller * n1)
+        return [*(f - q)], [*(f_by - q_by)]
+
     def end(self, joint, end):
         """The link and the place of an end of a joint."""
         link, name = joint[end]
@@ -144,6 +194,19 @@ class Multibody:
                     angle, row = self.angle(x, wheel)
                     gaps.append(angle - self.rough[self.columns(wheel)][2])
                 rows.append(row)
+                continue
+            if joint["type"] == "rack":
+                d, radius = self.pitch_line(x, joint)
+                (p, p_by), (c, c_by) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+                angle, by = self.angle(x, joint["by"][0])
+                rows.append(d @ (p_by - c_by) + radius * by)
+                gaps.append(d @ (p - c) + radius * angle - self.phases.get(joint["name"], 0.0))
+                if joint["name"] not in self.phases:
+                    gaps[-1], rows[-1] = self.at_the_start(x, joint)
+                continue
+            if joint["type"] == "cam":
+                gap, row = self.contact(x, joint)
+                gaps, rows = [*gaps, *gap], [*rows, *row]
                 continue
             (p, p_by), (r, r_by) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
             if joint["type"] == "revolute":
@@ -193,7 +256,7 @@ class Multibody:
         """The numbers of the equations of angles."""
         found, k = set(), 0
         for joint in self.joints:
-            k += 1 if joint["type"] == "gear" else 2
+            k += 1 if joint["type"] in ("gear", "rack") else 2
             if joint["type"] == "prismatic":
                 found.add(k - 1)
         return found | {k + n for n, driver in enumerate(self.drivers) if not driver["linear"]}
@@ -272,11 +335,21 @@ class Multibody:
         left = iter(factors)
         for joint in self.joints:
             one, name = next(left), joint["name"]
-            if joint["type"] == "gear":
-                force = self.mesh(x, joint)[1] * one
+            if joint["type"] in ("gear", "rack"):
+                force = (
+                    self.mesh(x, joint)[1] if joint["type"] == "gear" else self.pitch_line(x, joint)[0]
+                ) * one
                 found |= {f"{name}.fx": force[0], f"{name}.fy": force[1]}
                 continue
             two = next(left)
+            if joint["type"] == "cam":
+                force = np.array([one, two])
+                if joint["face"]:
+                    (f, *_), (h, *_) = (self.place(x, joint["on"][0], self.points[joint["on"][0]][name_of])
+                                        for name_of in (joint["on"][1], joint["face"]))  # fmt: skip
+                    force = turned(h - f) * one
+                found |= {f"{name}.fx": force[0], f"{name}.fy": force[1]}
+                continue
             if joint["type"] == "revolute":
                 found |= {f"{name}.fx": one, f"{name}.fy": two}
                 continue

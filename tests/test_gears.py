@@ -159,6 +159,49 @@ def wobbling_arm():
     return data
 
 
+def rack_of_a_press():
+    """The rack on an oblique slide of a crank turns a pinion, which lifts a weight on a lever by a rod."""
+    return {
+        "ground": {"O1": [0, 0], "G": [0, 0.3], "G2": [0.2, 1.3], "O2": [0.11, 0.5], "O3": [0.45, 0.45]},
+        "driver": {"link": "crank"},
+        "links": {
+            "crank": link(2.0, O1=[0, 0], A=[0.05, 0]),
+            "rod": link(1.0, A=[0, 0], B=[0.4, 0]),
+            "rack": link(3.0, B=[0, 0], T=[0.02, 0.06]),
+            "pinion": link(1.5, O2=[0, 0], D=[0.04, 0]),
+            "link": link(0.6, D=[0, 0], E=[0.3, 0]),
+            "lever": link(0.9, O3=[0, 0], E=[0.0, 0.15]),
+        },
+        "joints": {
+            "guide": {"on": "rack.B", "by": "ground.G", "toward": "G2", "angle": 0.2},
+            "teeth": {"type": "rack", "on": "rack.T", "by": "pinion.O2"},
+        },
+        "loads": {"weight": {"on": "lever.E", "force": [30, -150]}},
+        "start": {"phi": 0.3, "points": {"B": [0.02, 0.41], "E": [0.44, 0.6]}, "angles": {"pinion": 0.4}},
+    }
+
+
+def rack_of_a_lever():
+    """The rocker of a four-bar is the pinion of a rack, which a rod joins to a further slide."""
+    data = sector()
+    data["ground"] |= {"G": [0.0, 0.31], "G2": [1.0, 0.34], "H": [0.0, 0.5], "H2": [1.0, 0.5]}
+    for name in ("pinion", "rod", "ram"):
+        del data["links"][name]
+    data["links"] |= {
+        "rack": link(2.0, T=[0, 0], R=[0.1, 0.04]),
+        "rod": link(0.5, R=[0, 0], S=[0.35, 0]),
+        "ram": link(1.0, S=[0, 0]),
+    }
+    data["joints"] = {
+        "guide": {"on": "rack.T", "by": "ground.G", "toward": "G2", "angle": -0.1},
+        "teeth": {"type": "rack", "on": "rack.T", "by": "rocker.O2"},
+        "slide": {"on": "ram.S", "by": "ground.H", "toward": "H2"},
+    }
+    data["loads"] = {"lift": {"on": "ram.S", "force": [-200, 0]}}
+    data["start"] = {"points": {"B": [0.6, 0.0], "T": [0.55, 0.32], "S": [0.99, 0.5]}}
+    return data
+
+
 MACHINES = {
     made.__name__: (made, wheels)
     for made, wheels in (
@@ -169,8 +212,11 @@ MACHINES = {
         (idler, {"first": "idler", "second": "wheel"}),
         (sector, {"teeth": "pinion"}),
         (wobbling_arm, {"far": "twin", "near": "roller"}),
+        (rack_of_a_press, {"teeth": "pinion"}),
+        (rack_of_a_lever, {"teeth": "rack"}),
     )
 }
+RACKS = "rack_of_a_press", "rack_of_a_lever"
 STATES = [(0.3, 2.0, 5.0), (1.9, -3.0, 4.0), (4.4, 6.0, -20.0), (-7.7, 1.0, 0.0)]
 
 
@@ -188,7 +234,7 @@ def test_against_an_independent_solution(name):
     """Motion of every link and point, the pitch points among them, every reaction, torque and energies."""
     model, body = machine_of(described(name)), independent(name)
     kinds = [group.kind for group in model.described_by.structure.groups]
-    assert kinds.count("geared link") == len(MACHINES[name][1])
+    assert kinds.count("geared link") + kinds.count("rack and pinion") == len(MACHINES[name][1])
     for q, w, a in STATES:
         found, _, _ = by_the_machine(model, q, w, a)
         wanted = body.solution(body.followed(q), q, w, a)
@@ -201,7 +247,7 @@ def test_against_an_independent_solution(name):
 @pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
-@pytest.mark.parametrize("name", ["five_bar", "planetary", "sun_and_planet", "cardan", "sector"])
+@pytest.mark.parametrize("name", ["five_bar", "planetary", "sun_and_planet", "cardan", "sector", *RACKS])
 def test_fmus(name, make, tmp_path):
     """The same numbers through the FMU, before and after a step."""
     model, body, h = machine_of(described(name)), independent(name), 0.01
@@ -369,7 +415,7 @@ def on_one_centre():
         ),
         (changed(type="revolute"), "joints.mesh.teeth", "belongs to a gear joint, and this one is a pin"),
         (changed(toward="O2"), "joints.mesh.toward", "belongs to a prismatic joint, and this one is a gear"),
-        (changed(type="belt"), "joints.mesh.type", 'or "gear"; a belt or a cam'),
+        (changed(type="belt"), "joints.mesh.type", 'or "cam"; a belt between'),
         (changed(on="wheel.B"), "joints.mesh", "wheel.B and crank.O1 must be pinned to one link"),
         (changed(by="ground.O1"), "joints.mesh", "wheel.O2 and ground.O1 must be pinned to one link"),
         (changed(teeth=[20, 30]), "links.wheel", "drive the slower of the two wheels"),
@@ -407,3 +453,66 @@ def test_a_driver_that_swings_may_have_any_ratio():
     model = machine_of(description_of(data, "swinging"))
     angle = Machine(model).outputs(np.array([-0.6, 0.2, 0.9]), 1.0).wheel.angle
     assert angle == pytest.approx(0.7 - 1.5 * (np.array([-0.6, 0.2, 0.9]) - 0.2), abs=1e-14)
+
+
+def rack(**changes):
+    data = rack_of_a_press()
+    data["joints"]["teeth"] |= changes
+    return data
+
+
+def rack_that_turns_its_pinion_too_far():
+    data = rack_of_a_press()
+    data["ground"]["O2"] = [0.047, 0.5]
+    del data["links"]["link"], data["links"]["lever"], data["loads"]
+    data["start"]["points"].pop("E")
+    return data
+
+
+@pytest.mark.parametrize(
+    ("data", "key", "words"),
+    [
+        (
+            rack(on="rod.B"),
+            "joints.teeth",
+            "rod must slide in a guide of the ground, and pinion.O2 be pinned to",
+        ),
+        (rack(by="pinion.D"), "joints.teeth", "pinion.D be pinned to the ground"),
+        (rack(teeth=[20, 30]), "joints.teeth.teeth", "belongs to a gear joint, and this one is a rack"),
+        (
+            rack_that_turns_its_pinion_too_far(),
+            "links.pinion",
+            "the pinion of teeth has turned by nearly half a turn",
+        ),
+    ],
+)
+def test_what_is_refused_of_racks(data, key, words):
+    with pytest.raises(InputError) as caught:
+        machine_of(description_of(data, "wrong"))
+    assert any((fault.key or "").startswith(key) and words in str(fault) for fault in caught.value.faults)
+
+
+def test_a_rack_moves_as_far_as_the_pitch_circle():
+    """Way of the rack over the angle of its pinion, and the force of the teeth that holds a moment at the pinion."""
+    data = {
+        "ground": {"O1": [0, 0], "G": [-1, 0.05], "G2": [1, 0.05]},
+        "driver": {"link": "pinion", "range": [-1.2, 1.2]},
+        "links": {"pinion": link(1.0, O1=[0, 0]), "rack": link(2.0, T=[0, 0], R=[0.1, 0.0])},
+        "joints": {
+            "guide": {"on": "rack.R", "by": "ground.G", "toward": "G2"},
+            "mesh": {"type": "rack", "on": "rack.T", "by": "pinion.O1"},
+        },
+        "loads": {"push": {"on": "rack.R", "force": [-40, 0]}},
+        "start": {"points": {"T": [0.2, 0.05]}},
+    }
+    machine = Machine(machine_of(description_of(data, "rack")))
+    q = np.linspace(-1.1, 1.1, 7)
+    out = machine.outputs(q, 0.0)
+    assert out.rack.T.x == pytest.approx(0.2 - 0.05 * q, abs=1e-15)
+    assert np.broadcast_to(out.mesh.fx, q.shape) == pytest.approx(40.0, abs=1e-12)
+    # the force on the pinion, at 50 mm above its bearing, and the weight of it
+    assert out.tau == pytest.approx(-40.0 * 0.05 + 9.81 * (0.03 * np.cos(q) - 0.01 * np.sin(q)), abs=1e-12)
+    swung = machine_of(description_of(data | {"driver": {"link": "pinion", "range": [-2.9, 2.9]}}, "far"))
+    assert Machine(swung).outputs(2.8, 0.0).margin > 0.0
+    with pytest.raises(InputError, match="may swing by less than 168 deg"):
+        machine_of(description_of(data | {"driver": {"link": "pinion"}}, "round"))

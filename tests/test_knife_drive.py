@@ -13,7 +13,8 @@ from systems import component
 from chainunit import GeometryError, InputError
 from chainunit.core.engines import MATH, Dual, dual, numpy_, slope
 from chainunit.fmu.native.export import export
-from chainunit.groups.followed import HARMONICS, by_series
+from chainunit.groups.followed import TERMS
+from chainunit.groups.series import values_of
 from chainunit.groups.triad import Pose
 from chainunit.machines.knife_drive import KnifeDrive, modes
 from chainunit.mechanism.machine import Mechanism
@@ -275,9 +276,9 @@ def test_every_mode_that_goes_round_can_be_chosen():
 def test_the_series_is_a_start_and_newton_the_answer():
     """The series alone is some 1e-8 m off; what is shown closes to rounding, and what `derive` says of it is so."""
     *series, misfit, least = DEFAULT.derived
-    assert len(series) == 3 * (2 * HARMONICS + 1) and misfit < 1e-14 and 0.3 < least < 0.6
+    assert len(series) == 3 * TERMS and misfit < 1e-14 and 0.3 < least < 0.6
     angles = np.linspace(0.0, 2.0 * math.pi, 257)
-    near = Pose(*by_series(series, 3, np.cos(angles), np.sin(angles)))
+    near = Pose(*values_of(series, 3, TERMS, np.cos(angles), np.sin(angles)))
     link = moved(numpy_(), DEFAULT, angles).links["knife"]
     off = np.hypot(near.x - link.pin.p.x, near.y - link.pin.p.y)
     assert 1e-10 < np.max(off) < 1e-7

@@ -209,6 +209,7 @@ class Elbow(Driver):
 
     @property
     def joints(self) -> tuple[JointData, ...]:
+        """Its pins: of the arms with the link before, with each other and with the lever, then the lever's own."""
         bar, arm, lever = self.bar, self.arm.name, self.lever
         return (
             HingeData(bar.pin, bar.name),

@@ -22,6 +22,7 @@ from .block import minus_cofactors
 from .group import Group, SolvedGroup
 from .joints import LinkageInMotion, Placed
 from .legs import LegAt
+from .series import series_of, values_of
 
 SAMPLES = 20
 """Number of crank angles at which a group is followed once around."""
@@ -107,7 +108,7 @@ class FollowedGroup(Group):
     def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedOnLegs:
         """The group with the linkage `linkage` before it, on the branch that the series `derived` gives."""
         placed = self.at_position(linkage)
-        near = by_series(derived, len(self.assembly), xp.cos(q), xp.sin(q))
+        near = values_of(derived, len(self.assembly), TERMS, xp.cos(q), xp.sin(q))
         for k, turn in enumerate(self.turns):
             near[k] = near[k] + turn * q if turn else near[k]
         return self.solved(xp, placed, self._corrected(xp, placed, near, STEPS))
@@ -138,15 +139,10 @@ class FollowedGroup(Group):
         `before` gives the linkage before the group at a crank angle [rad]."""
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
         courses = zip(*self._followed(xp, before, angles), strict=True)
-        series = []
+        series: list[Any] = []
         for course, turn in zip(courses, self.turns or [0.0] * len(self.assembly), strict=True):
             values = [x - turn * q for x, q in zip(course, angles, strict=True)] if turn else course
-            series.append(sum(values) / SAMPLES)
-            for n in range(1, HARMONICS + 1):
-                for wave in (math.cos, math.sin):
-                    series.append(
-                        sum(v * (2.0 / SAMPLES * wave(n * q)) for v, q in zip(values, angles, strict=True))
-                    )
+            series += series_of(values, angles, HARMONICS)
         # the misfit as in a run, at angles halfway between the samples
         misfit, first, least = 0.0, None, None
         for q in angles:
@@ -159,14 +155,3 @@ class FollowedGroup(Group):
             margin = group.margin * first / xp.abs(first)
             least = margin if least is None else xp.minimum(least, margin)
         return [*series, misfit, least]
-
-
-def by_series(series: Sequence[Any], coordinates: int, cos: Any, sin: Any) -> list[Any]:
-    """The coordinates that the series gives, from cosine and sine of the crank angle."""
-    sums = [series[k * TERMS] for k in range(coordinates)]
-    c, s = cos, sin
-    for n in range(1, HARMONICS + 1):
-        for k in range(coordinates):
-            sums[k] = sums[k] + series[k * TERMS + 2 * n - 1] * c + series[k * TERMS + 2 * n] * s
-        c, s = c * cos - s * sin, s * cos + c * sin
-    return sums

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import zip_longest
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .block import GroupMatrix
 from .body import Bar, Load
-from .joints import SLIDES, UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Seat, Third
+from .joints import SLIDES, UNKNOWNS, HingeData, Joint, JointData, LinkageInMotion, Placed, Rail, Seat, Third
 
 
 class SolvedGroup:
@@ -86,6 +86,15 @@ def _rate(z: Sequence[Any], link: int) -> Third:
     return Vec2(x, y), turn
 
 
+class Outline(NamedTuple):
+    """A closed curve that a picture shows: its `points` [m], if lengths are numbers, count from a pin, in the
+    direction of a `frame`."""
+
+    pin: str
+    frame: Rail
+    points: Callable[[], Vec2]
+
+
 class Group:
     """A group as data."""
 
@@ -116,6 +125,11 @@ class Group:
     def circles(self) -> tuple[tuple[str, str], ...]:
         """The circles that a picture of it shows, each by the pins at its centre and on its rim."""
         return ()
+
+    @property
+    def outlines(self) -> Mapping[str, Outline]:
+        """The curves that a picture of it shows, by name."""
+        return {}
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """Numbers that follow from its lengths; `before` gives the linkage before the group at a crank angle

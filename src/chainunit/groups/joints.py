@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, Self
 
-from ..core.planar import ZERO, Link, Motion, Vec2
+from ..core.jets import Jet
+from ..core.planar import ZERO, Link, Motion, Vec2, rotated
 from .block import Row
 from .body import Load
 
@@ -50,7 +51,7 @@ class Rail(NamedTuple):
 
 
 class LinkageInMotion(Protocol):
-    """A linkage at one position: its `pins` with points, and its `links`, by name."""
+    """A linkage at one position: its `pins` with points, its `links`, and its `slides`, by name."""
 
     @property
     def pins(self) -> Mapping[str, Motion]:
@@ -59,6 +60,10 @@ class LinkageInMotion(Protocol):
     @property
     def links(self) -> Mapping[str, Link]:
         """Links by name."""
+
+    @property
+    def slides(self) -> Mapping[Joint, Slide]:
+        """The motion in each joint that slides."""
 
 
 class JointData(Protocol):
@@ -129,8 +134,8 @@ class HingeData(NamedTuple):
 
 
 class GuideData(NamedTuple):
-    """A sliding joint as data: the pin at which its reaction counts, the link on which this acts, and the other link
-    of the same group, or a line of a link before it."""
+    """A sliding joint, or the contact with a cam, as data: the pin at which its reaction counts, the link on which
+    this acts, and the other link of the same group, or a line of a link before; of a cam its centre and angle 0."""
 
     pin: str
     link: str
@@ -162,24 +167,27 @@ class GuideData(NamedTuple):
         return -reaction, -(reaction.moment + arm.cross(reaction))
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
-        """See `JointData`: the force is normal to the line, which turns with the link."""
-        link = m.links[self.link]
-        more = reaction.turned() * link.t1
-        yield self.link, (more, 0.0)
+        """See `JointData`: the force is normal to the line, or to the profile, which turns; its lever may grow."""
+        link, slide = m.links[self.link], m.slides[self.pin, self.link]
+        more, moment = reaction.turned() * slide.turn, reaction.dot(slide.d.turned()) * slide.growth
+        yield self.link, (more, moment)
         if carrier is not None:
             other = m.links[carrier]
             arm, arm1 = link.pin.p - other.pin.p, link.pin.p1 - other.pin.p1
-            yield carrier, (-more, -(arm1.cross(reaction) + arm.cross(more)))
+            yield carrier, (-more, -(moment + arm1.cross(reaction) + arm.cross(more)))
 
 
 class Slide(NamedTuple):
     """The motion in a sliding joint: the direction `d` of its line, the way `s` of the link that its reaction acts on
-    along it, and the derivatives of that by q [m, m/rad, m/rad2]."""
+    along it, the derivatives of that by q [m, m/rad, m/rad2], and of the angle of the line. A contact has no way;
+    `growth` is the derivative of the lever of `d`, turned by 90 degrees, about the start of the link."""
 
     d: Vec2
     s: Any
     s1: Any
     s2: Any
+    turn: Any
+    growth: Any = 0.0
 
 
 class GuideForce(Vec2):
@@ -396,7 +404,8 @@ class Guide(Hinge):
 
     def slide(self, rates: Rates) -> Slide:
         """The motion along its line."""
-        return Slide(self._d, self._s, self._speed(rates, 0), self._speed(rates, 1))
+        turn = rates[0][UNKNOWNS * self._link + 2]
+        return Slide(self._d, self._s, self._speed(rates, 0), self._speed(rates, 1), turn)
 
     def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
         """See `Placed`; the reaction is a `GuideForce`."""
@@ -409,3 +418,75 @@ class Guide(Hinge):
             effort = force.dot(self._d)
             moment = moment + self._line * effort
         return GuideForce.along(n, force.dot(n), moment), effort
+
+
+class Contact(Placed):
+    """The contact of a follower with a cam at one position: the frame `cam` of the profile, the start `base` of the
+    follower, the `arm` from there to the centre of its roller, or to a point of its face, the radius of the `roller`,
+    None for a face, and the point of the pitch curve, or of the profile under a face, turned with the cam."""
+
+    __slots__ = ("_arm", "_base", "_cam", "_lever", "_reach", "_roller", "_spot")
+
+    def __init__(self, cam: Link, base: Vec2, arm: Vec2, spot: Any, roller: Any) -> None:
+        self._cam, self._base, self._arm, self._spot, self._roller = cam, base, arm, spot, roller
+        # along the face, from its point to the contact
+        face = spot.normal.turned().dot(spot.place - (base + arm - cam.pin.p))
+        self._reach = face if roller is None else 0.0
+        self._lever = arm.cross(spot.normal) - self._reach
+
+    def rows(self) -> list[Row]:
+        """Its row: of the point at the contact along the normal."""
+        return [{0: self._spot.normal.x, 1: self._spot.normal.y, 2: self._lever}]
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """See `Placed`: what the gap loses while the next derivatives of the follower are 0. A profile counts by its
+        curvature and the change of that."""
+        (seen, turn), spot = self._seen(rates, len(rates) + 1, before), self._spot
+        n, t, k = spot.normal, spot.normal.turned(), spot.curvature
+        if self._roller is not None:
+            along = Jet(0.0, *seen.dot(t).parts[1:])
+            return [-(seen.dot(n) + along * along * (0.5 * k + along * (spot.change / 6.0))).parts[-1]]
+        # the distance of a tangent of the profile from its centre, over the angle
+        foot, bend = spot.place.dot(t), 1.0 / k - spot.place.dot(n)
+        cubic = -(spot.change / (k * k * k) + foot) / 6.0
+        distance = turn * (turn * (turn * cubic + 0.5 * bend) + foot)
+        return [(distance - seen.dot(rotated(_direction(turn), n))).parts[-1]]
+
+    def _seen(self, rates: Rates, order: int, before: Third | None = None) -> tuple[Vec2, Jet]:
+        """The point of the follower from the centre, as the cam sees it, and the angle of the follower less that of
+        the cam, up to an `order` of derivatives; those of the follower beyond `rates` are 0."""
+        cam, point = self._cam, self._base - self._cam.pin.p
+        motion = [(cam.pin.p1, cam.t1), (cam.pin.p2, cam.t2), *([] if before is None else [before])][:order]
+        x, y, angle = (Jet(0.0, *(z[k] for z in rates), *[0.0] * (order - len(rates))) for k in range(3))
+        turn = Jet(0.0, *(t for _, t in motion))
+        start = Vec2(
+            x + point.x - Jet(0.0, *(p.x for p, _ in motion)),
+            y + point.y - Jet(0.0, *(p.y for p, _ in motion)),
+        )
+        return rotated(start + rotated(_direction(angle), self._arm), _direction(-turn)), angle - turn
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """The force of the contact, along the normal where it presses."""
+        force = next(multipliers)
+        return GuideForce.along(self._spot.normal, force, force * self._lever), None
+
+    def slide(self, rates: Rates) -> Slide:
+        """The motion of the follower past the cam at the contact."""
+        (seen, turn), n, k, follower = (
+            self._seen(rates, 2),
+            self._spot.normal,
+            self._spot.curvature,
+            rates[0][2],
+        )
+        (_, s1, s2), (_, turn1, turn2), t = seen.dot(n.turned()).parts, turn.parts, n.turned()
+        if self._roller is None:
+            return Slide(t, None, s1, s2 - turn1 * turn1 * self._reach, follower, turn1 / k - s1)
+        turned = self._cam.t1 + k * s1
+        growth = (follower - turned) * self._arm.dot(n)
+        return Slide(t, None, s1 - self._roller * turn1, s2 - self._roller * turn2, turned, growth)
+
+
+def _direction(turn: Jet) -> Vec2:
+    """Cosine and sine of an angle that is 0 at first, up to the third derivatives."""
+    square = turn * turn
+    return Vec2(1.0 - square * 0.5, turn - square * turn * (1.0 / 6.0))

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar
 from .followed import TERMS, FollowedGroup, SolvedOnLegs
-from .joints import Guide, GuideData, Hinge, HingeData, JointData, LinkageInMotion, Rail
+from .joints import Guide, GuideData, Hinge, HingeData, Joint, JointData, LinkageInMotion, Rail, Slide
 from .legs import PLATE, Leg, LegAt
 
 
@@ -49,6 +50,7 @@ class _PlateAt(NamedTuple):
 
 
 def _plates_at(xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> Iterator[_PlateAt]:
+    """The plates at the coordinates `x`, from the pin or the rail that holds each of them."""
     for number, (base, place) in enumerate(zip(placed, x, strict=True), PLATE - 1):
         if isinstance(base, Motion):
             u = Vec2(xp.cos(place), xp.sin(place))
@@ -60,10 +62,11 @@ def _plates_at(xp: Any, placed: Sequence[Motion | Link], x: Sequence[Any]) -> It
 
 
 class _FirstPlate(NamedTuple):
-    """The first plate and its pins, as the linkage from which the legs go."""
+    """The first plate and its pins, as the linkage from which the legs go; it has no slides."""
 
     pins: Mapping[str, Motion]
     links: Mapping[str, Link]
+    slides: Mapping[Joint, Slide] = MappingProxyType({})
 
 
 @dataclass

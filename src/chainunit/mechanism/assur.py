@@ -28,8 +28,8 @@ class FreeLinksError(InputError):
 
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, its two links, and a `third` one that its equations
-    contain. `alone` is the kind of the group that a single link forms by it and a revolute joint. One that a driver
-    moves has 3 equations."""
+    contain. `alone` is the kind of the group that a single link forms by it and a joint of the kinds `seats`. One
+    that a driver moves has 3 equations."""
 
     name: str
     kind: str
@@ -38,6 +38,7 @@ class JointOf(NamedTuple):
     third: str = ""
     equations: int = 2
     alone: str = ""
+    seats: tuple[str, ...] = (REVOLUTE,)
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -57,8 +58,8 @@ class AssurGroup(NamedTuple):
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
     the joints are the outer ones of the legs, then their inner ones. Of a tetrad the two links with an outer joint
     stand first, then its legs; the joints are the outer ones, those of the legs with the first link, then with the
-    second. Of a single link the revolute one stands first. Of a driver between two links these stand first, then the
-    lever; the joints are as of a dyad, and that of the driver is the last one.
+    second. Of a single link the pin or the guide stands first. Of a driver between two links these stand first, then
+    the lever; the joints are as of a dyad, and that of the driver is the last one.
     """
 
     kind: str
@@ -271,8 +272,8 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
         link: [j for j in joints if link in (j.on, j.by) and j.other_link(link) in placed] for link in part
     }
     if len(part) == 1 and len(outer[part[0]]) == 2:
-        pair = sorted(outer[part[0]], key=lambda joint: joint.kind != REVOLUTE)
-        if pair[0].kind == REVOLUTE and pair[1].alone and {*pair[1].links} <= {*part} | placed:
+        pair = sorted(outer[part[0]], key=lambda joint: bool(joint.alone))
+        if pair[1].alone and pair[0].kind in pair[1].seats and {*pair[1].links} <= {*part} | placed:
             return AssurGroup(pair[1].alone, part, tuple(pair))
     if len(part) == 2 and len(inner) == 1 and all(len(link_joints) == 1 for link_joints in outer.values()):
         return _dyad(part, inner[0], {link: link_joints[0] for link, link_joints in outer.items()})

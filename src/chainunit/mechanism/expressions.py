@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 from ..core.engines import MATH
 from ..core.errors import InputError, meant, shown
+from ..core.jets import Jet, jet, variable
+from ..groups.driver import Course
 from .curves import TableCurve, positive, ramp, step
 
 Evaluation = Callable[[Any, Mapping[str, Any]], Any]
@@ -406,3 +408,33 @@ def expression(text: str) -> Expression:
 def value_of(xp: Any, entry: float | str, quantities: Mapping[str, Any]) -> Any:
     """The value of a number or of the text of an expression."""
     return expression(entry).value(xp, quantities) if isinstance(entry, str) else entry
+
+
+class LawCourse(NamedTuple):
+    """A course by a `law`: an expression of ``phi``, of quantities with `values`, and of `tables` over ``phi``."""
+
+    law: float | str
+    values: Mapping[str, Any]
+    tables: Mapping[str, TableCurve]
+
+    def __call__(self, xp: Any, q: Any) -> Course:
+        """The place and its derivatives at the place `q` of the first driver."""
+        engine, phi = jet(xp), variable(q)
+        names = expression(self.law).names if isinstance(self.law, str) else ()
+        over_phi = {name: table.value(engine, phi) for name, table in self.tables.items() if name in names}
+        place = value_of(engine, self.law, {**self.values, **over_phi, "phi": phi})
+        return Course(place.parts[0], place.parts[1:]) if isinstance(place, Jet) else held(place)
+
+
+def held(place: Any) -> Course:
+    """The course of a driver that stands at a place."""
+    return Course(place, (0.0, 0.0, 0.0))
+
+
+def splines(tables: Mapping[str, Mapping[str, Any]], turns: bool) -> dict[str, TableCurve]:
+    """The tables over the place of the first driver, which may turn round, as laws take them."""
+    return {
+        name: TableCurve(table["places"], table["values"], turns, spline=True)
+        for name, table in tables.items()
+        if table["over"] == "phi"
+    }

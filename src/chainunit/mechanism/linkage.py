@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from ..core.brief import briefly_shown
 from ..core.planar import Vec2
 from ..groups.driver import Course, Driver
-from ..groups.group import Group
+from ..groups.group import Group, Outline
 from ..groups.joints import TURNS, Joint
 from .extremes import MotionExtreme
 
@@ -102,6 +102,11 @@ class Linkage:
     def circles(self) -> tuple[tuple[str, str], ...]:
         """The circles that a picture shows, each by the pins at its centre and on its rim."""
         return tuple(circle for group in self.groups for circle in group.circles)
+
+    @property
+    def outlines(self) -> dict[str, Outline]:
+        """The closed curves that a picture shows, by name."""
+        return {name: outline for group in self.groups for name, outline in group.outlines.items()}
 
     @property
     def derived_count(self) -> int:

@@ -110,6 +110,8 @@ class MachineModel(Model):
     side have the same name."""
     cuts: bool = False
     """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
+    contacts: tuple[str, ...] = ()
+    """The outputs with the forces of contacts, which lift off where these are below 0."""
     further: tuple[str, ...] = ()
     """Names with which the machine has all of its further parameters, those of its pins apart."""
     extend: Callable[[Any, frozenset[str]], Any] | None = None
@@ -233,8 +235,10 @@ class InverseMachine(LinkageModel, MachineModel):
         self, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
     ) -> list[tuple[Variable, Any]]:
         """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; the places of all
-        pins, ``x(A)`` and ``y(A)``; and the angle of the line of each sliding block, ``line(ram)``. A machine whose
+        pins, ``x(A)`` and ``y(A)``; and the angle of each sliding block or cam, ``line(ram)``. A machine whose
         outputs depend on states has no places here."""
+        from .sketch import directions
+
         unit = self.driver_port.unit("N.m")
         columns = [
             (Variable("crank_torque", "effort at the driver", Quantity(unit, "")), outputs["tau"] * p.ratio)
@@ -252,9 +256,9 @@ class InverseMachine(LinkageModel, MachineModel):
                 for axis in "xy":
                     place = Variable(f"{axis}({pin})", f"place {axis} of the pin {pin}", Quantity("m", ""))
                     columns.append((place, getattr(motion.p, axis)))
-            for (pin, _), slide in m.slides.items():
+            for pin, d in directions(m).items():
                 line = Variable(f"line({pin})", f"angle of the line of the block {pin}", Quantity("rad", ""))
-                columns.append((line, xp.atan2(slide.d.y, slide.d.x)))
+                columns.append((line, xp.atan2(d.y, d.x)))
         return columns
 
     @cache  # noqa: B019 - models live as long as the program

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..core.model import Sketch
+from ..core.planar import Vec2
 from .linkage import Linkage
 from .machine import Mechanism
 
@@ -27,6 +28,13 @@ def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
     """The places x, y of the pins and points of a mechanism that are drawn [m]."""
     shown = shown_pins(mechanism.linkage)
     return {name: (pin.p.x, pin.p.y) for name, pin in mechanism.pins.items() if name in shown}
+
+
+def directions(mechanism: Mechanism) -> dict[str, Vec2]:
+    """The directions of the line of each sliding block, by its pin, and of each outline, by its name."""
+    lines = {pin: slide.d for (pin, _), slide in mechanism.slides.items() if slide.s is not None}
+    outlines = mechanism.linkage.outlines
+    return lines | {name: outlines[name].frame.at_position(mechanism.links).u for name in outlines}
 
 
 def sketch_of(mechanism: Mechanism) -> Sketch:

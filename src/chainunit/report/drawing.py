@@ -21,6 +21,7 @@ from ..core.quantities import Layout
 from ..groups.driver import Crank
 from ..machines.machine import Machine
 from ..mechanism.machine import Mechanism
+from ..mechanism.sketch import directions
 from ..reading.text import number
 from . import linkage
 from .motion import DrawnLink
@@ -174,6 +175,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
         _rail(canvas, *map(to_page, rail))
     for centre, rim in whole.linkage.circles:
         _circle(canvas, page_points[centre], math.dist(page_points[centre], page_points[rim]))
+    for outline in linkage.outlines(whole):
+        canvas.outline("polygon", map(to_page, outline), **_DASHED)
     if isinstance(crank, Crank):
         bearing = page_points[crank.bar.pin]
         # a link with its bearing alone, such as a drum or a fan, is a disc of any size
@@ -199,8 +202,9 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
         if any(name in link.joints for link in links):
             canvas.add("circle", cx=x, cy=y, r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2)
             canvas.label_boxes.append((x - 6, y - 6, x + 6, y + 6))
-    for (pin, _), slide in whole.slides.items():
-        _block(canvas, page_points[pin], math.atan2(-slide.d.y, slide.d.x))
+    for pin, d in directions(whole).items():
+        if pin in page_points:
+            _block(canvas, page_points[pin], math.atan2(-d.y, d.x))
     if isinstance(crank, Crank):
         _angle(canvas, bearing, phi, radius, math.atan2(crank.start.y, crank.start.x), crank.sense)
     drawn_links = {link.name: link for link in links}
@@ -255,11 +259,13 @@ def _positions(whole: Mechanism) -> dict[str, Point]:
 
 
 def _rims(whole: Mechanism) -> Iterator[Point]:
-    """Two corners of the square around each circle [m]."""
+    """Two corners of the square around each circle, and the points of outlines [m]."""
     positions = _positions(whole)
     for centre, rim in whole.linkage.circles:
         (x, y), r = positions[centre], math.dist(positions[centre], positions[rim])
         yield from ((x - r, y - r), (x + r, y + r))
+    for outline in linkage.outlines(whole):
+        yield from outline
 
 
 def _circle(canvas: _Canvas, centre: Point, radius: float) -> None:

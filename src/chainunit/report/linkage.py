@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..core.planar import rotated
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
+from ..mechanism.sketch import directions
 from ..mechanism.sketch import places as places
 from ..mechanism.sketch import shown_pins as shown_pins
 from ..mechanism.sketch import supports as supports
@@ -20,7 +22,8 @@ def links(linkage: Linkage) -> Iterator[DrawnLink]:
     link with more than two pins is an area."""
     shown = shown_pins(linkage)
     for name, carried in linkage.topology.links.items():
-        pins = tuple(pin for pin in carried if pin in shown)
+        # a contact has its pin at a point of its follower
+        pins = tuple(pin for pin in carried if pin in shown and pin.partition(".")[0] not in linkage.outlines)
         crank, grounded = name == linkage.driver.bar.name, any(pin in linkage.ground for pin in pins)
         look = "crank" if crank else "heavy" if grounded else "light"
         yield DrawnLink(name, pins, look, closed=len(pins) > 2)
@@ -32,7 +35,7 @@ def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, 
     ways = {}
     for connections in turn.topology.groups:
         for joint, carrier, _ in connections.joints:
-            if joint in turn.slides and carrier is None:
+            if joint in turn.slides and turn.slides[joint].s is not None and carrier is None:
                 place, d = turn.pins[joint[0]].p, turn.slides[joint].d
                 s = np.atleast_1d(turn.slides[joint].s)
                 x, y = (np.broadcast_to(v, s.shape) for v in (place.x, place.y))
@@ -73,8 +76,15 @@ def hanging(turn: Mechanism) -> tuple[str, ...]:
 
 
 def blocks(mechanism: Mechanism) -> dict[str, Any]:
-    """The angle of the line of each sliding block [rad], by its pin."""
-    return {pin: np.arctan2(slide.d.y, slide.d.x) for (pin, _), slide in mechanism.slides.items()}
+    """The angle of the line of each sliding block [rad], by its pin, and of each outline, by its name."""
+    return {name: np.arctan2(d.y, d.x) for name, d in directions(mechanism).items()}
+
+
+def outlines(mechanism: Mechanism) -> Iterator[list[tuple[float, float]]]:
+    """The points of each outline at one position [m]."""
+    for name, outline in mechanism.linkage.outlines.items():
+        place = mechanism.pins[outline.pin].p + rotated(outline.points(), directions(mechanism)[name])
+        yield list(zip(place.x.tolist(), place.y.tolist(), strict=True))
 
 
 def labels(linkage: Linkage) -> dict[str, str]:

@@ -260,6 +260,7 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
             ("at", lambda row: number(row[1].peak_at)),
             ("RMS", lambda row: number(row[1].rms)),
             ("largest moment", lambda row: number(row[1].moment)),
+            *[("least contact", lambda row: number(row[1].least))] * bool(f.machine.model.contacts),
             title=f"Reactions{on}",
             central=True,
         )

@@ -30,6 +30,11 @@ def picture(machine: Machine, way: Mechanism) -> Animation:
         linkage.supports(way.linkage),
         hanging=linkage.hanging(way),
         circles=(*circles, *way.linkage.circles),
+        outlines={
+            name: {"at": pin, "points": np.round([place.x, place.y], 6).T.tolist()}
+            for name, (pin, _, points) in way.linkage.outlines.items()
+            for place in [points()]
+        },
         names=linkage.labels(way.linkage),
         paths=linkage.paths(way, "" if turns else driver.end),
         rails=linkage.rails(way),
@@ -106,7 +111,7 @@ def loads_on_slides(state: MachineState) -> dict[str, tuple[Any, Any]]:
     for connections in m.topology.groups:
         for joint, carrier, _ in connections.joints:
             forces = [wrench.force for wrench in wrenches if wrench.link == joint[1]]
-            if joint in m.slides and carrier is None and forces:
+            if joint in m.slides and m.slides[joint].s is not None and carrier is None and forces:
                 slide, place = m.slides[joint], m.pins[joint[0]].p
                 way, force = (
                     np.broadcast_to(x, np.shape(m.q))

@@ -82,6 +82,8 @@ class Animation:
     hanging: tuple[str, ...] = ()
     circles: tuple[tuple[str, str], ...] = ()
     """circles, each by the joints at its centre and on its rim"""
+    outlines: Mapping[str, Any] = field(default_factory=dict)
+    """closed curves by name, each with its joint and its points from there [m]; `blocks` of a run have its angle"""
     groups: tuple[str, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     """the labels of joints whose label differs from their name"""
@@ -108,6 +110,7 @@ def pictures(animation: Animation, units: Units) -> dict[str, Any]:
         "grounds": animation.grounds,
         "hanging": animation.hanging,
         "circles": animation.circles,
+        "outlines": animation.outlines,
         "groups": animation.groups,
         "names": dict(animation.names),
         "paths": [

@@ -41,6 +41,11 @@ const machinePicture = (stage, motion, tables) => {
         const radius = Math.hypot(rim.x[0] - centre.x[0], rim.y[0] - centre.y[0]);
         for (const [list, all] of [[centre.x, x], [centre.y, y]]) reach(list.flatMap((place) => [place - radius, place + radius]), all);
       }
+    for (const r of motion.runs)
+      for (const { at, points } of Object.values(motion.outlines)) {
+        const radius = Math.max(...points.map((point) => Math.hypot(...point)));
+        for (const [list, all] of [[r.joints[at].x, x], [r.joints[at].y, y]]) reach(list.flatMap((place) => [place - radius, place + radius]), all);
+      }
     const ends = (list) => list.reduce((a, b) => Math.max(a, b)) - list.reduce((a, b) => Math.min(a, b));
     const size = Math.max(ends(x), ends(y)), arrow = 0.26 * size;
     for (const r of motion.runs)
@@ -95,8 +100,12 @@ const machinePicture = (stage, motion, tables) => {
       .map((link) => [link, drawn(stage, "polyline", { class: "material" })]);
     parts.links = motion.links.map((link) =>
       drawn(stage, link.closed ? "polygon" : "polyline", { class: `link ${link.look}${link.closed ? " closed" : ""}` }));
-    parts.blocks = Object.keys(run.blocks).map((joint) => [joint, drawn(stage, "rect", {
-      class: "block", x: -20, y: -10, width: 40, height: 20, rx: 2 })]);
+    parts.blocks = Object.keys(run.blocks).map((name) => {
+      const outline = motion.outlines[name];
+      if (!outline) return [name, drawn(stage, "rect", { class: "block", x: -20, y: -10, width: 40, height: 20, rx: 2 }), name];
+      const points = outline.points.map(([x, y]) => `${scale * x} ${-scale * y}`).join(",");
+      return [name, drawn(stage, "polygon", { class: "orbit", points }), outline.at];
+    });
     for (const path of motion.paths) {
       const points = path.x.map((px, i) => `${origin[0] + scale * px} ${origin[1] - scale * of(path.y, i)}`);
       drawn(drawn(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
@@ -252,9 +261,9 @@ const machinePicture = (stage, motion, tables) => {
       const [[ox, oy], [px, py]] = ends.map(at);
       for (const [name, value] of Object.entries({ cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) })) circle.setAttribute(name, value);
     }
-    for (const [joint, block] of parts.blocks) {
+    for (const [name, block, joint] of parts.blocks) {
       const [x, y] = at(joint);
-      block.setAttribute("transform", `translate(${x} ${y}) rotate(${-of(run.blocks[joint], frame)})`);
+      block.setAttribute("transform", `translate(${x} ${y}) rotate(${-of(run.blocks[name], frame)})`);
     }
     for (const [name, [dot]] of Object.entries(parts.joints)) {
       const [x, y] = at(name);

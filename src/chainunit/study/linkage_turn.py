@@ -75,6 +75,7 @@ class JointTurn:
     peak_at: Value = quantity("rad", "angle of the driver where it is largest")
     rms: Value = quantity("N", "force, RMS")
     moment: Value = quantity("N.m", "largest moment of a guide, about the point of its block")
+    least: Value = quantity("N", "least force of a cam on its follower, which lifts off below 0")
 
 
 @declaration
@@ -241,7 +242,9 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         named |= {
             f"force {name}": np.hypot(x[f"{joint}.fx"], x[f"{joint}.fy"]) for name, joint in joints.items()
         }
-        named |= {name: np.abs(x[name]) for name in sought}
+        named |= {name: np.abs(x[name]) for name in sought} | {
+            name: -x[name] for name in machine.model.contacts
+        }
         named |= {name: x[name] for name in moving} | {f"-{name}": -x[name] for name in moving}
         return {name: np.broadcast_to(column, q.shape) for name, column in named.items()}
 
@@ -280,6 +283,7 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
                 peak_at=peak_places[f"force {name}"],
                 rms=force_rms,
                 moment=top.get(f"{variable}.moment"),
+                least=-top[least] if (least := f"{variable}.normal") in machine.model.contacts else None,
             )
             for (name, variable), force_rms in zip(joints.items(), forces_rms, strict=True)
         },

@@ -459,6 +459,12 @@ _HAPPENINGS = {
             sizes={("N/m2", "stress"): "bar_stress_peak"},
         ),
         warning(
+            "lifts-off",
+            "A follower would lift off its cam, as the force of the contact falls below 0: {where}.",
+            remedy="Take a stronger spring, less mass, a slower rise, or a groove that guides the roller.",
+            sizes={("N", "", 3, "least force of the contact"): "least"},
+        ),
+        warning(
             "current-limit",
             "The motor runs into its current limit of {passed}: {where}.",
             sizes={"A": "passed"},
@@ -511,6 +517,14 @@ def _happenings(runs: StudyRuns, name: str) -> Iterator[tuple[str, str, dict[str
         yield "rod-end-pushed", "", {}
     if (stress := answers.bar_stress_peak) is not None and stress > drive.machine.p.bar.limit:
         yield "bar-overloaded", number(stress, "N/m2", "stress"), {"bar_stress_peak": stress}
+    run = runs.steady if name == STEADY else runs.series[name]
+    for contact in drive.machine.model.contacts:
+        if (least := float(run[f"machine.{contact}"].min())) < 0.0:
+            yield (
+                "lifts-off",
+                f"{contact.removesuffix('.normal')} with {number(least, 'N')}",
+                {"least": least},
+            )
     largest = drive.motor.current_limit(drive.parameters)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current-limit", "", {}

@@ -37,7 +37,7 @@ class WatchedFile:
     learning: float = quantity("s", "time from the begin in which the observer learns")
 
     @classmethod
-    def of(cls, watched: WatchedRecording) -> WatchedFile:
+    def from_recording(cls, watched: WatchedRecording) -> WatchedFile:
         """The file of a watched recording."""
         plan, recording = watched.plan, watched.recording
         duration = float(recording.time[-1]) - float(recording.time[0])
@@ -69,7 +69,7 @@ class Thresholds:
     force_widening: float = quantity("1", "factor by which the thresholds of the forces are wider for it")
 
     @classmethod
-    def of(cls, watched: WatchedRecording, settled: Any) -> Thresholds:
+    def from_recording(cls, watched: WatchedRecording, settled: Any) -> Thresholds:
         """The thresholds at the `settled` rows, without the outermost 2 % of them at either end."""
         columns = (watched.outputs[f"imbalance.{ground}_threshold"][settled] for ground in GROUNDS)
         (feed_least, feed_most), (force_least, force_most) = (
@@ -134,7 +134,7 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
     return WatchSummary(
         watched=watched,
         heading=Heading.of(watched.config.title, watched.config.file),
-        recording=WatchedFile.of(watched),
+        recording=WatchedFile.from_recording(watched),
         learned={
             _file_name(unknown.name): fitted
             for unknown, fitted in fitted_values(begin.problem, begin.fit)
@@ -146,7 +146,7 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
         doubts=list(_doubts(begin)),
         of_feed_alone=not begin.is_described and describes(begin.problem, begin.fit, begin.tests, loads),
         alarms=watched.alarms,
-        thresholds=Thresholds.of(watched, settled),
+        thresholds=Thresholds.from_recording(watched, settled),
         noise=dict(zip(("signal", "speed"), begin.noises, strict=True)),
         constant_parts=list(constant_parts(recording, [name for name in columns if name])),
         gaps=[Gap(*ends) for ends in recording.gaps if ends[1] - ends[0] > GAP * plan.turn],

@@ -11,7 +11,7 @@ from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
 from .declarations import RESERVED
 from .entries import Places
-from .joint_kind import JointEntry
+from .joint_kind import CAM, JointEntry
 from .joint_kinds import KINDS
 from .loads import MOTION
 from .names import alike_points
@@ -26,9 +26,10 @@ _STUDY = ("machine", "motor", "event", "run", "system", "sizing", "feed")
 
 
 def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
-    """The fault of a table of guides if no joint slides."""
-    if "guides" in data and not any(joint["type"] == PRISMATIC for joint in joints):
-        yield "guides", "no joint of the linkage slides; leave the table out"
+    """The fault of a table of guides or cams if the linkage has none."""
+    for table, kind, has in (("guides", PRISMATIC, "slides"), ("cams", CAM, "is a cam")):
+        if table in data and not any(joint["type"] == kind for joint in joints):
+            yield table, f"no joint of the linkage {has}; leave the table out"
 
 
 def study_fault(data: Mapping[str, Any]) -> None:

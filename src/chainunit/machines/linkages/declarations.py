@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from ...core.ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
@@ -12,11 +12,12 @@ from ...mechanism.assur import PRISMATIC, REVOLUTE
 from ...mechanism.driver_ports import AddedInertia
 from ...mechanism.models import names_of
 from ..parts import Force, GuideLaw, PinLaw
+from .joint_kind import CAM
 
 
 @declaration
 class CommonParameters:
-    """Parameters that every linkage has; `guides` only one in which a joint slides."""
+    """Parameters that every linkage has; `guides` only one in which a joint slides, `cams` only one with a cam."""
 
     g: Value = quantity("m/s2", "gravity, against y", default=9.81, min=0.0, tunable=True)
     ratio: Value = quantity(
@@ -24,6 +25,7 @@ class CommonParameters:
     )
     pins: PinLaw = group(PinLaw, "pins", default=PinLaw(friction=0.0, diameter=0.05))
     guides: GuideLaw = group(GuideLaw, "guides", default=GuideLaw())
+    cams: GuideLaw = group(GuideLaw, "contacts of cams", default=GuideLaw())
 
 
 @declaration
@@ -54,6 +56,13 @@ class GuideReaction(Force):
     s: Value = quantity("m", "way of the block along the line")
     v: Value = quantity("m/s", "speed along the line")
     a: Value = quantity("m/s2", "acceleration along the line")
+
+
+@declaration
+class CamReaction(Force):
+    """The force of a cam on its follower."""
+
+    normal: Value = quantity("N", "force of the contact, above 0 where it presses", nominal=1e3)
 
 
 @declaration
@@ -114,7 +123,9 @@ class WayRunning(Energies):
     tau: Value = quantity("N", "force needed at the driver, J a + tau_bias", nominal=1000.0)
 
 
-LOSSES: Mapping[str, tuple[str, type]] = {"pins": (REVOLUTE, PinLaw), "guides": (PRISMATIC, GuideLaw)}
+LOSSES: Mapping[str, tuple[str, type]] = {
+    "pins": (REVOLUTE, PinLaw), "guides": (PRISMATIC, GuideLaw), "cams": (CAM, GuideLaw)
+}  # fmt: skip
 """By table, the kind of the joints and the declaration of their losses."""
 
 
@@ -129,13 +140,14 @@ def with_differing(common: type, table: str, laws: Mapping[str, Mapping[str, flo
     return table, differing, group(differing, table, default=differing(**Layout(declared).by_name(shared)))
 
 
-def common_parameters(linear: bool, guides: bool, starts: Mapping[str, float]) -> type:
+def common_parameters(linear: bool, kinds: Collection[str], starts: Mapping[str, float]) -> type:
     """The parameters that a linkage has whatever its file says: of a driver that slides (`linear`) or turns, with
-    `guides` or without, and with the given start values by name."""
-    parameters = WayParameters if linear else CommonParameters
-    if not guides:
-        parameters = declared_class(parameters.__name__, (), fields_of(parameters, without=("guides",)))
-    return with_starts(parameters, starts)
+    the losses of the `kinds` of its joints, and with the given start values by name."""
+    declared = WayParameters if linear else CommonParameters
+    fields = fields_of(
+        declared, without=[name for name, (kind, _) in LOSSES.items() if kind not in (REVOLUTE, *kinds)]
+    )
+    return with_starts(declared_class(declared.__name__, (), fields), starts)
 
 
 def with_starts(declared: type, starts: Mapping[str, float]) -> type:

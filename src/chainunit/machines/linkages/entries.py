@@ -34,6 +34,8 @@ MOST_POINTS = 200
 """Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
 point costs an export about 10 ms, and each step of an FMU about 6 ns."""
 FEWER = f"must have at most {MOST_POINTS}: keep those between which the curve is nearly straight"
+_DEGREES = re.compile(r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*(?:deg\b|°)")
+"""An angle in degrees inside an expression."""
 _AXES = {"x": "m", "y": "m", "angle": "rad"}
 
 LARGEST = 1e30
@@ -177,6 +179,19 @@ class EntryReader(Entry):
                 self.expressed[key, entry] = None
             return entry
         return math.nan
+
+    def law_entry(self, key: str, law: Any, unit: str, unit_of_phi: str) -> Any:
+        """The value of a key that may be an expression of ``phi``, with tables over it and with angles in degrees."""
+        named = isinstance(law, str) and words_in(_DEGREES.sub("", law))
+        text = _DEGREES.sub(r"(\1 * deg)", law) if named else law
+        entry = self.entry(key, text, unit, {"phi": unit_of_phi, **self.table_units})
+        if isinstance(entry, str):
+            parsed = expression(entry)
+            if parsed.extremes:
+                self.fault(key, f"has {parsed.extremes[0]}, which depends on it; give a number")
+            with self.at(key):
+                self.count(parsed)
+        return entry
 
     def check_expression(self, parsed: Expression, unit: str, motion: NameUnits | None, inputs: bool) -> None:
         """Refuse an expression with a wrong name, of another unit, or with a width that changes in a run; the

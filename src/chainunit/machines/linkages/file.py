@@ -7,7 +7,6 @@ Each entry that is a quantity is a number in SI units, a text with a unit ("80 m
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,7 +18,7 @@ from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_
 from ...core.inputs import TOML, file_text
 from ...mechanism.assur import CYLINDER, DYADS, ELBOW, FURTHER_DRIVERS, GROUND, ON_LEGS, PRISMATIC, REVOLUTE
 from ...mechanism.curves import TableCurve
-from ...mechanism.expressions import expression, value_of
+from ...mechanism.expressions import LawCourse, splines, value_of
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
@@ -33,12 +32,12 @@ from .checks import (
     study_fault,
 )
 from .entries import is_among, is_given, sized, usual_distance, usual_inertia
-from .further import BACK, LawCourse, splines
+from .further import BACK
 from .joint_kind import JointEntry
 from .joint_kinds import KEYS, KINDS, SINGLES, kind_of
 from .load_entries import LoadReader
 from .model import machine_of
-from .names import model_name, name_fault, words_in
+from .names import model_name, name_fault
 from .shared_pins import shared_pins
 from .start import StartPose
 from .start_branches import check_start
@@ -46,22 +45,20 @@ from .way import WHOLE
 
 TABLES = (
     "title", "name", "about", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "drivers",
-    "links", "joints", "loads", "pins", "guides", "start", "groups",
+    "links", "joints", "loads", "pins", "guides", "cams", "start", "groups",
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _LAW_PLACES = 96
 """Places of the first driver at which a law is checked."""
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
-_DRIVES = ("belt", "chain", "cam", "rack", "rolling")
+_DRIVES = ("belt", "chain", "rolling")
 """Kinds of joints of other programs."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 _FURTHER_KEYS = (*_DRIVER_KEYS, "phi", "by", "start")
 _GEAR, _MOTOR = "gear", "motor"
 _RANGES = '["-20 deg", "75 deg"]', "[0.2, 0.6]"
 """Examples of the range of a driver that turns and of one that slides."""
-_DEGREES = re.compile(r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*(?:deg\b|°)")
-"""An angle in degrees inside an expression."""
 
 
 def read_linkage(file: Path) -> InverseMachine:
@@ -351,7 +348,7 @@ class _LinkageReader(LoadReader):
         kind_name = kind_of(table)
         kind = KINDS.get(str(kind_name))
         if kind is None:
-            drive = "; a belt or a cam between links is not possible yet" * (kind_name in _DRIVES)
+            drive = "; a belt between links is not possible yet" * (kind_name in _DRIVES)
             possible = " or ".join(f'"{possible_name}"' for possible_name in KINDS)
             self.fault(f"{key}.type", f"is {shown(kind_name)}; must be {possible}{drive}")
             return None
@@ -427,16 +424,7 @@ class _LinkageReader(LoadReader):
                 f'is {shown(by)}; must be "{_GEAR}", if the first driver drives it, or "{_MOTOR}", if it has one of '
                 "its own",
             )
-        named = isinstance(law, str) and words_in(_DEGREES.sub("", law))
-        text = _DEGREES.sub(r"(\1 * deg)", law) if named else law
-        motion = {"phi": "m" if first.get("linear") else "rad", **self.table_units}
-        entry["law"] = self.entry(f"{key}.phi", text, unit, motion)
-        if isinstance(entry["law"], str):
-            parsed = expression(entry["law"])
-            if parsed.extremes:
-                self.fault(f"{key}.phi", f"has {parsed.extremes[0]}, which depends on it; give a number")
-            with self.at(f"{key}.phi"):
-                self.count(parsed)
+        entry["law"] = self.law_entry(f"{key}.phi", law, unit, "m" if first.get("linear") else "rad")
         return entry | {"geared": by == _GEAR}
 
     def driver(
@@ -573,19 +561,22 @@ class _LinkageReader(LoadReader):
                 low, high = (f"{math.degrees(end):g} deg" for end in span)
                 raise InputError(f"{phi_text}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)
+        curves = splines(tables, span is None)
+        for joint in joints:
+            self.all(KINDS[joint["type"]].law_faults(joint, values, curves))
         for entry in drivers:
             if "law" in entry:
-                self.law(entry, value, values, splines(tables, span is None), span)
+                self.law(entry, value, values, curves, span)
         self.refuse()
         for entry, place in ((driver, value), *((entry, entry["start"]) for entry in drivers)):
             if entry["linear"]:
                 pose.slides.append((entries[entry["joint"]][0], place))
             else:
-                joint, turn = entries[entry["joint"]][0], number(entry["zero"]) + entry["sense"] * place
-                if GROUND in joint.links:
+                hinge, turn = entries[entry["joint"]][0], number(entry["zero"]) + entry["sense"] * place
+                if GROUND in hinge.links:
                     pose.angles[entry["link"]] = turn
                 else:  # as a guide keeps the angle of its links
-                    held.append((joint._replace(kind=PRISMATIC), turn))
+                    held.append((hinge._replace(kind=PRISMATIC), turn))
         self.refuse()
         with self.at("start"):
             return {"value": value, "poses": pose.complete()}

@@ -16,7 +16,7 @@ from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
 from .closing import LEAST_MARGIN, dead_group, open_group
 from .outputs import DescribedLinkage
-from .structure import Structure
+from .structure import FOLLOWED, Structure
 from .way import WHOLE, DriverWay
 
 NEAR = 0.35
@@ -161,7 +161,7 @@ class FollowedLinkage:
     def range_words(self) -> str:
         """Words on the range of the driver in which the linkage closes around its start, for a refusal; empty if
         there is none, or if the driver has to go all the way round."""
-        if any(isinstance(group, FollowedGroup) for group in self.linkage.groups):
+        if any(group.kind in FOLLOWED for group in self.structure.groups):
             return ""
         # the start of a slide may lie outside its range
         low, high = self.way.limits or (-math.inf, math.inf)

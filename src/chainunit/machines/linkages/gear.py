@@ -14,14 +14,27 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from ...core.errors import InputError, shown
 from ...core.planar import ZERO, Link, Motion, Vec2, mirrored, rotated
 from ...groups.block import Row
 from ...groups.body import Bar, Load
-from ...groups.group import Group, SolvedGroup
-from ...groups.joints import Hinge, HingeData, JointData, LinkageInMotion, Placed, Rates, Third
-from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
-from .joint_kind import JointEntry, JointParts, JointTable, SingleLinkKind
+from ...groups.group import Group, Outline, SolvedGroup
+from ...groups.joints import (
+    Guide,
+    GuideData,
+    Hinge,
+    HingeData,
+    JointData,
+    LinkageInMotion,
+    Placed,
+    Rail,
+    Rates,
+    Third,
+)  # fmt: skip
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup
+from .joint_kind import JointEntry, JointParts, JointTable, Seen, SingleLinkKind
 from .names import connected, owners_of
 
 if TYPE_CHECKING:
@@ -213,10 +226,7 @@ class GearKind(SingleLinkKind):
         """Add the arm with its points at the centres, and the pitch point, which it carries by the name of the
         joint."""
         key, wheels = f"joints.{joint['name']}", (joint["on"][0], joint["by"][0])
-        met = [{tuple(j["on"]), tuple(j["by"])} for j in joints if j["type"] == REVOLUTE]
-        # pins join points of one name, too
-        met += [{(link, name) for link in links} for name, links in owners_of(reader.points).items()]
-        centres = [dict(connected(tuple(joint[end]), met)) for end in ("on", "by")]
+        centres = [_pinned(reader, joint[end], joints) for end in ("on", "by")]
         arm = next(
             (link for link in reader.points if link not in wheels and all(link in c for c in centres)), ""
         )
@@ -259,8 +269,8 @@ class GearKind(SingleLinkKind):
             )
         return float(rate)
 
-    def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
-        """The wheel `link`, which turns on the arm in its `pin` and meshes with another wheel in the gear `joint`. If
+    def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
+        """The wheel `link`, which turns on the arm in its pin `first` and meshes with another one in the `joint`. If
         the other wheel is itself driven by a gear on the same arm, it is an idler: the turn then follows from the
         wheel that drives it, by the product of both ratios."""
         other, arm = joint.other_link(link), joint.third
@@ -268,7 +278,7 @@ class GearKind(SingleLinkKind):
         rolling = Rolling(_moving(arm), _moving(other), _ratio(joint, link))
         if idler is not None and idler.rolling.arm == rolling.arm:
             rolling = idler.rolling._replace(ratio=rolling.ratio * idler.rolling.ratio)
-        bar, mesh = parts.hung(link, pin), parts.pin(arm, joint.name)
+        bar, mesh = parts.hung(link, first), parts.pin(arm, joint.name)
         parts.receive(joint, mesh, link)
         structure, centre = parts.structure, parts.pin(other, joint.at(other))
         return GearedLink(
@@ -285,6 +295,171 @@ class GearKind(SingleLinkKind):
             "the slower of the two wheels with a whole ratio of the teeth, or let it swing by less than 168 deg "
             "about its start"
         )
+
+
+class RackData(MeshData):
+    """The mesh of a rack and its pinion as data: `pin` is a point of the rack on its pitch line."""
+
+    def third_before(
+        self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
+    ) -> Third | None:
+        """The third derivatives of the pin, if it is known, and of the angle of the other link."""
+        return pins.get(self.pin, ZERO), links[self.by or ""][1]
+
+    def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
+        """None: the force keeps its line."""
+        return iter(())
+
+
+class RackMesh(Placed):
+    """The mesh of a rack along `d` at one position: its `row`, the signed pitch `radius`, and the derivatives by q of
+    the pin and of the angle of the `other` link."""
+
+    __slots__ = ("_d", "_other", "_radius", "_row")
+
+    def __init__(self, row: Row, d: Vec2, radius: Any, other: Sequence[Third]) -> None:
+        self._row, self._d, self._radius, self._other = row, d, radius, other
+
+    def rows(self) -> list[Row]:
+        """Its row: of the rack along its line, or of the pitch point of the pinion."""
+        return [{**self._row}]
+
+    def right(self, rates: Rates, before: Third | None) -> list[Any]:
+        """Its right side, from the other link."""
+        place, turn = self._other[len(rates)] if before is None else before
+        return [self._d.dot(place) - self._radius * turn]
+
+    def force(self, multipliers: Iterator[Any]) -> tuple[Vec2 | None, Any]:
+        """The tangential force of the teeth [N]."""
+        return self._d * next(multipliers), None
+
+
+@dataclass
+class RackedLink(Group):
+    """A rack on a `rail` of the ground that a pinion moves, or without one a pinion on a pin of the ground that a
+    rack turns: its bar, the `name` of the joint, the point `mesh` of the rack on its pitch line, the other link `by`.
+    The rack has the direction `d`; the pitch line lies by the `radius` to the left of the `centre`. At the place
+    `start` of the driver the rack is at `place`, the pinion at that angle. The margin is as that of `GearedLink`."""
+
+    bar: Bar
+    name: str
+    mesh: str
+    by: str
+    centre: str
+    d: Vec2
+    radius: Any
+    rail: Rail | None
+    guide: str
+    place: float
+    start: float
+
+    derived_count: ClassVar[int] = 2
+    """The number of values that `derive` gives: at the start the direction of the pinion, or the place of the
+    rack."""
+
+    @property
+    def outlines(self) -> Mapping[str, Outline]:
+        """The pitch circle of the pinion."""
+        angles = np.linspace(0.0, 2.0 * math.pi, 91)
+        circle = Vec2(np.cos(angles), np.sin(angles))
+        return {self.name: Outline(self.centre, Rail(None, ZERO, self.d), lambda: circle * abs(self.radius))}
+
+    @property
+    def joints(self) -> tuple[JointData, ...]:
+        """Its guide or its pin, and its mesh."""
+        link = self.bar.name
+        first = HingeData(self.bar.pin, link) if self.rail is None else GuideData(self.guide, link, self.rail)
+        return first, RackData(self.mesh, link, self.centre, self.by, Rolling(None, None, Fraction(1)))
+
+    def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
+        """See `derived_count`."""
+        m = before(self.start)
+        there = m.pins[self.mesh].p if self.rail is None else m.links[self.by].u
+        return [there.x, there.y]
+
+    def solve(self, xp: Any, q: Any, linkage: LinkageInMotion, derived: Sequence[Any]) -> SolvedGroup:
+        """The rack as far along as the pinion has turned, or the pinion turned as the rack has moved."""
+        d, r, there = self.d, self.radius, Vec2(derived[0], derived[1])
+        if self.rail is None:
+            centre, rack = linkage.pins[self.bar.pin], linkage.pins[self.mesh]
+            turned = d.dot(there - rack.p) / r
+            cosine, rates = xp.cos(turned), [(rack.p1, 0.0), (rack.p2, 0.0)]
+            u = Vec2(xp.cos(turned + self.place), xp.sin(turned + self.place))
+            mesh = RackMesh({0: d.x, 1: d.y, 2: -r}, d, r, rates)
+            pose, first = (centre, u), Hinge(0, base=centre)
+        else:
+            pinion, rail = linkage.links[self.by], self.rail.at_position(linkage.links)
+            turned = rotated(pinion.u, mirrored(there))
+            way = self.place - d.dot(rail.pin.p) - r * xp.atan2(turned.y, turned.x)
+            cosine, mesh = turned.x, RackMesh({3: 1}, d, r, [(ZERO, pinion.t1), (ZERO, pinion.t2)])
+            pose, first = (rail.pin.p + d * way, rail.u), Guide(0, d, way, d * way, rail)
+        margin = (cosine - _LEAST_COSINE) * (1.0 / (1.0 - _LEAST_COSINE))
+        return SolvedGroup([pose], (first, mesh), margin)
+
+
+class RackKind(SingleLinkKind):
+    """A rack, the link `on` with a point of its pitch line, and its pinion about a point of the link `by`."""
+
+    name = noun = "rack"
+    limits = (
+        "The reaction of a rack is its tangential force; what presses it from its pinion is in no reaction."
+    )
+    equations = 1
+    alone = "rack and pinion"
+    seats = (REVOLUTE, PRISMATIC)
+
+    def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
+        """Add the guide of the rack."""
+        rack = {joint["on"][0], GROUND}
+        guides = [j["name"] for j in joints if j["type"] == PRISMATIC and {j["on"][0], j["by"][0]} == rack]
+        if not guides or GROUND not in _pinned(reader, joint["by"], joints):
+            reader.fault(
+                f"joints.{joint['name']}",
+                f"{joint['on'][0]} must slide in a guide of the ground, and {'.'.join(joint['by'])} be pinned to the "
+                "ground: give the rack in `on` with a point of its pitch line, the pinion in `by` with its centre",
+            )
+        joint["guide"] = next(iter(guides), "")
+
+    def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
+        """The place of the rack along its guide."""
+        if first.kind == REVOLUTE:
+            return {}
+        d = line(first)
+        return {joint.on[0]: place(*joint.on).dot(d) / math.sqrt(d.squared())}
+
+    def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
+        """The rack on its guide `first`, or the pinion on its pin."""
+        (rack, point), (pinion, centre), geometry = joint.on, joint.by, parts.geometry
+        guide = parts.structure.joints[joint.table["guide"]]
+        d, rail, pin, place = geometry.direction(guide, GROUND), None, "", parts.sides.get(link, 0.0)
+        name = parts.pin(pinion, centre)
+        line = geometry.line_through(guide, rack, geometry.point(rack, point))
+        if link == rack:
+            bar, rail, pin = parts.slider(link, first, point)
+            mesh = f"{joint.name}.{point}"
+            bar = bar._replace(points={**bar.points, mesh: (0.0, 0.0)})
+        else:
+            bar, mesh, place = parts.hung(link, first), parts.pin(rack, point), parts.structure.poses[link][2]
+        parts.receive(joint, mesh, link)
+        radius = d.cross(line - parts.ground[name])
+        by, start = pinion if link == rack else rack, parts.structure.start
+        return RackedLink(bar, joint.name, mesh, by, name, d, radius, rail, pin, place, start)
+
+    def dead(self, group: AssurGroup, where: str) -> str:
+        """See `SingleLinkKind`: half a turn of the pinion."""
+        joint = group.joints[1]
+        return (
+            f"the pinion of {joint.name} has turned by nearly half a turn from its start at {where}, and may swing "
+            "by less than 168 deg about that; take a larger pinion, a shorter way, or a start in its middle"
+        )
+
+
+def _pinned(reader: EntryReader, end: Sequence[str], joints: Sequence[JointTable]) -> dict[str, str]:
+    """The points that meet an end of a joint in pins, by link."""
+    met = [{tuple(j["on"]), tuple(j["by"])} for j in joints if j["type"] == REVOLUTE]
+    # pins join points of one name, too
+    met += [{(link, name) for link in links} for name, links in owners_of(reader.points).items()]
+    return dict(connected(tuple(end), met))
 
 
 def _moving(link: str) -> str | None:

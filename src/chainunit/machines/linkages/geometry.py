@@ -17,6 +17,7 @@ from ...groups.body import Mass
 from ...mechanism.assur import CYLINDER, ELBOW, GROUND
 from ...mechanism.expressions import value_of
 from .joint_kind import Entry, JointEntry
+from .joint_kinds import SINGLES
 from .structure import LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
@@ -125,8 +126,8 @@ class LinkGeometry:
 
 
 def start_sides(geometry: LinkGeometry) -> dict[str, float]:
-    """The assembly mode of each dyad that has two, by its first link, from the rough poses of the structure; the
-    `geometry` has numbers.
+    """The assembly mode of each dyad that has two, by its first link, and what the start tells of single links, from
+    the rough poses of the structure; the `geometry` has numbers.
 
     Raises
     ------
@@ -139,8 +140,11 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
         link, start = joint.by
         return place(link, joint.toward) - place(link, start)
 
-    sides = {}
+    sides: dict[str, float] = {}
     for group in structure.groups:
+        if group.kind in SINGLES:
+            seat, joint = (structure.joints[joint.name] for joint in group.joints)
+            sides |= SINGLES[group.kind].start(seat, joint, place, line)
         if group.kind not in TWO_WAYS:
             continue
         first, last = group.links[0], group.links[-1]

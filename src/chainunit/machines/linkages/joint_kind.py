@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from ...core.errors import shown
+from ...core.planar import Vec2
 from ...groups.body import Bar
 from ...groups.group import Group
+from ...groups.joints import Rail
 from ...mechanism.assur import PRISMATIC, REVOLUTE, AssurGroup
 
 if TYPE_CHECKING:
     from .entries import EntryReader
 
+CAM = "cam"
+Seen = Callable[..., Vec2]
 Entry = float | str
 """A number, or the text of an expression."""
 JointTable = dict[str, Any]
@@ -56,7 +60,16 @@ class JointEntry(NamedTuple):
 
 
 class JointParts(Protocol):
-    """What a kind of joint needs of the parts of a linkage."""
+    """What a kind of joint needs of the parts of a linkage: the links with numbers, the frames of links in their
+    groups, and what the start tells of groups, by link."""
+
+    geometry: Any
+    frames: Any
+    sides: Any
+
+    @property
+    def ground(self) -> dict[str, Vec2]:
+        """Places of the ground pins [m]."""
 
     @property
     def groups(self) -> Sequence[Group]:
@@ -66,11 +79,14 @@ class JointParts(Protocol):
     def structure(self) -> Any:
         """The linkage without numbers."""
 
+    def slider(self, link: str, rail: JointEntry, start: str) -> tuple[Bar, Rail, str]:
+        """The bar of a block that starts from its point `start` on its rail, the rail, and the pin of its force."""
+
     def pin(self, link: str, point: str) -> str:
         """The name of a point in the linkage."""
 
-    def hung(self, link: str, joint: JointEntry) -> Bar:
-        """The bar of a link that starts from the pin of a joint, along its own x axis."""
+    def hung(self, link: str, joint: JointEntry, along: Vec2 = ...) -> Bar:
+        """The bar of a link that starts from the pin of a joint, in the direction `along`, by default its x axis."""
 
     def receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
@@ -80,8 +96,8 @@ class JointKind:
     """A kind of joint: its `name` in `type`, its `noun` in reports, the `keys` that it has besides `type`, `on` and
     `by`, of which the first one tells the kind if `type` is missing, with words on their `use`. `losses` are the
     table of the losses of all such joints, and its keys; `limits` say what is not in their reactions; `equations` is
-    their number. `alone` is the kind of the group that a single link forms by such a joint and a pin, if there is
-    one."""
+    their number. `alone` is the kind of the group that a single link forms by such a joint and one of the kinds
+    `seats`, if there is one."""
 
     name: ClassVar[str]
     noun: ClassVar[str]
@@ -91,6 +107,7 @@ class JointKind:
     limits: ClassVar[str] = ""
     equations: ClassVar[int] = 2
     alone: ClassVar[str] = ""
+    seats: ClassVar[tuple[str, ...]] = (REVOLUTE,)
 
     def read(self, reader: EntryReader, key: str, table: Mapping[str, Any], joint: JointTable) -> None:
         """Add its own keys from its `table` to the `joint`, which has its ends."""
@@ -102,6 +119,12 @@ class JointKind:
         self, joint: Mapping[str, Any], points: Mapping[str, Mapping[str, tuple[float, float]]]
     ) -> Iterator[tuple[str, str]]:
         """Faults by key at the start values of the parameters, from the `points` of each link in its frame [m]."""
+        return iter(())
+
+    def law_faults(
+        self, joint: Mapping[str, Any], values: Mapping[str, Any], tables: Mapping[str, Any]
+    ) -> Iterator[tuple[str, str]]:
+        """Faults of its laws by key at the start `values` of the parameters, with the `tables` over phi as curves."""
         return iter(())
 
 
@@ -150,15 +173,19 @@ class GuideKind(JointKind):
 
 
 class SingleLinkKind(JointKind):
-    """A kind of joint by which, and a pin, a single link forms a group of the kind `alone`."""
+    """A kind of joint by which, and a pin or a guide, a single link forms a group of the kind `alone`."""
 
-    def group(self, parts: JointParts, link: str, pin: JointEntry, joint: JointEntry) -> Group:
-        """The group of the link."""
+    def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
+        """What the start tells of the group, by names, from the rough `place` of points and the `line` of guides."""
+        return {}
+
+    def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
+        """The group of the link, with the pin or the guide `first`."""
         raise NotImplementedError
 
     def rate(self, joint: JointEntry, link: str) -> float:
         """How often the link turns, at most, while the links before it turn once."""
-        raise NotImplementedError
+        return 1.0
 
     def dead(self, group: AssurGroup, where: str) -> str:
         """The sentence on the group in its dead position."""

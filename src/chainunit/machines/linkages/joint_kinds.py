@@ -6,10 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...mechanism.assur import REVOLUTE, JointOf
-from .gear import GearKind
+from .cam import CamKind
+from .gear import GearKind, RackKind
 from .joint_kind import GuideKind, JointEntry, JointKind, PinKind, SingleLinkKind
 
-KINDS: Mapping[str, JointKind] = {kind.name: kind for kind in (PinKind(), GuideKind(), GearKind())}
+KINDS: Mapping[str, JointKind] = {
+    kind.name: kind for kind in (PinKind(), GuideKind(), GearKind(), RackKind(), CamKind())
+}
 """The kinds by their names."""
 SINGLES: Mapping[str, SingleLinkKind] = {
     kind.alone: kind for kind in KINDS.values() if isinstance(kind, SingleLinkKind)
@@ -28,4 +31,6 @@ def kind_of(table: Mapping[str, Any]) -> Any:
 def in_decomposition(joint: JointEntry) -> JointOf:
     """A joint as the decomposition sees it."""
     kind = KINDS[joint.kind]
-    return JointOf(joint.name, kind.name, joint.on[0], joint.by[0], joint.third, kind.equations, kind.alone)
+    return JointOf(
+        joint.name, kind.name, joint.on[0], joint.by[0], joint.third, kind.equations, kind.alone, kind.seats
+    )

@@ -32,15 +32,16 @@ from ...mechanism.curves import TableCurve
 from ...mechanism.driven import StateOfDrivers
 from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
 from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
-from ...mechanism.expressions import expression, value_of
+from ...mechanism.expressions import expression, splines, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import DirectMachine, InverseMachine, names_of, slopes, words_on_motion
 from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, with_differing
 from .following import FollowedLinkage, lesser, misfits, signed, turns_of_followed
-from .further import BACK, FurtherDrivers, splines
+from .further import BACK, FurtherDrivers
 from .geometry import LinkGeometry, start_sides
+from .joint_kind import CAM
 from .joint_kinds import KINDS
 from .loads import (
     ForceLaw,
@@ -208,8 +209,8 @@ class LinkageDescription(LinkageOutputs):
             if quantities := link.get("own", {}):
                 name, title = self.variable("link", link["name"]), f"link {link['name']}"
                 fields.append((name, LinkBody, group(LinkBody, title, default=LinkBody(**quantities))))
-        guides = any(j.kind == PRISMATIC for j in self.structure.joints.values())
-        common = common_parameters(self.way.linear, guides, self.data["common"])
+        kinds = {j.kind for j in self.structure.joints.values()}
+        common = common_parameters(self.way.linear, kinds, self.data["common"])
         fields += [with_differing(common, table, laws) for table, laws in self.data.get("losses", {}).items()]
         if self.way.swings:
             ratio = self._ratio
@@ -242,6 +243,7 @@ class LinkageDescription(LinkageOutputs):
         derived = getattr(p, "derived", ())
         values |= zip(self.extremes, derived[-len(self.extremes) :], strict=False) if self.extremes else ()
         values |= {f"table {name}": curve for name, curve in self.curves.items()}
+        values["splines"] = self.further.tables
         values |= {"g": p.g, "ratio": p.ratio}
         for name, text in self.data.get("derived", ()):
             values[name] = value_of(xp, text, values)
@@ -275,13 +277,19 @@ class LinkageDescription(LinkageOutputs):
             for table, named in self.data.get("losses", {}).items()
         }
         loads["pins"] = PinLosses(p.pins, p.pins.damping, laws.get("pins", {}))
-        if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
+        cams = [parts.receivers[name][0] for name, j in self.structure.joints.items() if j.kind == CAM]
+        if cams or any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
                 parts.receivers[joint["name"]][0]: parts.geometry.number(joint["length"])
                 for joint in self.data["joints"]
                 if "length" in joint
             }
-            loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths, laws.get("guides", {}))
+            usual, of_cams = (
+                getattr(p, "guides", None) or p.cams,
+                dict.fromkeys(cams, getattr(p, "cams", None)),
+            )
+            differing = of_cams | laws.get("cams", {}) | laws.get("guides", {})
+            loads["guides"] = GuideLosses(usual, usual.damping, lengths, differing)
         extremes = tuple(self._extreme(name, parts) for name in self.extremes)
         return DescribedLinkage(
             parts.ground, parts.driver, tuple(parts.groups), loads, parts, extremes=extremes
@@ -499,6 +507,9 @@ class LinkageDescription(LinkageOutputs):
             Outputs=self.outputs,
             joints={variable: receivers[name][0] for name, variable in variables.items()},
             pins=variables,
+            contacts=tuple(
+                f"{variables[j.name]}.normal" for j in self.structure.joints.values() if j.kind == CAM
+            ),
             usual_speed=(0.05, 200.0),
             described_by=self,
             linkage=self.linkage,

@@ -17,9 +17,9 @@ from ...mechanism.driver_ports import DriverPort
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism
 from ..parts import Force, force
-from .declarations import RESERVED, GuideReaction, LinkTurning, PointMotion, Running, WayRunning
+from .declarations import RESERVED, CamReaction, GuideReaction, LinkTurning, PointMotion, Running, WayRunning
 from .further import FurtherDrivers
-from .joint_kind import JointEntry
+from .joint_kind import CAM, JointEntry
 from .loads import name_of_load
 from .names import LinkPoint, connected
 from .parts import LinkageParts
@@ -67,7 +67,7 @@ class LinkageOutputs:
         """The declaration of the outputs."""
         fields: list[tuple[str, Any, Any]] = []
         for name, joint in self.structure.joints.items():
-            kind: type = GuideReaction if joint.kind == PRISMATIC else Force
+            kind: type = {PRISMATIC: GuideReaction, CAM: CamReaction}.get(joint.kind, Force)
             description = f"joint {name}: on {joint.on[0]} from {joint.by[0]}"
             fields.append((self.variable("joint", name), kind, group(kind, description)))
         for name, kind in self.link_outputs.items():
@@ -101,6 +101,9 @@ class LinkageOutputs:
             key, sign = parts.receivers[name]
             if joint.kind == PRISMATIC:
                 value: Any = self._guide_reaction(joint, parts, m, reactions[key], w, a)
+            elif joint.kind == CAM:
+                pressing = -reactions[key].dot(m.slides[key].d.turned())
+                value = CamReaction(fx=reactions[key].x, fy=reactions[key].y, normal=pressing)
             else:
                 value = force(reactions[key] if sign > 0.0 else -reactions[key])
             values[self.variable("joint", name)] = value

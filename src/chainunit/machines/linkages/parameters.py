@@ -29,7 +29,7 @@ class ParameterReader(EntryReader):
         """Start values of the parameters that every linkage has."""
         common = {}
         variables = Layout(CommonParameters).variables
-        for table in ("pins", "guides"):
+        for table in LOSSES:
             names = [v.name.removeprefix(f"{table}.") for v in variables if v.name.startswith(f"{table}.")]
             shared = {key: x for key, x in self.table(table).items() if not isinstance(x, Mapping)}
             self.keys(table, shared, names)
@@ -60,7 +60,7 @@ class ParameterReader(EntryReader):
     def differing(
         self, joints: Sequence[Mapping[str, Any]], common: Mapping[str, float]
     ) -> dict[str, dict[str, dict[str, float]]]:
-        """By table ("pins", "guides") and joint, the start values of the losses of joints that differ from the
+        """By table of losses and joint, the start values of the losses of joints that differ from the
         others, which have the `common` ones."""
         laws: dict[str, dict[str, dict[str, float]]] = {}
         for table, (kind, declared) in LOSSES.items():

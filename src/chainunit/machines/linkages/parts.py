@@ -225,7 +225,7 @@ class LinkageParts:
         self.receive(joint, pin, first)
         return pin
 
-    def _slider(self, link: str, rail: JointEntry, start: str) -> tuple[Bar, Rail, str]:
+    def slider(self, link: str, rail: JointEntry, start: str) -> tuple[Bar, Rail, str]:
         """A block whose frame starts at the point `start` on its rail."""
         point = self.geometry.point(link, start)
         line = self._rail(rail, link, point)
@@ -235,7 +235,7 @@ class LinkageParts:
     def _rrp(self, first: str, slider: str, p: JointEntry, c: JointEntry, g: JointEntry) -> Group:
         inner = self._inner(c, first, slider)
         rod = self._rod(first, p, c)
-        return RRP(inner, rod, *self._slider(slider, g, c.at(slider)), self.sides[first])
+        return RRP(inner, rod, *self.slider(slider, g, c.at(slider)), self.sides[first])
 
     def _rpr(self, first: str, second: str, p: JointEntry, g: JointEntry, q: JointEntry) -> Group:
         """The first link on its pin with a block, which slides on a line of the second link on its own pin."""
@@ -249,8 +249,8 @@ class LinkageParts:
 
     def _prp(self, first: str, second: str, g: JointEntry, c: JointEntry, h: JointEntry) -> Group:
         inner = self._inner(c, first, second)
-        one, one_rail, one_guide = self._slider(first, g, c.at(first))
-        other, other_rail, other_guide = self._slider(second, h, c.at(second))
+        one, one_rail, one_guide = self.slider(first, g, c.at(first))
+        other, other_rail, other_guide = self.slider(second, h, c.at(second))
         return PRP(inner, one, other, one_rail, other_rail, (one_guide, other_guide))
 
     def _rpp(self, block: str, yoke: str, p: JointEntry, s: JointEntry, g: JointEntry) -> Group:
@@ -302,7 +302,7 @@ class LinkageParts:
             bar, x = self.hung(link, outer), self.structure.poses[link][2]
             held = HingeData(bar.pin, link)
         else:
-            (bar, rail, guide), x = self._slider(link, outer, outer.at(link)), geometry.rough_way(outer, link)
+            (bar, rail, guide), x = self.slider(link, outer, outer.at(link)), geometry.rough_way(outer, link)
             held = GuideData(guide, link, rail)
         arms = ((self.pin(link, j.at(link)), geometry.point(link, j.at(link))) for j in pins)
         return Plate(bar, held, {pin: self.frames[link].coordinates(arm) for pin, arm in arms}), x
@@ -316,7 +316,7 @@ class LinkageParts:
             self.receive(inner, pin, link)
             if outer.kind == REVOLUTE:
                 return RodLeg(self._rod(link, outer, inner), pin, arm)
-            bar, rail, guide = self._slider(link, outer, inner.at(link))
+            bar, rail, guide = self.slider(link, outer, inner.at(link))
             return BlockLeg(bar, pin, arm, rail, guide)
         place = self.geometry.line_through(inner, link, self.geometry.point(link, outer.at(link)))
         bar = self.hung(link, outer, self.geometry.direction(inner, link))

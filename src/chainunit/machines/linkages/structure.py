@@ -9,9 +9,12 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...mechanism.assur import DRIVES, GROUND, ON_LEGS, PRISMATIC, REVOLUTE, AssurGroup, decompose
-from .joint_kind import Entry, JointEntry
-from .joint_kinds import SINGLES, in_decomposition
+from .joint_kind import CAM, Entry, JointEntry
+from .joint_kinds import KINDS, SINGLES, in_decomposition
 from .names import LinkPoint, connected, owners_of
+
+FOLLOWED = (*ON_LEGS, KINDS[CAM].alone)
+"""Kinds of groups that are followed over a turn of the driver."""
 
 
 @dataclass(frozen=True)
@@ -75,22 +78,19 @@ def groups_of(
     """
     moved, driver = {entry.joint: entry.link for entry in drivers}, drivers[0]
     groups = decompose(links, [in_decomposition(joint) for joint in joints], moved)
-    followed = next((group for group in groups if group.kind in ON_LEGS), None)
-    if followed is not None and any(entry.is_free for entry in drivers):
-        kind = followed.kind
-        raise InputError(
-            f"the links {', '.join(followed.links)} form a {kind}, and two drivers are inputs: a {kind} needs one; "
-            'give the other one a law, phi = "..."',
-            key=followed.links[0],
-        )
-    if followed is not None and (driver.linear or driver.swings):
+    followed = next((group for group in groups if group.kind in FOLLOWED), None)
+    if followed is None:
+        return groups
+    kind, many, link = f"a {followed.kind}", len(followed.links) > 1, followed.links[0]
+    who = f"the link{'s' * many} {', '.join(followed.links)} form{'s' * (not many)} {kind}"
+    if any(entry.is_free for entry in drivers):
+        law = 'give the other one a law, phi = "..."'
+        raise InputError(f"{who}, and two drivers are inputs: {kind} needs one; {law}", key=link)
+    if driver.linear or driver.swings:
         moves = "swings" if driver.swings else "slides"
         remedy = "turns all the way round; leave driver.range out, or" if driver.swings else "turns;"
-        raise InputError(
-            f"the links {', '.join(followed.links)} form a {followed.kind}, and the driver {moves}: a "
-            f"{followed.kind} needs a driver that {remedy} drive another link",
-            key=followed.links[0],
-        )
+        needed = f"{kind} needs a driver that {remedy} drive another link"
+        raise InputError(f"{who}, and the driver {moves}: {needed}", key=link)
     return groups
 
 
