@@ -68,7 +68,7 @@ def test_a_package_that_is_not_installed_has_a_sentence(module, package):
     assert "Traceback" in run("chainunit.nothing").stderr
 
 
-@pytest.mark.parametrize(("name", "most"), [("ChamberForces", 90), (TIPPER, 116)])
+@pytest.mark.parametrize(("name", "most"), [("ChamberForces", 90), (TIPPER, 122)])
 def test_an_export_imports_the_machine_and_nothing_of_studies(name, most, tmp_path):
     code = f"import sys; {_command('export', name, '-o', str(tmp_path / 'it.fmu'), '--backend', 'python')}"
     after = "print('loaded', *(m for m in sys.modules if m.split('.')[0] == 'chainunit'))"

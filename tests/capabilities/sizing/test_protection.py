@@ -177,16 +177,16 @@ def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
     assert motor_verdict(on_line).text.startswith("The motor keeps the crank at")
     found = on_line.findings.by_analysis["starts"]
     stuck = dataclasses.replace(found.starts[3], start_time=None)
-    study = changed(
-        on_line, by_analysis={"starts": dataclasses.replace(found, starts=(found.starts[0], stuck))}
-    )
+    sizing = {"sizing": on_line.findings.by_analysis["sizing"]}
+    starts = dataclasses.replace(found, starts=(found.starts[0], stuck))
+    study = changed(on_line, by_analysis=sizing | {"starts": starts})
     verdict = motor_verdict(study)
     assert verdict.holds == "false" and "does NOT bring the crank to its speed from 135 deg" in verdict.text
     early = changed(
         on_line,
         started=dataclasses.replace(on_line.runs.started, steady_from=0.0),
         answers=dict(on_line.runs.answers),
-        by_analysis={},
+        by_analysis=sizing,
         remarks=[],
     )
     window = early.runs.window(
