@@ -64,10 +64,12 @@ class CamKind(SingleLinkKind):
                 f"{key}.{other}", "belongs to a roller, and the follower has a face; take one of both out"
             )
 
-    def law_faults(
-        self, joint: Mapping[str, Any], values: Mapping[str, Any], tables: Mapping[str, Any]
+    @staticmethod
+    def profile_faults(
+        joint: Mapping[str, Any], values: Mapping[str, Any], tables: Mapping[str, Any]
     ) -> Iterator[tuple[str, str]]:
-        """The fault of a radius that is none, that jumps, or with which the profile is undercut."""
+        """The fault by key of a radius that is not above 0, that jumps, or with which the profile is undercut, at the
+        start `values` of the parameters; `tables` has those over phi as curves."""
         with np.errstate(all="ignore"):
             radius, rates = LawCourse(joint["radius"], values, tables)(numpy_(), _ANGLES)
             course = np.array([np.broadcast_to(x, _ANGLES.shape) for x in (radius, *rates)], float)

@@ -22,6 +22,7 @@ from ...mechanism.expressions import LawCourse, splines, value_of
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
+from .cam import CamKind
 from .checks import (
     POINT_NAMES,
     freedom_faults,
@@ -563,7 +564,8 @@ class _LinkageReader(LoadReader):
         self.given_pose(table, pose)
         curves = splines(tables, span is None)
         for joint in joints:
-            self.all(KINDS[joint["type"]].law_faults(joint, values, curves))
+            if isinstance(kind := KINDS[joint["type"]], CamKind):
+                self.all(kind.profile_faults(joint, values, curves))
         for entry in drivers:
             if "law" in entry:
                 self.law(entry, value, values, curves, span)

@@ -121,12 +121,6 @@ class JointKind:
         """Faults by key at the start values of the parameters, from the `points` of each link in its frame [m]."""
         return iter(())
 
-    def law_faults(
-        self, joint: Mapping[str, Any], values: Mapping[str, Any], tables: Mapping[str, Any]
-    ) -> Iterator[tuple[str, str]]:
-        """Faults of its laws by key at the start `values` of the parameters, with the `tables` over phi as curves."""
-        return iter(())
-
 
 class PinKind(JointKind):
     """A pin, about which its links turn."""
