@@ -110,7 +110,7 @@ def test_a_crusher_with_three_kinds_of_pins():
 
 
 def study_of(name, folder, text=""):
-    """The result of an example, or of the `text` of a study file beside it."""
+    """The result of an example, or of the `text` of a study file, and what the terminal shows."""
     file = EXAMPLES / f"{name}.toml"
     arguments = [str(file)]
     if text:
@@ -119,12 +119,14 @@ def study_of(name, folder, text=""):
         arguments = [str(folder / f"{name}.toml")]
     process = chainunit("study", *arguments, "-o", str(folder / "out"), cwd=folder)
     assert process.returncode == 0, process.stderr
-    return ResultEntries(json.loads((folder / "out" / "result.json").read_text("utf-8")))
+    result = ResultEntries(json.loads((folder / "out" / "result.json").read_text("utf-8")))
+    return result, process.stdout
 
 
 @pytest.mark.second
 def test_the_crusher_gets_the_motor_of_the_calculation_by_hand(tmp_path):
-    result = study_of("jaw_crusher", tmp_path)
+    result, text = study_of("jaw_crusher", tmp_path)
+    assert "Largest force in a pin: D" in text
     assert "IE3 4-pole 5.5 kW" in result["sentence"] and "V-belt" in result["sentence"]
     mean = result["answers"]["steady"]["crank_torque_mean"]["value"]
     work, _ = rock_by_hand()
@@ -134,7 +136,9 @@ def test_the_crusher_gets_the_motor_of_the_calculation_by_hand(tmp_path):
 @pytest.mark.second
 def test_a_fan_gets_its_motor_without_a_gear(tmp_path):
     """The torque grows from 0 to its whole with the square of the speed: a third of it in the mean of the start."""
-    result = study_of("fan_without_gear", tmp_path)
+    result, text = study_of("fan_without_gear", tmp_path)
+    # its bearing bears no force
+    assert "Largest force in a pin" not in text
     assert 60.0 * 1480.0 * math.pi / 30.0 == pytest.approx(9.3e3, rel=1e-3)
     assert "IE3 4-pole 11 kW" in result["sentence"] and "no gear" in result["sentence"]
     plate = motor_of_catalogue("IE3 4-pole 11 kW, 160M").nameplate
@@ -153,5 +157,5 @@ def test_the_mill_gets_the_motor_that_its_example_names(tmp_path):
     for line in ("[system]", 'motor = "IE3 4-pole 15 kW, 160L"', "[gear]", "ratio = 1"):
         assert f"{line}\n" in text
         text = text.replace(f"{line}\n", "", 1)
-    result = study_of("mill", tmp_path, f'{text}\n[sizing]\ngear_kind = "none"\ncandidates = 3\n')
+    result, _ = study_of("mill", tmp_path, f'{text}\n[sizing]\ngear_kind = "none"\ncandidates = 3\n')
     assert "IE3 4-pole 15 kW, 160L" in result["sentence"]

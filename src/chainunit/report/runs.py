@@ -32,7 +32,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
         yield from _begin(study.runs, "settling", study.runs.settling, Phase.SETTLING)
     if study.runs.pins:
         yield _pins(study.runs)
-        yield _largest_pin(study.runs)
+        yield from _largest_pin(study.runs)
     if loops := cited(study.setup.statics.loops, "findings.speed_loop"):
         title = "The linearised speed loop; deviation and settling are those after a step of the load torque"
         rows = {
@@ -123,12 +123,13 @@ def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
     return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")
 
 
-def _largest_pin(runs: StudyRuns) -> b.Text:
-    """The pin with the largest force of all runs, for one screen."""
+def _largest_pin(runs: StudyRuns) -> Iterator[b.Text]:
+    """The pin with the largest force of all runs, for one screen; nothing if the pins bear no force."""
     forces = {pin: _peak(runs, pin) for pin in next(iter(runs.pins.values()))}
     pin = max(forces, key=lambda pin: forces[pin].value or 0.0)
-    worst = runs.title_of(hardest_run(runs.pins, pin))
-    return b.Text(line(f"Largest force in a pin: {pin} ", forces[pin], f" ({worst})."), form="screen")
+    if forces[pin].value:
+        worst = runs.title_of(hardest_run(runs.pins, pin))
+        yield b.Text(line(f"Largest force in a pin: {pin} ", forces[pin], f" ({worst})."), form="screen")
 
 
 def _peak(runs: StudyRuns, pin: str) -> Number:
