@@ -454,7 +454,7 @@ class Contact(Placed):
 
     def _seen(self, rates: Rates, order: int, before: Third | None = None) -> tuple[Vec2, Jet]:
         """The point of the follower from the centre, as the cam sees it, and the angle of the follower less that of
-        the cam, up to an `order` of derivatives; those of the follower beyond `rates` are 0."""
+        the cam, up to an `order` of derivatives; the derivatives of the follower beyond `rates` are 0."""
         cam, point = self._cam, self._base - self._cam.pin.p
         motion = [(cam.pin.p1, cam.t1), (cam.pin.p2, cam.t2), *([] if before is None else [before])][:order]
         x, y, angle = (Jet(0.0, *(z[k] for z in rates), *[0.0] * (order - len(rates))) for k in range(3))

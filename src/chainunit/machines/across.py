@@ -146,7 +146,7 @@ BEARINGS = tuple(
 
 
 def _limits(machine: InverseMachine, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-    """The limits of the machine, and those of the wall of the bar."""
+    """The limits of the machine, and of the wall of the bar."""
     yield from machine.requirements(xp, p)
     yield p.bar.bore, -math.inf, p.bar.diameter
 

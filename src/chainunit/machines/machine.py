@@ -94,7 +94,7 @@ class Machine:
 
     def __repr__(self) -> str:
         """The call that makes the machine, with the parameters that differ from their start values, to nine
-        digits, and with those that it has only as it was made with them."""
+        digits, and with the further parameters, see `MachineModel.having`."""
         model = self.model.root or self.model
         start = dict.fromkeys(self.by_name, math.nan) | model.parameter_layout.by_name(model.Parameters())
         texts = {name: f"{value:.9g}" for name, value in self.by_name.items()}

@@ -216,8 +216,8 @@ def quantity_keys(
 
 
 def _of_machine(name: str, table: str) -> Iterator[Key]:
-    """The keys of [machine], or of the `table` [feed], for a machine of that name, with those that it has only if a
-    file names one of them."""
+    """The keys of [machine], or of the `table` [feed], for a machine of that name, with the further ones that a
+    file may name."""
     config = _study(name)
     model: InverseMachine = config.machine.model.having(config.machine.model.further)
     if table == "feed":

@@ -181,7 +181,7 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
 
 
 def _names(data: Mapping[str, Any], table: str) -> list[str]:
-    """The names of all keys in a table of a file, those of its inner tables in full; none of what is no table."""
+    """The names of all keys in a table of a file, the keys of inner tables in full; none if there is no such table."""
     names, tables = [], [("", data.get(table))]
     for prefix, inner in tables:
         if isinstance(inner, Mapping):
@@ -191,7 +191,7 @@ def _names(data: Mapping[str, Any], table: str) -> list[str]:
 
 
 def _with_further(machine: MachineModel, names: Sequence[str]) -> tuple[MachineModel, tuple[InputError, ...]]:
-    """The machine with its further parameters among `names`, and the refusals of those that it cannot have."""
+    """The machine with its further parameters among `names`, and the refusals of the others."""
     try:
         return machine.having(names), ()
     except InputError as error:
