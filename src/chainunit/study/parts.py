@@ -181,7 +181,7 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
 
 
 def _names(data: Mapping[str, Any], table: str) -> list[str]:
-    """The names of all keys in a table of a file, the keys of inner tables in full; none if there is no such table."""
+    """The names of all keys in a table of a file, of inner tables in full; none if there is no such table."""
     names, tables = [], [("", data.get(table))]
     for prefix, inner in tables:
         if isinstance(inner, Mapping):
