@@ -389,3 +389,30 @@ def test_a_study_shows_the_corner_that_a_lump_overloads(tmp_path):
         remark.runs == ("jam_left",)
         and jam.bar_stress_peak > 5e7 > study.runs.answers["steady"].bar_stress_peak
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "refusals"),
+    [
+        ("pins.A3.friction = 0.1", ["machine.pins.A3: is no pin of this machine"]),
+        ("pins = 'rolling'", ['machine.pins = "rolling": must be a table of pins']),
+        (
+            "pins = { A = { kind = 'soft' }, Q = {} }",
+            ["machine.pins.A.kind: is", "machine.pins.Q: is no pin"],
+        ),
+        ("width = 1\nbar = 0.08", ["machine.bar = 0.08: must be a table"]),
+        ("bar.diameter = 0.08", ["machine.bar: joins rockers that stand a width apart"]),
+        (
+            "width = 1\n[feed]\nleft = { across = 2 }",
+            ["feed.left.across = 2: must be >= -1 and <= 1 (material"],
+        ),
+        ("[feed]\nleft = { across = 0.5 }", ["feed.left.across: unknown key"]),
+    ],
+)
+def test_a_wrong_place_or_pin_is_refused_once(text, refusals):
+    with pytest.raises(InputError) as refused:
+        parse(f"[machine]\n{text}\n")
+    lines = str(refused.value).splitlines()
+    assert len(lines) == len(refusals)
+    for line, refusal in zip(lines, refusals, strict=True):
+        assert line.startswith(refusal) and ("give machine.width" in line) == ("unknown key" in line)

@@ -92,9 +92,10 @@ def extended(placed: type, machine: InverseMachine, names: frozenset[str]) -> In
     InputError
         for a bar without a width, for chains with a width, and for a pin that the machine does not have.
     """
-    bar = any(name.startswith("bar.") for name in names)
+    bar = any(name == "bar" or name.startswith("bar.") for name in names)
     if bar and "width" not in names:
-        raise InputError("bar: joins rockers that stand a width apart; give width, too", "bar")
+        needed = "give width, too, or, with chains, leave it out"
+        raise InputError(f"bar: joins rockers that stand a width apart; {needed}", "bar")
     if "width" not in names:
         return with_pins(machine, names)
     if machine.States is not None:

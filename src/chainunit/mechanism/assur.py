@@ -57,9 +57,9 @@ class AssurGroup(NamedTuple):
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
     each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
     the joints are the outer ones of the legs, then their inner ones. Of a tetrad the two links with an outer joint
-    stand first, then its legs; the joints are the outer ones, then the joints of the legs with the first link and with
-    the second. Of a single link the pin or the guide stands first. Of a driver between two links these stand first, then
-    the lever; the joints are as of a dyad, and the one of the driver is the last.
+    stand first, then its legs; the joints are the outer ones, then the joints of the legs with the first link and
+    with the second. Of a single link the pin or the guide stands first. Of a driver between two links these stand
+    first, then the lever; the joints are as of a dyad, and the one of the driver is the last.
     """
 
     kind: str

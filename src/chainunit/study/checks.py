@@ -43,6 +43,10 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
     if parts:
         faults.add(parts.faults)
         readable = without(data, parts.faults)
+        machine = readable.get("machine")
+        if isinstance(machine, Mapping) and machine.get("pins") == {}:
+            # all of its pins are refused
+            readable = {**readable, "machine": {key: x for key, x in machine.items() if key != "pins"}}
     places = {
         f"{table}.{key}": x
         for table, section in usable_parts.sections.items()

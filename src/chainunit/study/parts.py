@@ -279,8 +279,14 @@ def with_frictions(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Inp
     """The tables of a file with the usual friction of a pin that differs in place of its kind of bearing, and the
     refusals of kinds that are none."""
     machine, faults = data.get("machine"), Faults()
-    if not isinstance(machine, Mapping) or not isinstance(machine.get("pins"), Mapping):
+    if not isinstance(machine, Mapping) or "pins" not in machine:
         return data, []
+    if not isinstance(machine["pins"], Mapping):
+        wrong = (
+            f"machine.pins = {shown(machine['pins'])}: must be a table of pins, such as pins.A.friction = 0.1"
+        )
+        rest = {name: value for name, value in machine.items() if name != "pins"}
+        return {**data, "machine": rest}, [InputError(wrong, "machine.pins")]
     pins = dict(machine["pins"])
     for name, entry in pins.items():
         if isinstance(entry, Mapping) and "kind" in entry:

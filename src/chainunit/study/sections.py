@@ -306,7 +306,8 @@ def sections_of(machine: MachineModel, motor: Motor) -> dict[str, FileSection]:
     }
     places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}
     no_width = "a load has a place across rockers that stand a width apart; give machine.width"
-    places["feed"] = {f"{side}.{place}": no_width for side in machine.sides for place in PLACES.values()}
+    if not machine.layers:
+        places["feed"] = {f"{side}.{place}": no_width for side in machine.sides for place in PLACES.values()}
     sections = {
         name: FileSection(declaration, places=places.get(name, {}))
         for name, declaration in declarations.items()

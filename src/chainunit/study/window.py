@@ -131,9 +131,9 @@ class Window:
     @property
     def normal_speed(self) -> float:
         """Crank speed that the drive keeps without an event [rad/s]: the requested speed, or the speed that a
-        motor on the line takes."""
+        motor on the line, or with a droop, takes."""
         steady = self if self.phase is Phase.STEADY else self.steady
-        if self.drive.follows or steady is None:
+        if (self.drive.follows and not self.drive.droop_speed) or steady is None:
             return self.requested_speed
         mean = steady.speed_mean
         return mean if steady is not self or mean > CREEPS * self.requested_speed else self.requested_speed
