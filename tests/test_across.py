@@ -416,3 +416,9 @@ def test_a_wrong_place_or_pin_is_refused_once(text, refusals):
     assert len(lines) == len(refusals)
     for line, refusal in zip(lines, refusals, strict=True):
         assert line.startswith(refusal) and ("give machine.width" in line) == ("unknown key" in line)
+
+
+def test_pins_of_organs_differ_with_two_bars_alone():
+    text = "organ = 'chain'\n[machine.pins]\nA.friction = 0.1\nB_left.friction = 0.1\n"
+    with pytest.raises(InputError, match=r"^machine\.pins\.B_left: is of organs with two bars"):
+        parse(text)

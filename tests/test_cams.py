@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 import math
+from types import SimpleNamespace
 
 import fmpy
 import numpy as np
@@ -17,8 +18,10 @@ from scipy.interpolate import CubicSpline
 from test_linkage_random import by_the_machine, deviations
 from test_live import check_turn, varied
 
+from chainunit.capabilities.energy.running import losses_in_joints
 from chainunit.core.errors import InputError
 from chainunit.core.native.compilers import compiler
+from chainunit.core.quantities import Layout
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of
@@ -28,6 +31,8 @@ from chainunit.report.drawing import drawing
 from chainunit.report.live.machine import of_linkage
 from chainunit.study import config
 from chainunit.study.linkage_turn import linkage_findings
+from chainunit.study.measures import Answers
+from chainunit.study.remarks import _happenings
 from chainunit.study.run import run_study
 
 
@@ -392,6 +397,36 @@ def test_a_study_warns_of_a_follower_that_lifts_off(tmp_path):
         codes[speed] = {remark.code: remark for remark in result.findings.remarks}
     assert "lifts-off" in codes[600] and "lifts-off" not in codes[120]
     assert "cam with -" in codes[600]["lifts-off"].text
+
+
+def test_friction_of_a_cam_counts_as_a_loss_of_the_joints():
+    rubbing = Machine(machine_of(description_of(swinging_roller() | {"cams": {"friction": 0.1}}, "cam")))
+    smooth = rubbing.replace(dict.fromkeys(losses_in_joints(rubbing), 0.0))
+    motion = {"phi": np.arange(720) * 2.0 * math.pi / 720, "w": 5.0}
+    lost, left = (np.mean(m.evaluate(motion)["dissipated_power"]) for m in (rubbing, smooth))
+    assert lost > 1.0 and abs(left) < 1e-6
+
+
+def test_each_follower_that_lifts_off_is_named():
+    run = {
+        f"machine.{cam}.normal": np.array([least, 1.0])
+        for cam, least in (("inlet", -500.0), ("outlet", -3.0))
+    }
+    model = SimpleNamespace(contacts=("inlet.normal", "outlet.normal"))
+    motor = SimpleNamespace(current_limit=lambda parameters: None)
+    drive = SimpleNamespace(machine=SimpleNamespace(model=model), motor=motor, parameters=None)
+    answers = SimpleNamespace(**dict.fromkeys(Layout(Answers).names) | {"current_peak": 0.0})
+    runs = SimpleNamespace(
+        answers={"steady": answers},
+        drive=drive,
+        steady=run,
+        events={},
+        overloads=[],
+        returns=False,
+        title_of=str,
+    )
+    said = [happening for happening in _happenings(runs, "steady") if happening[0] == "lifts-off"]
+    assert said == [("lifts-off", "inlet with -500 N, outlet with -3.00 N", {"least": -500.0})]
 
 
 def changed(make=offset_roller, cam=None, **tables):

@@ -278,6 +278,7 @@ STUDIES = {
     "knife": example("knife"),
     "on line": CATALOGUE.format("direct"),
     "inverter": CATALOGUE.format("inverter"),
+    "droop": CATALOGUE.format("inverter") + "[starter]\ndroop = '8 %'\n",
     "soft": CATALOGUE.format("soft"),
     "star-delta": CATALOGUE.format("star-delta") + "[[event]]\ntype = 'interruption'\n",
 }
@@ -379,7 +380,7 @@ def test_a_long_start_is_awaited(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["chain-unit", "knife", "inverter", "jam_with_driveline.toml"])
+@pytest.mark.parametrize("name", ["chain-unit", "knife", "inverter", "droop", "jam_with_driveline.toml"])
 def test_every_overload_has_the_peaks_of_the_co_simulation(name, tmp_path):
     """The page integrates one system; a study couples FMUs, with an error of its step, which is halved here: at 1 ms
     the peak of the current in a dip is 2e-3 off."""

@@ -518,13 +518,10 @@ def _happenings(runs: StudyRuns, name: str) -> Iterator[tuple[str, str, dict[str
     if (stress := answers.bar_stress_peak) is not None and stress > drive.machine.p.bar.limit:
         yield "bar-overloaded", number(stress, "N/m2", "stress"), {"bar_stress_peak": stress}
     run = runs.steady if name == STEADY else runs.series[name]
-    for contact in drive.machine.model.contacts:
-        if (least := float(run[f"machine.{contact}"].min())) < 0.0:
-            yield (
-                "lifts-off",
-                f"{contact.removesuffix('.normal')} with {number(least, 'N')}",
-                {"least": least},
-            )
+    contacts = {x: float(run[f"machine.{x}"].min()) for x in drive.machine.model.contacts}
+    if lifting := {x.removesuffix(".normal"): least for x, least in contacts.items() if least < 0.0}:
+        text = ", ".join(f"{cam} with {number(least, 'N')}" for cam, least in lifting.items())
+        yield "lifts-off", text, {"least": min(lifting.values())}
     largest = drive.motor.current_limit(drive.parameters)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current-limit", "", {}

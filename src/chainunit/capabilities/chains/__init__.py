@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from ...machines.chain_unit import ON_DRIVE, PIN_NAMES
 from ...report.capability import AnswerBlocks, Capability, Contents
 from ...study.analysis import Analysis
 from ...study.record import StudyRecord
@@ -27,9 +28,10 @@ class ChainsCapability(Capability):
             has_sides() & ~CHAINS.is_chosen,
             'is of organs that are chains; add organ = "chain", or leave it out',
         )
-        yield Rule(
-            "machine.width", CHAINS.is_chosen, "is of organs with two bars; leave it out, or the key organ"
-        )
+        of_organs = [f"pins.{name}" for name, joint in PIN_NAMES.items() if joint not in ON_DRIVE.values()]
+        for name in ("width", *of_organs):
+            refusal = "is of organs with two bars; leave it out, or the key organ"
+            yield Rule(f"machine.{name}", CHAINS.is_chosen, refusal)
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Chains at constant speed."""

@@ -19,6 +19,7 @@ import numpy as np
 from ...core.messages import unit_behind
 from ...core.quantities import Layout, Value, declaration, quantity
 from ...drives.nameplate import Nameplate
+from ...machines.machine import Machine
 from ...study.drive import Drive
 from ...study.readings import crank_angle, crank_speed, gear_loss, shaft_power
 from ...study.rig import Rig
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 _HELD = 1e6
 """Factor on the heat capacity of a winding that keeps its temperature."""
-_LOSS_IN_JOINT = re.compile(r"(pins?|guides)(\.\w+)?\.(friction|damping)|joint_damping")
-"""The names of the parameters of machines by which their joints take power."""
+_LOSS_IN_JOINT = re.compile(r"(pins?|guides|cams)(\.\w+)?\.(friction|damping)|joint_damping")
+"""A parameter by which the joints of a machine take power."""
 
 
 @declaration
@@ -151,11 +152,16 @@ def _read(w: Window, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
     return SteadyLoad(Losses(electric=electric, missing=missing, **parts), turns, back, w.lasts)
 
 
+def losses_in_joints(machine: Machine) -> list[str]:
+    """The names of the parameters of a machine by which its joints take power."""
+    return [name for name in machine.by_name if _LOSS_IN_JOINT.fullmatch(name)]
+
+
 def _machine(w: Window, feed: Any) -> dict[str, float]:
     """The power that the machine takes: of its joints and of the processing, where they can be told apart. The forces
     of the processing follow from the motion alone, so the same turns without friction take theirs alone."""
     whole, machine = w.mean("machine.dissipated_power"), w.drive.machine
-    names = [name for name in machine.by_name if _LOSS_IN_JOINT.fullmatch(name)]
+    names = losses_in_joints(machine)
     if not names or machine.simulated is not machine or machine.model.States is not None:
         return {"machine": whole}
     smooth = machine.replace(dict.fromkeys(names, 0.0))

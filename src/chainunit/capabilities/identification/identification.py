@@ -329,7 +329,7 @@ def _run(
                 "leave them out",
                 "identify.run",
             )
-        changes = ((begin, lasts, w * drive.ratio) for begin, lasts, w in run.speeds)
+        changes = ((begin, lasts, drive.reference_speed(w)) for begin, lasts, w in run.speeds)
         values["motor.w_ref"] = Profile(values["motor.w_ref"], tuple(changes))
     stated = drive.loads(feed) if run.has_feed else dict.fromkeys(drive.loads(feed), 0.0)
     # a sought feed of a loaded run is free

@@ -240,6 +240,8 @@ const liveModel = (data, equations) => {
       this.ratio = ratioOf(values);
       this.speed = speedOf(values);
       this.turnTime = TURN / this.speed;
+      // a droop lets the motor fall to the speed that is asked for
+      this.referenceSpeed = this.speed * this.ratio + of.droop_speed;
       const role = (name, otherwise) => (placeOf(name) < 0 ? otherwise : values[placeOf(name)]);
       this.ramp = role("ramp", of.ramp);
       this.rampEnd = Math.max(this.ramp, of.starter_time);
@@ -275,7 +277,7 @@ const liveModel = (data, equations) => {
           for (const name of q.runs)
             all[name] = { start: 0, changes: fedFrom === null ? [] : [[fedFrom, this.of.feed_rise * this.turnTime, this.inputs[name]]] };
       if (this.of.reference) {
-        const w = this.speed * this.ratio;
+        const w = this.referenceSpeed;
         all[this.of.reference] = fromRest ? { start: 0, changes: [[0, this.ramp, w]] } : { start: w, changes: [] };
       }
       if (fromRest) Object.assign(all, this.of.switching);
@@ -445,7 +447,7 @@ const liveModel = (data, equations) => {
     }
 
     normal(full) {
-      return full === this.of.reference ? this.speed * this.ratio : this.inputs[full] ?? this.k.get(full);
+      return full === this.of.reference ? this.referenceSpeed : this.inputs[full] ?? this.k.get(full);
     }
 
     // the event, from steady running on: time counts from its begin

@@ -107,6 +107,7 @@ def live_runs(
         "columns": columns,
         "line_ratio": float(drive.whole_line.ratio),
         "reference": "motor.w_ref" if drive.follows else None,
+        "droop_speed": drive.droop_speed,
         "ramp": float(run.ramp),
         "switching": {full: _profile(x) for full, x in drive.switching().items()},
         "switched_until": drive.switched_until,
