@@ -401,6 +401,10 @@ def test_a_study_shows_the_corner_that_a_lump_overloads(tmp_path):
             ["machine.pins.A.kind: is", "machine.pins.Q: is no pin"],
         ),
         ("width = 1\nbar = 0.08", ["machine.bar = 0.08: must be a table"]),
+        (
+            "width = 1\nbar = { diameter = 0.08, bore = 0.09 }",
+            ["machine: bar.bore = 0.09 m: the bar has no wall"],
+        ),
         ("bar.diameter = 0.08", ["machine.bar: joins rockers that stand a width apart"]),
         (
             "width = 1\n[feed]\nleft = { across = 2 }",

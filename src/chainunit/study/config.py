@@ -505,15 +505,25 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
 def _machine(parts: Parts, parameters: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
     make: Any = ForeignMachine if isinstance(parts.machine, ForeignModel) else machine_of
-    if of_papers:
-        with refusal_prefix("ratios: ", "ratios"):
-            return of_ratios(
-                lambda lengths: make(parts.machine, parameters | lengths), filled(Ratios, of_papers)
-            )
+
+    def machine_with(lengths: Mapping[str, float]) -> Machine:
+        """The machine with its `parameters` and these lengths [m], which follow from the ratios."""
+        values = {**parameters, **lengths}
+        try:
+            return make(parts.machine, values)
+        except InputError as error:
+            if of_papers and isinstance(error, GeometryError) and not {*error.names} & parameters.keys():
+                # of the ratios alone
+                raise
+            refused: InputError = _refused_machine(error, parts.machine, values)
+            raise refused from error
+
+    if not of_papers:
+        return machine_with({})
     try:
-        return make(parts.machine, parameters)
-    except InputError as error:
-        raise _refused_machine(error, parts.machine, parameters) from error
+        return of_ratios(machine_with, filled(Ratios, of_papers))
+    except GeometryError as error:
+        raise InputError(f"ratios: {error}", error.key or "ratios") from error
 
 
 def _refused_machine(error: InputError, model: MachineModel, parameters: dict[str, float]) -> InputError:
