@@ -23,6 +23,7 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of, linkage_from
 from chainunit.machines.linkages.imports.source import imported
 from chainunit.machines.machine import Machine
+from chainunit.mechanism.assur import GROUND, REVOLUTE, JointOf, decompose
 from chainunit.reading.tables import toml
 from chainunit.report.drawing import drawing
 from chainunit.report.live.machine import of_linkage
@@ -349,6 +350,65 @@ def test_refusals_of_drivers_between_links():
         ("[loads.push]", slide),
     )
     assert "links.fore: " in text and "more than once" in text
+
+
+ARMS_ON_ONE_EQUATION = """
+[ground]
+O = [0, 0]
+P = [1, 0]
+K = [1.8, 0]
+[driver]
+link = "crank"
+[drivers.motor]
+joint = "B"
+phi = "0.1 * sin(phi)"
+by = "motor"
+[links.crank]
+points = { O = [0, 0] }
+[links.near]
+points = { P = [0, 0], B = [0.3, 0] }
+[links.far]
+points = { B = [0, 0], C = [0.3, 0] }
+[joints.last]
+"""
+
+
+@pytest.mark.parametrize(
+    "last",
+    ['on = "far.C"\nby = "ground.K"\nradius = 0.2', 'on = "far.B"\nby = "ground.P"\nteeth = [20, 20]'],
+    ids=["cam", "gear"],
+)
+def test_a_motor_between_two_links_with_one_more_equation_is_refused(last):
+    text = refused(ARMS_ON_ONE_EQUATION + last)
+    assert text.startswith("links.near: the links near and far, which the driver B moves against each other")
+    assert "one of them on a pin of" in text and "the other one on a pin of a lever" in text
+
+
+ON_LEGS = {
+    "triad": (("one", "two", "three"), [("plate", leg) for leg in ("one", "two", "three")]),
+    "tetrad": (
+        ("plate", "other"),
+        [(plate, leg) for plate in ("plate", "other") for leg in ("upper", "lower")],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", ON_LEGS)
+def test_links_on_legs_with_a_motor_and_a_cam_are_not_covered(kind):
+    """They have as many equations as with pins alone: a motor gives one more, a cam one less."""
+    outer, inner = ON_LEGS[kind]
+    links = [*dict.fromkeys(("crank", *outer, *(link for pair in inner for link in pair)))]
+    crank = JointOf("O", REVOLUTE, "crank", GROUND)
+    first, *pins = (
+        JointOf(f"{on}_{by}", REVOLUTE, on, by) for on, by in [*((x, GROUND) for x in outer), *inner]
+    )
+    groups = decompose(links, [crank, first, *pins], {"O": "crank"})
+    assert [group.kind for group in groups] == [kind]
+    cam, motor = first._replace(kind="cam", equations=1, alone="cam follower"), pins[len(outer) - 1]
+    with pytest.raises(
+        InputError, match=f"which the driver {motor.name} moves against each other, must be two"
+    ):
+        decompose(links, [crank, cam, *pins], {"O": "crank", motor.name: motor.on})
 
 
 @pytest.mark.parametrize(
