@@ -352,6 +352,34 @@ def test_refusals_of_drivers_between_links():
     assert "links.fore: " in text and "more than once" in text
 
 
+@pytest.mark.parametrize(
+    ("text", "end", "message"),
+    [
+        (
+            texts.EXCITER,
+            'joint = "M"',
+            'drivers.again.joint: is "M", which [drivers.exciter] moves; name another joint, or take [drivers.again] '
+            "out",
+        ),
+        (
+            texts.FOUR_BAR,
+            'joint = "A"',
+            'drivers.again.joint: is "A", which [driver] moves; name another joint, or take [drivers.again] out',
+        ),
+        (
+            texts.FIVE_BAR.format(law='range = ["80 deg", "130 deg"]').replace(
+                'joint = "C"', 'link = "right"'
+            ),
+            'link = "right"',
+            'drivers.again.link: is "right", which [drivers.other] moves; name another link, or take [drivers.again] '
+            "out",
+        ),
+    ],
+)
+def test_two_drivers_of_one_joint_are_refused(text, end, message):
+    assert refused(f'{text}\n[drivers.again]\n{end}\nphi = "2 * phi"\nby = "motor"\n') == message
+
+
 ARMS_ON_ONE_EQUATION = """
 [ground]
 O = [0, 0]

@@ -178,10 +178,9 @@ class _LinkageReader(LoadReader):
         links = [self.link(name) for name in self.link_names()]
         joints = self.joints()
         driver, span = self.driver("driver", self.table("driver"), joints)
-        drivers = [
-            self.further_driver(name, key, table, driver, joints)
-            for name, key, table in self.tables("drivers", _FURTHER_KEYS)
-        ]
+        drivers: list[dict[str, Any]] = []
+        for name, key, table in self.tables("drivers", _FURTHER_KEYS):
+            drivers.append(self.further_driver(name, key, table, [driver, *drivers], joints))
         loads = [self.load(name) for name in self.table("loads")]
         common, groups, about = self.common(), self.groups(), self.about()
         losses = self.differing(joints, common)
@@ -385,17 +384,23 @@ class _LinkageReader(LoadReader):
         name: str,
         key: str,
         table: Mapping[str, Any],
-        first: Mapping[str, Any],
+        before: Sequence[Mapping[str, Any]],
         joints: list[dict[str, Any]],
     ) -> dict[str, Any]:
-        """A driver besides the first one: it follows that by a law, or is an input of its own."""
-        if table.get("link", "") == first.get("link") and "joint" not in table:
-            self.fault(f"{key}.link", f"{first['link']} is the link of [driver]; name another one")
-            return {"name": name}
+        """A driver besides the first one, after those `before` it: it follows the first one by a law, or is an input
+        of its own."""
         entry, span = self.driver(key, table, joints)
         entry |= {"name": name}
         if not entry.get("link"):
             return entry
+        first, named = before[0], "joint" if "joint" in table else "link"
+        other = next((driver for driver in before if driver.get("joint") == entry["joint"]), None)
+        if other is not None:
+            whose = f"drivers.{other['name']}" if "name" in other else "driver"
+            self.fault(
+                f"{key}.{named}",
+                f"is {shown(table[named])}, which [{whose}] moves; name another {named}, or take [{key}] out",
+            )
         unit, law, by = "m" if entry["linear"] else "rad", table.get("phi"), table.get("by", _GEAR)
         if law is None:
             if span is None:
