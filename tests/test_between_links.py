@@ -353,31 +353,31 @@ def test_refusals_of_drivers_between_links():
 
 
 @pytest.mark.parametrize(
-    ("text", "end", "message"),
+    ("text", "end", "other", "link"),
     [
+        (texts.EXCITER, 'joint = "M"', "drivers.exciter", "unbalance"),
+        (texts.FOUR_BAR, 'joint = "A"', "driver", "coupler"),
+        (texts.FIVE_BAR.format(law='phi = "90 deg"'), 'joint = "C"', "drivers.other", "upper"),
+        (texts.ROBOT.format(law='phi = "-phi"'), 'link = "boom"', "driver", "boom"),
         (
-            texts.EXCITER,
-            'joint = "M"',
-            'drivers.again.joint: is "M", which [drivers.exciter] moves; name another joint, or take [drivers.again] '
-            "out",
-        ),
-        (
-            texts.FOUR_BAR,
-            'joint = "A"',
-            'drivers.again.joint: is "A", which [driver] moves; name another joint, or take [drivers.again] out',
-        ),
-        (
-            texts.FIVE_BAR.format(law='range = ["80 deg", "130 deg"]').replace(
-                'joint = "C"', 'link = "right"'
+            texts.ROBOT.format(law='phi = "-phi"')
+            + '[joints.rail]\non = "boom.O"\nby = "ground.O"\ntoward = "R"\n[ground]\n'.replace(
+                "[ground]\n", ""
             ),
-            'link = "right"',
-            'drivers.again.link: is "right", which [drivers.other] moves; name another link, or take [drivers.again] '
-            "out",
+            'joint = "rail"',
+            "driver",
+            "boom",
         ),
     ],
 )
-def test_two_drivers_of_one_joint_are_refused(text, end, message):
-    assert refused(f'{text}\n[drivers.again]\n{end}\nphi = "2 * phi"\nby = "motor"\n') == message
+def test_two_drivers_of_one_link_or_joint_are_refused(text, end, other, link):
+    unit = "m" if "rail" in end else "rad"
+    text = text.replace("O = [0, 0]\n[driver]", "O = [0, 0]\nR = [1, 0]\n[driver]")
+    key, _, value = end.partition(" = ")
+    assert refused(f"{text}\n[drivers.again]\n{end}\nrange = ['1 {unit}', '2 {unit}']\n") == (
+        f"drivers.again.{key}: is {value}, and [{other}] moves {link} already; name another {key}, or take "
+        "[drivers.again] out"
+    )
 
 
 ARMS_ON_ONE_EQUATION = """

@@ -394,12 +394,20 @@ class _LinkageReader(LoadReader):
         if not entry.get("link"):
             return entry
         first, named = before[0], "joint" if "joint" in table else "link"
-        other = next((driver for driver in before if driver.get("joint") == entry["joint"]), None)
+        grounded = [j["name"] for j in joints if GROUND in (j["on"][0], j["by"][0])]
+
+        def motion(driver: Mapping[str, Any]) -> tuple[Any, Any]:
+            """What it moves: a link in the ground, or by a joint of two links that move."""
+            joint = driver.get("joint")
+            return driver.get("link"), GROUND if joint in grounded else joint
+
+        other = next((driver for driver in before if motion(driver) == motion(entry)), None)
         if other is not None:
             whose = f"drivers.{other['name']}" if "name" in other else "driver"
             self.fault(
                 f"{key}.{named}",
-                f"is {shown(table[named])}, which [{whose}] moves; name another {named}, or take [{key}] out",
+                f"is {shown(table[named])}, and [{whose}] moves {entry['link']} already; name another {named}, or "
+                f"take [{key}] out",
             )
         unit, law, by = "m" if entry["linear"] else "rad", table.get("phi"), table.get("by", _GEAR)
         if law is None:
