@@ -14,6 +14,7 @@ from drawings import DENSITY, Drawing
 from javascript_hosts import node
 from live_pages import in_node
 from multibody import Multibody
+from test_two_motions import EXCAVATOR
 
 from chainunit import GeometryError, InputError
 from chainunit.core.engines import MATH
@@ -377,6 +378,30 @@ def test_two_drivers_of_one_link_or_joint_are_refused(text, end, other, link):
     assert refused(f"{text}\n[drivers.again]\n{end}\nrange = ['1 {unit}', '2 {unit}']\n") == (
         f"drivers.again.{key}: is {value}, and [{other}] moves {link} already; name another {key}, or take "
         "[drivers.again] out"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "joint", "name"),
+    [
+        (texts.EXCITER, "M", "exciter"),
+        (texts.FOUR_BAR, "A", ""),
+        (texts.ROBOT.format(law='phi = "-phi"\nzero = "5 deg"'), "B", "elbow"),
+        (EXCAVATOR.format(law='phi = "0.3 * phi"'), "boom_cylinder", ""),
+    ],
+)
+@pytest.mark.parametrize("wrong", ["O", "none"])
+def test_a_wrong_joint_of_a_driver_is_refused_once(text, joint, name, wrong):
+    """Whether its driver turns or slides is not known, so that its other keys are not wrong."""
+    message = refused(text, (f'joint = "{joint}"', f'joint = "{wrong}"'))
+    key = f"drivers.{name}.joint" if name else "driver.joint"
+    assert message.startswith(f'{key}: is "{wrong}"') and "\n" not in message, message
+
+
+def test_keys_of_a_driver_that_turns_are_refused_of_one_that_slides():
+    text = EXCAVATOR.format(law='range = ["0.3 m", "0.5 m"]\npositive = "clockwise"')
+    assert refused(text) == (
+        "drivers.stick_cylinder.positive: belongs to a driver that turns, and this one slides in stick"
     )
 
 

@@ -180,7 +180,7 @@ class EntryReader(Entry):
             return entry
         return math.nan
 
-    def law_entry(self, key: str, law: Any, unit: str, unit_of_phi: str) -> Any:
+    def law_entry(self, key: str, law: Any, unit: str, unit_of_phi: str | None) -> Any:
         """The value of a key that may be an expression of ``phi``, with tables over it and with angles in degrees."""
         named = isinstance(law, str) and words_in(_DEGREES.sub("", law))
         text = _DEGREES.sub(r"(\1 * deg)", law) if named else law

@@ -438,7 +438,9 @@ class _LinkageReader(LoadReader):
                 f'is {shown(by)}; must be "{_GEAR}", if the first driver drives it, or "{_MOTOR}", if it has one of '
                 "its own",
             )
-        entry["law"] = self.law_entry(f"{key}.phi", law, unit, "m" if first.get("linear") else "rad")
+        # of a faulty first driver the unit is not known
+        unit_of_phi = ("m" if first["linear"] else "rad") if first else None
+        entry["law"] = self.law_entry(f"{key}.phi", law, unit, unit_of_phi)
         return entry | {"geared": by == _GEAR}
 
     def driver(
@@ -495,11 +497,6 @@ class _LinkageReader(LoadReader):
     ) -> tuple[dict[str, Any], list[float] | None]:
         """The driver that slides in the prismatic joint that its table names, with the link that moves, and its range
         [m]; nothing and None, with a fault, for another joint."""
-        for name in ("link", "zero", "positive"):
-            if name in table:
-                self.fault(
-                    f"{key}.{name}", "belongs to a driver that turns; a driver with a joint slides in it"
-                )
         kinds = {joint["name"]: joint["type"] for joint in joints}
         sliding = {joint["name"]: joint for joint in joints if joint["type"] == PRISMATIC}
         name = table["joint"]
@@ -511,6 +508,9 @@ class _LinkageReader(LoadReader):
                 f"two links that move: {', '.join((*sliding, *motors)) or 'there is none'}",
             )
             return {}, None
+        for other in ("link", "zero", "positive"):
+            if other in table:
+                self.fault(f"{key}.{other}", f"belongs to a driver that turns, and this one slides in {name}")
         (on, _), (by, _) = sliding[name]["on"], sliding[name]["by"]
         span = None
         if key == "driver" or "range" in table:
