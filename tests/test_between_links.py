@@ -391,6 +391,12 @@ def test_two_drivers_of_one_link_or_joint_are_refused(text, end, other, link):
         (texts.FOUR_BAR, "A", ""),
         (texts.ROBOT.format(law='phi = "-phi"\nzero = "5 deg"'), "B", "elbow"),
         (EXCAVATOR.format(law='phi = "0.3 * phi"'), "boom_cylinder", ""),
+        (
+            EXCAVATOR.format(law='phi = "0.5 + amp * sin(phi / span)"')
+            + '[parameters]\namp = "10 mm"\nspan = "1 m"\n',
+            "boom_cylinder",
+            "",
+        ),
     ],
 )
 @pytest.mark.parametrize("wrong", ["O", "none"])
@@ -406,6 +412,29 @@ def test_keys_of_a_driver_that_turns_are_refused_of_one_that_slides():
     assert refused(text) == (
         "drivers.stick_cylinder.positive: belongs to a driver that turns, and this one slides in stick"
     )
+
+
+OVER_THE_ANGLE = 'force = ["push * cos(2 * phi) + table(phi, pull)", "-push * w / rate"]'
+TABLE = """
+[parameters]
+push = "20 N"
+rate = "4 rad/s"
+[tables.pull]
+phi = ["0 deg", "120 deg", "240 deg"]
+value = ["0 N", "30 N", "10 N"]
+"""
+
+
+def test_the_place_of_a_motor_between_two_links_is_an_angle_in_loads_and_tables():
+    text = texts.FOUR_BAR.replace('force = [-30, "20"]', OVER_THE_ANGLE)
+    machine = Machine(linkage_from(toml(text + TABLE), "machine")[0])
+    q = math.radians(120.0)
+    out = machine.evaluate({"phi": q, "w": 2.0})
+    constant = texts.FOUR_BAR.replace("force = [-30", f"force = [{20.0 * math.cos(2.0 * q) + 30.0}")
+    other = Machine(linkage_from(toml(constant.replace('"20"]', "-10]")), "machine")[0])
+    assert out["tau"] == pytest.approx(other.evaluate({"phi": q, "w": 2.0})["tau"], rel=1e-12)
+    wrong = refused(text + TABLE, ('joint = "A"', 'joint = "none"'))
+    assert wrong.startswith('driver.joint: is "none"') and "\n" not in wrong
 
 
 ARMS_ON_ONE_EQUATION = """

@@ -204,7 +204,8 @@ class EntryReader(Entry):
         if parsed.names == (name,) and self.units.get(name, "") is None:
             self.units[name] = names[name] = unit
             self.derived_dimensions = None
-        checked_dimension(parsed.text, self.dimensions(names), unit)
+        if names.get("phi", "") is not None:  # else the first driver is faulty, and its unit is not known
+            checked_dimension(parsed.text, self.dimensions(names), unit)
         for width in parsed.widths:
             moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
             if moving:

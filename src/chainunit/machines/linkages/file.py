@@ -401,9 +401,9 @@ class _LinkageReader(LoadReader):
             joint = driver.get("joint")
             return driver.get("link"), GROUND if joint in grounded else joint
 
-        other = next((driver for driver in before if motion(driver) == motion(entry)), None)
-        if other is not None:
-            whose = f"drivers.{other['name']}" if "name" in other else "driver"
+        same = next((driver for driver in before if motion(driver) == motion(entry)), None)
+        if same is not None:
+            whose = f"drivers.{same['name']}" if "name" in same else "driver"
             self.fault(
                 f"{key}.{named}",
                 f"is {shown(table[named])}, and [{whose}] moves {entry['link']} already; name another {named}, or "
@@ -438,7 +438,7 @@ class _LinkageReader(LoadReader):
                 f'is {shown(by)}; must be "{_GEAR}", if the first driver drives it, or "{_MOTOR}", if it has one of '
                 "its own",
             )
-        # of a faulty first driver the unit is not known
+        # the unit of a faulty one is not known
         unit_of_phi = ("m" if first["linear"] else "rad") if first else None
         entry["law"] = self.law_entry(f"{key}.phi", law, unit, unit_of_phi)
         return entry | {"geared": by == _GEAR}
