@@ -14,6 +14,7 @@ from drawings import DENSITY, Drawing
 from javascript_hosts import node
 from live_pages import in_node
 from multibody import Multibody
+from test_two_motions import EXCAVATOR
 
 from chainunit import GeometryError, InputError
 from chainunit.core.engines import MATH
@@ -23,6 +24,7 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of, linkage_from
 from chainunit.machines.linkages.imports.source import imported
 from chainunit.machines.machine import Machine
+from chainunit.mechanism.assur import GROUND, REVOLUTE, JointOf, decompose
 from chainunit.reading.tables import toml
 from chainunit.report.drawing import drawing
 from chainunit.report.live.machine import of_linkage
@@ -303,9 +305,12 @@ def refused(text, *changes):
 
 def test_refusals_of_tetrads():
     text = texts.STEPHENSON
+    open_tetrad = (
+        "links.one: the tetrad of one, two, upper, lower does not close all the way round, or moves too"
+    )
     for changes, words in (
-        ([("A = [0.1, 0]", "A = [0.5, 0]")], "links.one: the tetrad of one does not close all the way round"),
-        ([("C = [0.92, 0]", "C = [2.6, 0]")], "links.one: the tetrad of one does not close all the way round"),
+        ([("A = [0.1, 0]", "A = [0.5, 0]")], open_tetrad),
+        ([("C = [0.92, 0]", "C = [2.6, 0]")], open_tetrad),
         (
             [('link = "crank"', 'link = "crank"\nrange = ["0 deg", "40 deg"]')],
             "the links one, two, upper, lower form a tetrad, and the driver swings: a tetrad needs a driver that",
@@ -323,7 +328,7 @@ def test_other_lengths_that_do_not_close_are_refused():
     text = texts.STEPHENSON.replace("C = [0.92, 0]", 'C = ["rod", 0]') + "[parameters]\nrod = 0.92\n"
     model = linkage_from(toml(text), "machine")[0]
     assert Machine(model, rod=0.9).evaluate({"phi": 1.0})["margin"] > 0.3
-    with pytest.raises(GeometryError, match="tetrad of one does not close"):
+    with pytest.raises(GeometryError, match="tetrad of one, two, upper, lower does not close"):
         Machine(model, rod=2.6)
 
 
@@ -349,6 +354,146 @@ def test_refusals_of_drivers_between_links():
         ("[loads.push]", slide),
     )
     assert "links.fore: " in text and "more than once" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "end", "other", "link"),
+    [
+        (texts.EXCITER, 'joint = "M"', "drivers.exciter", "unbalance"),
+        (texts.FOUR_BAR, 'joint = "A"', "driver", "coupler"),
+        (texts.FIVE_BAR.format(law='phi = "90 deg"'), 'joint = "C"', "drivers.other", "upper"),
+        (texts.ROBOT.format(law='phi = "-phi"'), 'link = "boom"', "driver", "boom"),
+        (
+            texts.ROBOT.format(law='phi = "-phi"')
+            + '[joints.rail]\non = "boom.O"\nby = "ground.O"\ntoward = "R"\n[ground]\n'.replace(
+                "[ground]\n", ""
+            ),
+            'joint = "rail"',
+            "driver",
+            "boom",
+        ),
+    ],
+)
+def test_two_drivers_of_one_link_or_joint_are_refused(text, end, other, link):
+    unit = "m" if "rail" in end else "rad"
+    text = text.replace("O = [0, 0]\n[driver]", "O = [0, 0]\nR = [1, 0]\n[driver]")
+    key, _, value = end.partition(" = ")
+    assert refused(f"{text}\n[drivers.again]\n{end}\nrange = ['1 {unit}', '2 {unit}']\n") == (
+        f"drivers.again.{key}: is {value}, and [{other}] moves {link} already; name another {key}, or take "
+        "[drivers.again] out"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "joint", "name"),
+    [
+        (texts.EXCITER, "M", "exciter"),
+        (texts.FOUR_BAR, "A", ""),
+        (texts.ROBOT.format(law='phi = "-phi"\nzero = "5 deg"'), "B", "elbow"),
+        (EXCAVATOR.format(law='phi = "0.3 * phi"'), "boom_cylinder", ""),
+        (
+            EXCAVATOR.format(law='phi = "0.5 + amp * sin(phi / span)"')
+            + '[parameters]\namp = "10 mm"\nspan = "1 m"\n',
+            "boom_cylinder",
+            "",
+        ),
+    ],
+)
+@pytest.mark.parametrize("wrong", ["O", "none"])
+def test_a_wrong_joint_of_a_driver_is_refused_once(text, joint, name, wrong):
+    """Whether its driver turns or slides is not known, so that its other keys are not wrong."""
+    message = refused(text, (f'joint = "{joint}"', f'joint = "{wrong}"'))
+    key = f"drivers.{name}.joint" if name else "driver.joint"
+    assert message.startswith(f'{key}: is "{wrong}"') and "\n" not in message, message
+
+
+def test_keys_of_a_driver_that_turns_are_refused_of_one_that_slides():
+    text = EXCAVATOR.format(law='range = ["0.3 m", "0.5 m"]\npositive = "clockwise"')
+    assert refused(text) == (
+        "drivers.stick_cylinder.positive: belongs to a driver that turns, and this one slides in stick"
+    )
+
+
+OVER_THE_ANGLE = 'force = ["push * cos(2 * phi) + table(phi, pull)", "-push * w / rate"]'
+TABLE = """
+[parameters]
+push = "20 N"
+rate = "4 rad/s"
+[tables.pull]
+phi = ["0 deg", "120 deg", "240 deg"]
+value = ["0 N", "30 N", "10 N"]
+"""
+
+
+def test_the_place_of_a_motor_between_two_links_is_an_angle_in_loads_and_tables():
+    text = texts.FOUR_BAR.replace('force = [-30, "20"]', OVER_THE_ANGLE)
+    machine = Machine(linkage_from(toml(text + TABLE), "machine")[0])
+    q = math.radians(120.0)
+    out = machine.evaluate({"phi": q, "w": 2.0})
+    constant = texts.FOUR_BAR.replace("force = [-30", f"force = [{20.0 * math.cos(2.0 * q) + 30.0}")
+    other = Machine(linkage_from(toml(constant.replace('"20"]', "-10]")), "machine")[0])
+    assert out["tau"] == pytest.approx(other.evaluate({"phi": q, "w": 2.0})["tau"], rel=1e-12)
+    wrong = refused(text + TABLE, ('joint = "A"', 'joint = "none"'))
+    assert wrong.startswith('driver.joint: is "none"') and "\n" not in wrong
+
+
+ARMS_ON_ONE_EQUATION = """
+[ground]
+O = [0, 0]
+P = [1, 0]
+K = [1.8, 0]
+[driver]
+link = "crank"
+[drivers.motor]
+joint = "B"
+phi = "0.1 * sin(phi)"
+by = "motor"
+[links.crank]
+points = { O = [0, 0] }
+[links.near]
+points = { P = [0, 0], B = [0.3, 0] }
+[links.far]
+points = { B = [0, 0], C = [0.3, 0] }
+[joints.last]
+"""
+
+
+@pytest.mark.parametrize(
+    "last",
+    ['on = "far.C"\nby = "ground.K"\nradius = 0.2', 'on = "far.B"\nby = "ground.P"\nteeth = [20, 20]'],
+    ids=["cam", "gear"],
+)
+def test_a_motor_between_two_links_with_one_more_equation_is_refused(last):
+    text = refused(ARMS_ON_ONE_EQUATION + last)
+    assert text.startswith("links.near: the links near and far, which the driver B moves against each other")
+    assert "one of them on a pin of" in text and "the other one on a pin of a lever" in text
+
+
+ON_LEGS = {
+    "triad": (("one", "two", "three"), [("plate", leg) for leg in ("one", "two", "three")]),
+    "tetrad": (
+        ("plate", "other"),
+        [(plate, leg) for plate in ("plate", "other") for leg in ("upper", "lower")],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", ON_LEGS)
+def test_links_on_legs_with_a_motor_and_a_cam_are_not_covered(kind):
+    """They have as many equations as with pins alone: a motor gives one more, a cam one less."""
+    outer, inner = ON_LEGS[kind]
+    links = [*dict.fromkeys(("crank", *outer, *(link for pair in inner for link in pair)))]
+    crank = JointOf("O", REVOLUTE, "crank", GROUND)
+    first, *pins = (
+        JointOf(f"{on}_{by}", REVOLUTE, on, by) for on, by in [*((x, GROUND) for x in outer), *inner]
+    )
+    groups = decompose(links, [crank, first, *pins], {"O": "crank"})
+    assert [group.kind for group in groups] == [kind]
+    cam, motor = first._replace(kind="cam", equations=1, alone="cam follower"), pins[len(outer) - 1]
+    with pytest.raises(
+        InputError, match=f"which the driver {motor.name} moves against each other, must be two"
+    ):
+        decompose(links, [crank, cam, *pins], {"O": "crank", motor.name: motor.on})
 
 
 @pytest.mark.parametrize(

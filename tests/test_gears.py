@@ -469,9 +469,32 @@ def rack_that_turns_its_pinion_too_far():
     return data
 
 
+def rack_through_the_centre(data, pinion):
+    """The centre of the pinion is moved along the oblique pitch line, which goes through it."""
+    guide, ground = data["joints"]["guide"], data["ground"]
+    (x, y), start = data["links"]["rack"]["points"]["T"], data["links"]["rack"]["points"][guide["on"][-1]]
+    arm = complex(x - start[0], y - start[1]) * complex(math.cos(guide["angle"]), math.sin(guide["angle"]))
+    begin, end = (complex(*ground[name]) for name in ("G", "G2"))
+    centre = begin + arm + 0.37 * (end - begin)
+    ground["O2"] = [centre.real, centre.imag]
+    data["start"]["angles"] = {pinion: 0.4}
+    return data
+
+
 @pytest.mark.parametrize(
     ("data", "key", "words"),
     [
+        (
+            rack_through_the_centre(rack_of_a_press(), "pinion"),
+            "joints.teeth",
+            "the pitch line of rack goes through pinion.O2, the centre of its pinion, whose pitch radius is 0 m; "
+            "must be > 0: move rack.T",
+        ),
+        (
+            rack_through_the_centre(rack_of_a_lever(), "rocker"),
+            "joints.teeth",
+            "the pitch line of rack goes through rocker.O2, the centre of its pinion",
+        ),
         (
             rack(on="rod.B"),
             "joints.teeth",

@@ -399,7 +399,7 @@ def test_the_live_page_has_both_motions(name):
         ('phi = "1.5 * phi"', "drivers.other.phi: moves by 1.5 turns in a turn of the first driver"),
         ('phi = "phi**2"', "give a law with the same place at 0 and 360 deg"),
         ('phi = "phi * (2 * pi - phi)"', "drivers.other.phi: its speed jumps after a turn of the first driver"),
-        ('link = "left"', "drivers.other.link: left is the link of [driver]; name another one"),
+        ('link = "left"', 'drivers.other.link: is "left", and [driver] moves left already; name another link'),
         ('range = "40 mm"\nstart = 1', "drivers.other.range: "),
         ('phi = "2 * phi"\nby = "belt"', 'drivers.other.by: is "belt"; must be "gear"'),
         ('phi = "2 * phi"\nrange = [0, 1]', "drivers.other.range: follows from the law in phi"),

@@ -21,7 +21,7 @@ from ..core.planar import Motion, Vec2
 from .block import minus_cofactors
 from .group import Group, SolvedGroup
 from .joints import LinkageInMotion, Placed
-from .legs import LegAt
+from .legs import Leg, LegAt
 from .series import series_of, values_of
 
 SAMPLES = 20
@@ -85,10 +85,12 @@ class SolvedOnLegs(SolvedGroup):
 class FollowedGroup(Group):
     """A group of plates on legs as data. `assembly` are coordinates from which Newton's method leads to the assembly
     mode at the crank angle `start` [rad]; `turns` is how often each coordinate turns counter-clockwise in a turn of
-    the crank, none at all if it is empty: the rest of it is periodic. `kind` and `name` are for a refusal."""
+    the crank, none at all if it is empty: the rest of it is periodic. Its bars are its `legs`, then its plates;
+    `kind` and `name` are for a refusal."""
 
     kind: ClassVar[str]
     name: str
+    legs: Sequence[Leg]
     assembly: Sequence[Any]
     start: float
     turns: Sequence[float]

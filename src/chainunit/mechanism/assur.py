@@ -267,17 +267,23 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
     InputError
         for one that is not covered.
     """
+    # the others are of groups after it
+    joints = [j for j in joints if {*part} & {*j.links} and {*j.links} <= {*part} | placed]
     inner = [j for j in joints if j.on in part and j.by in part]
     outer = {
         link: [j for j in joints if link in (j.on, j.by) and j.other_link(link) in placed] for link in part
     }
     if len(part) == 1 and len(outer[part[0]]) == 2:
         pair = sorted(outer[part[0]], key=lambda joint: bool(joint.alone))
-        if pair[1].alone and pair[0].kind in pair[1].seats and {*pair[1].links} <= {*part} | placed:
+        if pair[1].alone and pair[0].kind in pair[1].seats:
             return AssurGroup(pair[1].alone, part, tuple(pair))
-    if len(part) == 2 and len(inner) == 1 and all(len(link_joints) == 1 for link_joints in outer.values()):
+    if drive := next((j for j in joints if j.equations == _DRIVEN), None):
+        return _driven(drive, part, [j for j in inner if j is not drive], outer)
+    plain = all(joint.kind in _LETTERS for joint in joints)
+    singly = all(len(link_joints) == 1 for link_joints in outer.values())
+    if plain and singly and len(part) == 2 and len(inner) == 1:
         return _dyad(part, inner[0], {link: link_joints[0] for link, link_joints in outer.items()})
-    if len(part) == 4:
+    if plain and len(part) == 4:
         for ternary in part:
             legs = [link for link in part if link != ternary]
             pairs = [[j for j in inner if {j.on, j.by} == {ternary, leg}] for leg in legs]
@@ -294,12 +300,7 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
             near, far = ([pair[0] for pair in pairs] for pairs in (ends[:2], ends[2:]))
             group = _on_legs(TETRAD, held, legs, near, far)
             return group._replace(joints=(*(outer[plate][0] for plate in held), *group.joints))
-    if drive := next((j for j in joints if j.equations == _DRIVEN and {*j.links} & {*part}), None):
-        return _driven(drive, part, [j for j in inner if j is not drive], outer)
-    number, many = (
-        len([j for j in joints if {*part} & {*j.links} and {*j.links} <= {*part} | placed]),
-        len(part) > 1,
-    )
+    number, many = len(joints), len(part) > 1
     raise InputError(
         f"the link{'s' * many} {', '.join(part)} form{'s' * (not many)} one group with {len(part)} "
         f"link{'s' * many} and {number} joint{'s' * (number > 1)}: a class that is not covered; covered are dyads "

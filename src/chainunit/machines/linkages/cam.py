@@ -16,7 +16,7 @@ from ...groups.group import Group
 from ...groups.joints import Rail
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup
 from ...mechanism.expressions import LawCourse, value_of
-from .joint_kind import CAM, JointEntry, JointParts, JointTable, Seen, SingleLinkKind
+from .joint_kind import CAM, JointEntry, JointParts, JointTable, SingleLinkKind
 
 if TYPE_CHECKING:
     from .entries import EntryReader
@@ -108,10 +108,10 @@ class CamKind(SingleLinkKind):
         if message:
             yield f"joints.{joint['name']}.{entry}", message
 
-    def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
+    def start(self, first: JointEntry, joint: JointEntry, geometry: Any) -> dict[str, float]:
         """The angle of the contact from the pin or the line of the follower, and on which side of its face the cam
         lies."""
-        cam = joint.by[0]
+        cam, place = joint.by[0], geometry.rough_place
         if cam in first.links:
             state = f"{cam} has the profile of {joint.name}, and its follower {joint.on[0]} moves before it"
             raise InputError(f"{state}: drive {cam}, or a link before it", key=f"links.{cam}")
@@ -124,7 +124,7 @@ class CamKind(SingleLinkKind):
         if face:
             side = math.copysign(1.0, arm.turned().dot(towards))
             towards = arm.turned() * side
-        zero = place(other, first.at(other)) - centre if turns else line(first)
+        zero = place(other, first.at(other)) - centre if turns else geometry.rough_line(first)
         return {link: math.atan2(zero.cross(towards), zero.dot(towards)), f"{link}.face": side}
 
     def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:

@@ -180,7 +180,7 @@ class EntryReader(Entry):
             return entry
         return math.nan
 
-    def law_entry(self, key: str, law: Any, unit: str, unit_of_phi: str) -> Any:
+    def law_entry(self, key: str, law: Any, unit: str, unit_of_phi: str | None) -> Any:
         """The value of a key that may be an expression of ``phi``, with tables over it and with angles in degrees."""
         named = isinstance(law, str) and words_in(_DEGREES.sub("", law))
         text = _DEGREES.sub(r"(\1 * deg)", law) if named else law
@@ -204,7 +204,8 @@ class EntryReader(Entry):
         if parsed.names == (name,) and self.units.get(name, "") is None:
             self.units[name] = names[name] = unit
             self.derived_dimensions = None
-        checked_dimension(parsed.text, self.dimensions(names), unit)
+        if names.get("phi", "") is not None:  # else the first driver is faulty, and its unit is not known
+            checked_dimension(parsed.text, self.dimensions(names), unit)
         for width in parsed.widths:
             moving = {*width.of.names} & {*self.inputs, *(motion or {})} or {*width.of.tables}
             if moving:

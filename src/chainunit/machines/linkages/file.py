@@ -178,10 +178,9 @@ class _LinkageReader(LoadReader):
         links = [self.link(name) for name in self.link_names()]
         joints = self.joints()
         driver, span = self.driver("driver", self.table("driver"), joints)
-        drivers = [
-            self.further_driver(name, key, table, driver, joints)
-            for name, key, table in self.tables("drivers", _FURTHER_KEYS)
-        ]
+        drivers: list[dict[str, Any]] = []
+        for name, key, table in self.tables("drivers", _FURTHER_KEYS):
+            drivers.append(self.further_driver(name, key, table, [driver, *drivers], joints))
         loads = [self.load(name) for name in self.table("loads")]
         common, groups, about = self.common(), self.groups(), self.about()
         losses = self.differing(joints, common)
@@ -385,17 +384,31 @@ class _LinkageReader(LoadReader):
         name: str,
         key: str,
         table: Mapping[str, Any],
-        first: Mapping[str, Any],
+        before: Sequence[Mapping[str, Any]],
         joints: list[dict[str, Any]],
     ) -> dict[str, Any]:
-        """A driver besides the first one: it follows that by a law, or is an input of its own."""
-        if table.get("link", "") == first.get("link") and "joint" not in table:
-            self.fault(f"{key}.link", f"{first['link']} is the link of [driver]; name another one")
-            return {"name": name}
+        """A driver besides the first one, after those `before` it: it follows the first one by a law, or is an input
+        of its own."""
         entry, span = self.driver(key, table, joints)
         entry |= {"name": name}
         if not entry.get("link"):
             return entry
+        first, named = before[0], "joint" if "joint" in table else "link"
+        grounded = [j["name"] for j in joints if GROUND in (j["on"][0], j["by"][0])]
+
+        def motion(driver: Mapping[str, Any]) -> tuple[Any, Any]:
+            """What it moves: a link in the ground, or by a joint of two links that move."""
+            joint = driver.get("joint")
+            return driver.get("link"), GROUND if joint in grounded else joint
+
+        same = next((driver for driver in before if motion(driver) == motion(entry)), None)
+        if same is not None:
+            whose = f"drivers.{same['name']}" if "name" in same else "driver"
+            self.fault(
+                f"{key}.{named}",
+                f"is {shown(table[named])}, and [{whose}] moves {entry['link']} already; name another {named}, or "
+                f"take [{key}] out",
+            )
         unit, law, by = "m" if entry["linear"] else "rad", table.get("phi"), table.get("by", _GEAR)
         if law is None:
             if span is None:
@@ -425,7 +438,9 @@ class _LinkageReader(LoadReader):
                 f'is {shown(by)}; must be "{_GEAR}", if the first driver drives it, or "{_MOTOR}", if it has one of '
                 "its own",
             )
-        entry["law"] = self.law_entry(f"{key}.phi", law, unit, "m" if first.get("linear") else "rad")
+        # the unit of a faulty one is not known
+        unit_of_phi = ("m" if first["linear"] else "rad") if first else None
+        entry["law"] = self.law_entry(f"{key}.phi", law, unit, unit_of_phi)
         return entry | {"geared": by == _GEAR}
 
     def driver(
@@ -482,11 +497,6 @@ class _LinkageReader(LoadReader):
     ) -> tuple[dict[str, Any], list[float] | None]:
         """The driver that slides in the prismatic joint that its table names, with the link that moves, and its range
         [m]; nothing and None, with a fault, for another joint."""
-        for name in ("link", "zero", "positive"):
-            if name in table:
-                self.fault(
-                    f"{key}.{name}", "belongs to a driver that turns; a driver with a joint slides in it"
-                )
         kinds = {joint["name"]: joint["type"] for joint in joints}
         sliding = {joint["name"]: joint for joint in joints if joint["type"] == PRISMATIC}
         name = table["joint"]
@@ -498,6 +508,9 @@ class _LinkageReader(LoadReader):
                 f"two links that move: {', '.join((*sliding, *motors)) or 'there is none'}",
             )
             return {}, None
+        for other in ("link", "zero", "positive"):
+            if other in table:
+                self.fault(f"{key}.{other}", f"belongs to a driver that turns, and this one slides in {name}")
         (on, _), (by, _) = sliding[name]["on"], sliding[name]["by"]
         span = None
         if key == "driver" or "range" in table:

@@ -316,8 +316,10 @@ def check_followed(linkage: Linkage, derived: Sequence[Any]) -> None:
     """Refuse triads and tetrads that cannot be followed all the way round."""
     for group, misfit in misfits(linkage, derived):
         if not misfit <= MOST_MISFIT:
+            bars, legs = group.bars, len(group.legs)
+            links = ", ".join(bar.name for bar in (*bars[legs:], *bars[:legs]))
             raise InputError(
-                f"the {group.kind} of {group.name} does not close all the way round, or moves too sharply to be "
+                f"the {group.kind} of {links} does not close all the way round, or moves too sharply to be "
                 "followed: change its lengths",
                 key=f"links.{group.name}",
             )

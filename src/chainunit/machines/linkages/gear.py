@@ -34,7 +34,7 @@ from ...groups.joints import (
     Third,
 )  # fmt: skip
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup
-from .joint_kind import JointEntry, JointParts, JointTable, Seen, SingleLinkKind
+from .joint_kind import JointEntry, JointParts, JointTable, SingleLinkKind
 from .names import connected, owners_of
 
 if TYPE_CHECKING:
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 _AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
 _MOST = 12
 """Largest number of turns of a wheel in a turn of the links before it: a linkage is checked at so many places."""
+_LEAST_RADIUS = 1e-9
+"""Least pitch radius of the pinion of a rack [m]; a smaller one is zero but for rounding."""
 _LEAST_COSINE = -0.98
 """Cosine of the angle, of about 168 deg, by which a wheel may turn whose ratio is no whole number: half a turn on
 either side of its start has one angle, and the places at which a linkage is checked lie some degrees apart."""
@@ -409,31 +411,37 @@ class RackKind(SingleLinkKind):
     seats = (REVOLUTE, PRISMATIC)
 
     def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
-        """Add the guide of the rack."""
+        """Add the guide of the rack, and the point of the ground at the centre of the pinion."""
         rack = {joint["on"][0], GROUND}
         guides = [j["name"] for j in joints if j["type"] == PRISMATIC and {j["on"][0], j["by"][0]} == rack]
-        if not guides or GROUND not in _pinned(reader, joint["by"], joints):
+        pinned = _pinned(reader, joint["by"], joints)
+        if not guides or GROUND not in pinned:
             reader.fault(
                 f"joints.{joint['name']}",
                 f"{joint['on'][0]} must slide in a guide of the ground, and {'.'.join(joint['by'])} be pinned to the "
                 "ground: give the rack in `on` with a point of its pitch line, the pinion in `by` with its centre",
             )
-        joint["guide"] = next(iter(guides), "")
+        joint |= {"guide": next(iter(guides), ""), "centre": pinned.get(GROUND, "")}
 
-    def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
+    def start(self, first: JointEntry, joint: JointEntry, geometry: Any) -> dict[str, float]:
         """The place of the rack along its guide."""
+        if abs(_pitch(joint, geometry)[1]) < _LEAST_RADIUS:
+            (rack, point), centre = joint.on, ".".join(joint.by)
+            raise InputError(
+                f"the pitch line of {rack} goes through {centre}, the centre of its pinion, whose pitch radius is "
+                f"0 m; must be > 0: move {rack}.{point}, which is on that line, or the centre to the side",
+                key=f"joints.{joint.name}",
+            )
         if first.kind == REVOLUTE:
             return {}
-        d = line(first)
-        return {joint.on[0]: place(*joint.on).dot(d) / math.sqrt(d.squared())}
+        d = geometry.rough_line(first)
+        return {joint.on[0]: geometry.rough_place(*joint.on).dot(d) / math.sqrt(d.squared())}
 
     def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:
         """The rack on its guide `first`, or the pinion on its pin."""
         (rack, point), (pinion, centre), geometry = joint.on, joint.by, parts.geometry
-        guide = parts.structure.joints[joint.table["guide"]]
-        d, rail, pin, place = geometry.direction(guide, GROUND), None, "", parts.sides.get(link, 0.0)
+        (d, radius), rail, pin, place = _pitch(joint, geometry), None, "", parts.sides.get(link, 0.0)
         name = parts.pin(pinion, centre)
-        line = geometry.line_through(guide, rack, geometry.point(rack, point))
         if link == rack:
             bar, rail, pin = parts.slider(link, first, point)
             mesh = f"{joint.name}.{point}"
@@ -441,7 +449,6 @@ class RackKind(SingleLinkKind):
         else:
             bar, mesh, place = parts.hung(link, first), parts.pin(rack, point), parts.structure.poses[link][2]
         parts.receive(joint, mesh, link)
-        radius = d.cross(line - parts.ground[name])
         by, start = pinion if link == rack else rack, parts.structure.start
         return RackedLink(bar, joint.name, mesh, by, name, d, radius, rail, pin, place, start)
 
@@ -452,6 +459,17 @@ class RackKind(SingleLinkKind):
             f"the pinion of {joint.name} has turned by nearly half a turn from its start at {where}, and may swing "
             "by less than 168 deg about that; take a larger pinion, a shorter way, or a start in its middle"
         )
+
+
+def _pitch(joint: JointEntry, geometry: Any) -> tuple[Vec2, Any]:
+    """The direction of the pitch line of a rack, and how far it lies to the left of the centre of the pinion [m]."""
+    rack, point = joint.on
+    guide = geometry.structure.joints[joint.table["guide"]]
+    d, place = (
+        geometry.direction(guide, GROUND),
+        geometry.line_through(guide, rack, geometry.point(rack, point)),
+    )
+    return d, d.cross(place - geometry.point(GROUND, joint.table["centre"]))
 
 
 def _pinned(reader: EntryReader, end: Sequence[str], joints: Sequence[JointTable]) -> dict[str, str]:

@@ -117,10 +117,14 @@ class LinkGeometry:
         turned = rotated(self.point(link, point), Vec2(math.cos(angle), math.sin(angle)))
         return Vec2(x, y) + turned
 
+    def rough_line(self, joint: JointEntry) -> Vec2:
+        """The line of a prismatic joint in the rough pose of the start [m]."""
+        link, start = joint.by
+        return self.rough_place(link, joint.toward) - self.rough_place(link, start)
+
     def rough_way(self, joint: JointEntry, link: str) -> Any:
         """The way of a link along the line in the link on the other side, in the rough pose of the start [m]."""
-        (by, start), other, place = joint.by, joint.other_link(link), self.rough_place
-        line = place(by, joint.toward) - place(by, start)
+        other, place, line = joint.other_link(link), self.rough_place, self.rough_line(joint)
         way = place(link, joint.at(link)) - place(other, joint.at(other))
         return way.dot(line) / self.xp.sqrt(line.squared())
 
@@ -132,19 +136,14 @@ def start_sides(geometry: LinkGeometry) -> dict[str, float]:
     Raises
     ------
     InputError
-        if a dyad starts in a dead position.
+        if a dyad starts in a dead position, or a single link has no length.
     """
-    structure, place = geometry.structure, geometry.rough_place
-
-    def line(joint: JointEntry) -> Vec2:
-        link, start = joint.by
-        return place(link, joint.toward) - place(link, start)
-
+    structure, place, line = geometry.structure, geometry.rough_place, geometry.rough_line
     sides: dict[str, float] = {}
     for group in structure.groups:
         if group.kind in SINGLES:
             seat, joint = (structure.joints[joint.name] for joint in group.joints)
-            sides |= SINGLES[group.kind].start(seat, joint, place, line)
+            sides |= SINGLES[group.kind].start(seat, joint, geometry)
         if group.kind not in TWO_WAYS:
             continue
         first, last = group.links[0], group.links[-1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from ...core.errors import shown
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .entries import EntryReader
 
 CAM = "cam"
-Seen = Callable[..., Vec2]
 Entry = float | str
 """A number, or the text of an expression."""
 JointTable = dict[str, Any]
@@ -169,8 +168,14 @@ class GuideKind(JointKind):
 class SingleLinkKind(JointKind):
     """A kind of joint by which, and a pin or a guide, a single link forms a group of the kind `alone`."""
 
-    def start(self, first: JointEntry, joint: JointEntry, place: Seen, line: Seen) -> dict[str, float]:
-        """What the start tells of the group, by names, from the rough `place` of points and the `line` of guides."""
+    def start(self, first: JointEntry, joint: JointEntry, geometry: Any) -> dict[str, float]:
+        """What the start tells of the group, by names, from the `geometry` of the links with its rough places.
+
+        Raises
+        ------
+        InputError
+            if the group has no length that it needs.
+        """
         return {}
 
     def group(self, parts: JointParts, link: str, first: JointEntry, joint: JointEntry) -> Group:

@@ -12,9 +12,10 @@ from typing import Any
 from ...core import units
 from ...core.errors import InputError, meant, near_name, shown
 from ...core.inputs import cells_of, file_text, lines_of_table
-from ...mechanism.assur import GROUND
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.expressions import expression
 from .entries import FEWER, MOST_POINTS, NameUnits, is_among, is_given, within
+from .joint_kinds import kind_of
 from .names import name_fault
 from .parameters import ParameterReader
 
@@ -41,6 +42,20 @@ class LoadReader(ParameterReader):
     def __init__(self, data: Mapping[str, Any], name: str, folder: Path) -> None:
         super().__init__(data, name)
         self.folder = folder
+
+    def unit_of_place(self) -> str | None:
+        """The unit of the place of the first driver: it slides in a guide, or turns; None if its joint is no such
+        joint."""
+        name, joints = self.table("driver").get("joint"), self.table("joints")
+        if name is None:
+            return "rad"
+        if is_among(name, joints):
+            kind = kind_of(joints[name]) if isinstance(joints[name], Mapping) else None
+            return {PRISMATIC: "m", REVOLUTE: "rad"}.get(str(kind))
+        links = [link.get("points") for link in self.table("links").values() if isinstance(link, Mapping)]
+        pins = [pin for points in links if isinstance(points, Mapping) for pin in points]
+        # of three links in a pin each further one has a joint that is named by the pin and the link
+        return "rad" if any(name == pin or str(name).startswith(f"{pin}_") for pin in pins) else None
 
     # tables
 
@@ -93,7 +108,9 @@ class LoadReader(ParameterReader):
             raise InputError(f"has {len(places)} points; {FEWER}")
         if over == "x":
             return self.like(places), self.like(values)
-        unit = "m" if "joint" in self.table("driver") else "rad"
+        unit = self.unit_of_place()
+        if unit is None:
+            return self.like(places), self.like(values)
         return ([self.number(key, x, unit) for x in places], unit), self.like(values)
 
     def like(self, entries: list[Any]) -> Column:
@@ -175,7 +192,8 @@ class LoadReader(ParameterReader):
             self.spring(key, table, load)
         elif "on" in load:
             motion = {**(_OF_LINK if kind == "torque" else _OF_FORCE), **self.table_units}
-            motion |= {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
+            unit = self.unit_of_place()
+            motion |= {"phi": unit, "w": unit and f"{unit}/s"}
             if kind == "torque":
                 torque = _placed(table.get("torque"), load["on"])
                 load["torque"] = self.entry(f"{key}.torque", torque, "N.m", motion, True)
