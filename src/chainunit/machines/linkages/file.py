@@ -179,8 +179,8 @@ class _LinkageReader(LoadReader):
         joints = self.joints()
         driver, span = self.driver("driver", self.table("driver"), joints)
         drivers: list[dict[str, Any]] = []
-        for name, key, table in self.tables("drivers", _FURTHER_KEYS):
-            drivers.append(self.further_driver(name, key, table, [driver, *drivers], joints))
+        for entries in self.tables("drivers", _FURTHER_KEYS):
+            drivers.append(self.further_driver(*entries, [driver, *drivers], joints))
         loads = [self.load(name) for name in self.table("loads")]
         common, groups, about = self.common(), self.groups(), self.about()
         losses = self.differing(joints, common)
