@@ -516,7 +516,7 @@ def test_the_direct_model_gives_back_the_motion(name):
     assert 0.0 < machine.model.described_by.at_start.driver.inertia <= np.min(reflected)
 
 
-@pytest.mark.second
+@pytest.mark.stages(second=1)
 @pytest.mark.parametrize("outer", ["RR", "RP", "PR", "PP"])
 def test_tetrads_with_slides(outer):
     """All kinds of legs, on plates that turn or slide: those that close are those of all their equations, and the

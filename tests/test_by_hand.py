@@ -117,13 +117,13 @@ def study_of(name, folder, text=""):
         machines = str(EXAMPLES / "loads").replace("\\", "/")
         (folder / f"{name}.toml").write_text(text.replace("loads/", f"{machines}/"), "utf-8")
         arguments = [str(folder / f"{name}.toml")]
-    process = chainunit("study", *arguments, "-o", str(folder / "out"), cwd=folder)
+    process = chainunit("study", *arguments, "-o", str(folder / "out"), cwd=folder, whole=False)
     assert process.returncode == 0, process.stderr
     result = ResultEntries(json.loads((folder / "out" / "result.json").read_text("utf-8")))
     return result, process.stdout
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_the_crusher_gets_the_motor_of_the_calculation_by_hand(tmp_path):
     result, text = study_of("jaw_crusher", tmp_path)
     assert "Largest force in a pin: D" in text

@@ -227,7 +227,7 @@ def test_torque_inertia_and_slopes_belong_together(name):
 
 @pytest.mark.second
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
-@pytest.mark.parametrize("make", ["native 2", "native 3", "python"])
+@pytest.mark.parametrize("make", ["native 2", pytest.param("native 3", marks=pytest.mark.slow), "python"])
 @pytest.mark.parametrize("name", MACHINES)
 def test_fmus(name, make, tmp_path):
     """The same numbers through the FMU, before and after a step."""
@@ -250,7 +250,7 @@ def test_fmus(name, make, tmp_path):
 
 
 @node
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["offset_roller", "flat_lever"])
 def test_live_pages(name):
     """A turn in JavaScript is that of Python, also with other lengths and loads."""
@@ -366,7 +366,7 @@ def test_the_picture_has_the_profile_and_the_report_the_least_force():
     assert np.hypot(x, y)[0] == pytest.approx(0.04, rel=1e-12)
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_a_study_warns_of_a_follower_that_lifts_off(tmp_path):
     lines = """
     title = "Plunger"
@@ -563,7 +563,7 @@ def test_a_cam_that_differs():
     assert differing == pytest.approx(own, rel=1e-13) and np.max(np.abs(common - own)) > 1e-3
 
 
-@pytest.mark.second
+@pytest.mark.slow
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_a_coasting_cam_loses_its_energy_by_friction(tmp_path):
     """The direct model without a torque: what kinetic and potential energy lose is what friction takes."""
