@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import fmpy
 import numpy as np
 import pytest
+from command import chainunit
 from javascript_hosts import node
 from multibody import Multibody
 from scipy.interpolate import CubicSpline
@@ -366,20 +367,32 @@ def test_the_picture_has_the_profile_and_the_report_the_least_force():
     assert np.hypot(x, y)[0] == pytest.approx(0.04, rel=1e-12)
 
 
+PLUNGER = """
+title = "Plunger"
+parameters = { base = "40 mm", lift = "6 mm" }
+ground = { O1 = [0, 0], G = [0, 0], G2 = [0, 1] }
+driver = { link = "shaft" }
+links.shaft.points = { O1 = [0, 0] }
+links.plunger = { points = { P = [0, 0] }, mass = "1 kg" }
+joints.guide = { on = "plunger.P", by = "ground.G", toward = "G2" }
+joints.cam = { on = "plunger.P", by = "shaft.O1", radius = "base + lift * cos(2 * phi)", roller = "10 mm" }
+start.points = { P = [0, 0.05] }
+"""
+
+
+@pytest.mark.second
+@pytest.mark.parametrize(("speed", "lifts"), [("120 rev/min", False), ("600 rev/min", True)])
+def test_the_report_of_a_linkage_warns_of_a_follower_that_lifts_off(speed, lifts, tmp_path):
+    (tmp_path / "plunger.toml").write_text(PLUNGER, "utf-8")
+    process = chainunit("linkage", "plunger.toml", "--speed", speed, cwd=tmp_path, whole=False)
+    assert process.returncode == 0
+    said = "Warning: The follower would lift off at cam: the force of the contact falls to -"
+    assert (said in " ".join(process.stdout.split())) == lifts
+
+
 @pytest.mark.slow
 def test_a_study_warns_of_a_follower_that_lifts_off(tmp_path):
-    lines = """
-    title = "Plunger"
-    parameters = { base = "40 mm", lift = "6 mm" }
-    ground = { O1 = [0, 0], G = [0, 0], G2 = [0, 1] }
-    driver = { link = "shaft" }
-    links.shaft.points = { O1 = [0, 0] }
-    links.plunger = { points = { P = [0, 0] }, mass = "1 kg" }
-    joints.guide = { on = "plunger.P", by = "ground.G", toward = "G2" }
-    joints.cam = { on = "plunger.P", by = "shaft.O1", radius = "base + lift * cos(2 * phi)", roller = "10 mm" }
-    start.points = { P = [0, 0.05] }
-    """
-    (tmp_path / "plunger.toml").write_text("\n".join(line.strip() for line in lines.splitlines()))
+    (tmp_path / "plunger.toml").write_text(PLUNGER, "utf-8")
     study = """
     [system]
     machine = "plunger.toml"

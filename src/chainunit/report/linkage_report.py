@@ -264,6 +264,10 @@ def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
             title=f"Reactions{on}",
             central=True,
         )
+    for name, joint in f.joints.items():
+        if joint.least is not None and joint.least < 0.0:
+            text = "The follower would lift off at {}: the force of the contact falls to {}."
+            yield b.Judgement("warning", filled(text, Name(name), number(x.forces.joints[name].least)))
     yield from table(
         (x.drivers or {}).items(),
         ("driver", lambda row: Name(row[0])),

@@ -79,10 +79,9 @@ class Jam(_Pulses):
 
     def fault(self, normal: Values) -> str:
         """A place across the width needs a machine with a width."""
-        lacks_width = self.p.across and f"{self.side}.force_across" not in normal
-        return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width" * bool(
-            lacks_width
-        )
+        if not self.p.across or f"{self.side}.force_across" in normal:
+            return ""
+        return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width"
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The pulses, and the place of the whole force across the width."""
