@@ -131,7 +131,7 @@ def test_behind_a_gear_without_loss_it_is_the_same_as_before_it():
 def test_the_gear_loses_a_share_of_the_torque_of_the_flywheel(geared):
     """The equation of motion of the rotor, with torque and acceleration of the run."""
     rig, r = geared
-    p, loss = rig.drive.fmu_parameters, rig.drive.gear_loss
+    p, loss = rig.drive.fmu_parameters, rig.drive.gear.loss
     assert loss == pytest.approx(0.25)
     a, w = r["motor.a"].values, r["motor.w"].values
     passed = (r["machine.tau"].values + 400.0 * a / RATIO) / RATIO

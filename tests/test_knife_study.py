@@ -180,7 +180,7 @@ def test_fluctuation_by_hand_with_a_large_flywheel(rig):
     w, ratio = answers.speed_mean, rig.drive.ratio
     inertia = heavy.drive.rotor_inertia + turn.inertia_mean / ratio**2
     # the flywheel also gives what the gear loses
-    loaded, loss = study.findings.by_analysis["constant_speed"].loaded, heavy.drive.gear_loss
+    loaded, loss = study.findings.by_analysis["constant_speed"].loaded, heavy.drive.gear.loss
     torque = np.append(loaded.crank_torque, loaded.crank_torque[0])
     torque = torque + loss * np.abs(torque)
     angle = np.append(loaded.angle, loaded.angle[0] + 2.0 * math.pi)
@@ -216,7 +216,7 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
         load = table(phi, torque)
         lossless = (air - load) / (p.rotor.J + table(phi, inertia))
         passed = load + table(phi, inertia) * lossless
-        share = 1.0 + math.copysign(drive.gear_loss, passed)
+        share = 1.0 + math.copysign(drive.gear.loss, passed)
         return [w, (air - share * load) / (p.rotor.J + share * table(phi, inertia))]
 
     turn = study.setup.config.operation.turn
@@ -234,7 +234,7 @@ def test_energy_over_a_cut(done):
     run, answers, p = study.runs.steady, study.runs.answers["steady"], study.setup.drive.fmu_parameters
     power, time = cutting_power(run), run["time"].values
     rotor = run["motor.w"].values
-    lost = study.setup.drive.gear_loss * np.abs(run["motor.tau"].values) * rotor
+    lost = study.setup.drive.gear.loss * np.abs(run["motor.tau"].values) * rotor
     given = (run["motor.air_gap_tau"].values - p.rotor.d * rotor) * rotor - lost
     inside = power > 0.01 * np.max(power)
     work = np.trapezoid(np.where(inside, power, 0.0), time)

@@ -179,7 +179,7 @@ def test_a_quantity_has_one_value(study, report):
     """A start and a steady turn are run by several analyses: they take them from the same runs."""
     values = defaultdict(dict)
     plan = study.setup.config.plans["checks"]
-    factor = 3.0**0.5 if study.setup.drive.star_delta is not None and plan.relay_in_phases else 1.0
+    factor = 3.0**0.5 if study.setup.drive.star and plan.relay_in_phases else 1.0
     for whole, value in leaves(report.result):
         place = whole.removeprefix("given.").removeprefix("runs.").removeprefix("findings.")
         if value is not None and re.fullmatch(IN_PHASES, place):

@@ -68,10 +68,10 @@ def test_the_ratio_makes_up_for_the_slip():
 def test_a_belt_has_its_part_of_the_ratio_and_the_gear_the_rest():
     whole, split = drive("[gear]\nratio = 6\n[belt]\n"), drive("[gear]\nratio = 60\n[belt]\nratio = 4\n")
     # one belt has a ratio of 6, and then there is no gear that loses anything
-    assert whole.line.ratio == 6.0 and whole.gear_loss == 0.0
+    assert whole.line.ratio == 6.0 and whole.gear.loss == 0.0
     assert split.line.ratio == 4.0 and split.driven_machine.ratio == pytest.approx(15.0)
     # a gear of 15 has two stages of 98 %
-    assert split.gear_loss == pytest.approx(1.0 / 0.98**2 - 1.0, rel=1e-12)
+    assert split.gear.loss == pytest.approx(1.0 / 0.98**2 - 1.0, rel=1e-12)
     p = split.line.parts[0].parameters
     assert p.distance == pytest.approx(5.0 * p.diameter, rel=1e-12)
     # the motor's pulley is a standard one
@@ -99,7 +99,7 @@ def test_a_study_without_such_a_part_has_the_gear_at_the_rotor():
     bare = drive("[gear]\nJ = 0.002\nd = 0.001\n")
     p = bare.fmu_parameters
     assert p.rotor.J == bare.parameters.rotor.J + 0.002 and p.rotor.d == bare.parameters.rotor.d + 0.001
-    assert p.gear.loss == bare.gear_loss > 0.0 and bare.geared_line.parts == ()
+    assert p.gear.loss == bare.gear.loss > 0.0 and bare.geared_line.parts == ()
 
 
 # -- torques and inertias of both sides

@@ -83,19 +83,19 @@ def test_a_start_changes_the_connection_without_current():
     assert changing.any() and np.all(contactor(t)[changing] == 0.0)
     # ten time constants after the contactor opened, and before it closes
     assert t[changing][0] > 0.5 + CONTACTOR_EDGE + 10.0 * rig.drive.parameters.switching.decay
-    assert star(0.0) == 1.0 and star(rig.drive.switched_until) == 0.0
-    assert contactor(rig.drive.switched_until) == 1.0 and contactor(0.539) == 0.0
+    assert star(0.0) == 1.0 and star(rig.drive.star.end) == 0.0
+    assert contactor(rig.drive.star.end) == 1.0 and contactor(0.539) == 0.0
     assert rig.operation.ramp_end == pytest.approx(max(rig.operation.run.ramp, 0.54))
     assert "motor.contactor" not in rig.signals() and rig.inputs["contactor"][1] == 1.0
     direct, _ = rig_of(DIRECT)
-    assert "motor.contactor" not in direct.signals(ramp=True) and direct.drive.switched_until == 0.0
+    assert "motor.contactor" not in direct.signals(ramp=True) and direct.drive.star.end == 0.0
     assert direct.inputs["star"][1] == 0.0
 
 
 def test_the_file_states_the_starter():
     config = parse(STUDY.replace("pause", "preferred = false, pause"))
     drive = drive_of(config)
-    assert drive.parameters.switching.preferred == 0.0 and drive.star_delta.pause == 0.04
+    assert drive.parameters.switching.preferred == 0.0 and drive.star.pause == 0.04
     assert drive_of(parse(STUDY)).parameters.switching.preferred == 1.0
     for wrong, said in (
         (STUDY.replace("40 ms", "5 ms"), r"starter\.star_delta\.pause = 0\.005 s: must be >= 0\.02 s"),
@@ -169,7 +169,7 @@ def test_the_change_to_delta_is_a_part_of_the_start():
     """The crank has its speed in star; the peak of the current comes later, in the change."""
     rig, _ = rig_of(STUDY)
     found = start_from(rig, 0.0, 5.0)
-    assert found.start_time < 0.45 and found.followed > rig.drive.switched_until
+    assert found.start_time < 0.45 and found.followed > rig.drive.star.end
     with rig.from_rest() as simulation:
         run = simulation.run(1.0, 1e-4)
     time, current = run["time"].values, run["motor.i"].values
@@ -185,7 +185,7 @@ def test_a_machine_that_starts_empty_is_fed_in_delta():
     rig, _ = rig_of("empty_start = true\n" + STUDY)
     with rig.from_rest() as simulation:
         started = start_up(rig, simulation, lambda time: None, {})
-    assert started.rig.fed_from == pytest.approx(rig.drive.switched_until)
+    assert started.rig.fed_from == pytest.approx(rig.drive.star.end)
     direct, _ = rig_of("empty_start = true\n" + DIRECT)
     with direct.from_rest() as simulation:
         assert start_up(direct, simulation, lambda time: None, {}).rig.fed_from < 0.4

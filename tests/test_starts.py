@@ -123,7 +123,7 @@ def test_a_start_from_an_angle_by_the_compiled_system(pump):
     by_motor = (
         run["motor.air_gap_tau"].values - rotor.J * run["motor.a"].values - rotor.d * run["motor.w"].values
     )
-    for torque in (by_machine, by_motor / (1.0 + np.sign(by_motor) * drive.gear_loss)):
+    for torque in (by_machine, by_motor / (1.0 + np.sign(by_motor) * drive.gear.loss)):
         assert float(np.max(np.abs(torque))) * drive.ratio == pytest.approx(worst.gear_torque, rel=0.02)
 
 

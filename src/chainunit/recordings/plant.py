@@ -18,7 +18,7 @@ from ..core.errors import InputError
 from ..core.quantities import Variable
 from ..drives.free_rotor import FreeRotor
 from ..machines.machine import Machine
-from ..study.drive import Drive
+from ..study.drive import NO_LOSS, Drive
 from ..system.compiled_simulation import CompiledSystem
 from .loop import DirectedLoop, Piece
 from .measurands import COUNTS
@@ -209,9 +209,7 @@ def free(drive: Drive) -> Drive:
         motor=FreeRotor,
         parameters=rotor,
         added_inertia=0.0,
-        gear_inertia=0.0,
-        gear_friction=0.0,
-        gear_loss=0.0,
+        gear=NO_LOSS,
         feed_forward=False,
     )
 

@@ -128,7 +128,7 @@ def _starts(study: StudyRecord) -> Iterator[b.Block]:
         ("torque on a coupling", lambda start: number(start.coupling_torque, none="not reached")),
         ("start-up time", lambda start: number(start.start_time, none="not reached")),
         ("motor current, peak", lambda start: number(start.current)),
-        *([in_star] if setup.drive.star_delta is not None else []),
+        *([in_star] if setup.drive.star else []),
         title=f"Starts from rest, from several {setup.driver_noun} angles",
         form="long",
     )

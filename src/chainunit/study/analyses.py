@@ -132,7 +132,7 @@ class GearAnalysis(Analysis):
     @staticmethod
     def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the drive has a gear with a loss."""
-        return drive.gear_friction > 0.0 or drive.gear_loss > 0.0
+        return drive.gear.d > 0.0 or drive.gear.loss > 0.0
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> GearFindings | None:
@@ -156,7 +156,7 @@ class GearAnalysis(Analysis):
                 passed_power=window.mean(lambda drive, run: np.abs(shaft_power(drive, run))),
                 share=total / net if net > 0.0 else None,
             ),
-            1.0 / (1.0 + study.setup.drive.gear_loss),
+            1.0 / (1.0 + study.setup.drive.gear.loss),
         )
 
 

@@ -17,8 +17,9 @@ from ..drives.induction_motor import Inverter, InverterControl
 from ..drives.nameplate import Nameplate
 from ..machines.machine import Machine
 from .cycle import Cycle
-from .drive import Drive
+from .drive import Drive, TurningGear
 from .operation import NO_GEAR, DriveTables
+from .star_start import NO_STAR, StarStart
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""
@@ -89,17 +90,16 @@ def catalogue_drive(
     p = with_starter(tables, p, plate)
     if ambient is not None:
         p = replace(p, ambient=replace(p.ambient, T=ambient))
+    star = tables.starter.star_delta
     drive = Drive(
         model,
         p,
         machine.replace({"ratio": ratio}),
         follows,
         rated_current=plate.rated_current,
-        gear_inertia=tables.gear.J,
-        gear_friction=tables.gear.d,
-        gear_loss=gear_with(tables, ratio, offer).loss,
+        gear=TurningGear(tables.gear.J, tables.gear.d, gear_with(tables, ratio, offer).loss),
         transmission=transmission_of(tables, ratio, offer),
-        star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
+        star=StarStart(star.time, star.pause) if tables.start == "star-delta" else NO_STAR,
         flywheel_shaft=tables.flywheel_shaft,
         droop_speed=fall * mean / rated_torque,
     )

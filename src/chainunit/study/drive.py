@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
-
-import numpy as np
+from typing import Any, Literal
 
 from ..core.brief import briefly_shown
 from ..core.errors import InputError
 from ..core.quantities import Layout
-from ..drives.contactor import CONTACTOR_EDGE, StarDelta
 from ..drives.gear import Gear
 from ..drives.gear_rating import GearRating
 from ..drives.motor import Motor
@@ -25,6 +21,7 @@ from ..system.graph import Connection
 from .foreign_machine import ForeignMachine
 from .line.flywheel import ON_MOTOR, FlywheelShaft
 from .line.placed import Line, PlacedPart
+from .star_start import NO_STAR, StarStart
 
 
 class AbsentError(InputError):
@@ -40,12 +37,19 @@ def _component(machine: Machine) -> ModelComponent:
     return ModelComponent(machine.model, machine.p)
 
 
-class TurningGear(NamedTuple):
-    """Inertia `J` [kg m2], drag `d` [N m s/rad] and `Transmission.loss` of a gear, at the motor's shaft."""
+@dataclass(frozen=True)
+class TurningGear:
+    """The gear of a drive: inertia `J` [kg m2], drag `d` [N m s/rad] and `Transmission.loss`, at its shaft on the
+    motor's side."""
 
     J: float = 0.0
     d: float = 0.0
     loss: float = 0.0
+    rating: GearRating | None = None
+    """its ratings; none of the overhung load where its shaft carries no reaction of the driver"""
+
+
+NO_LOSS = TurningGear()
 
 
 @briefly_shown
@@ -74,27 +78,17 @@ class Drive:
     """inertia of the flywheel at its own shaft [kg m2]"""
     flywheel_shaft: FlywheelShaft = ON_MOTOR
 
-    gear_inertia: float = 0.0
-    gear_friction: float = 0.0
-    gear_loss: float = 0.0
-    """inertia [kg m2], drag [N m s/rad] and `Transmission.loss` of the gear of a catalogue motor, at its shaft"""
-
     transmission: str = "gear"
     """its parts in a noun: "gear", "belt", "belt and gear", or "coupling" of a machine that turns with the motor"""
 
-    gear_name: str = ""
-    """designation of the gear, if it is one of a catalogue"""
-
-    gear_rating: GearRating | None = None
-    """its ratings; none of the overhung load where its shaft carries no reaction of the driver"""
-
+    gear: TurningGear = NO_LOSS
     observer: ModelComponent | None = None
     """a load observer, which takes signals of the motor"""
     observed: Mapping[str, str] = field(default_factory=dict)
     """by input of the observer, the output of the motor that it takes"""
 
-    star_delta: StarDelta | None = None
-    """the starter of a motor that starts in star; None for another start"""
+    star: StarStart = NO_STAR
+    """its time in star in a start from rest"""
 
     droop_speed: float = 0.0
     """speed by which a motor with a droop falls at the mean torque [rad/s]: its reference stands as much higher"""
@@ -132,7 +126,7 @@ class Drive:
         """The line with the flywheel, if it is on another shaft than the motor's, and with the gear on the driven
         shaft of the last part that slips."""
         line = self.flywheel_shaft.mounted(self.line, self.ratio, self.added_inertia)
-        return line.with_gear(*self._gear)
+        return line.with_gear(self.gear.J, self.gear.d, self.gear.loss)
 
     @property
     def inertia_on_rotor(self) -> float:
@@ -156,18 +150,14 @@ class Drive:
         return replace(p, gear=replace(p.gear, loss=gear.loss)) if gear.loss or slips else p
 
     @property
-    def _gear(self) -> TurningGear:
-        return TurningGear(self.gear_inertia, self.gear_friction, self.gear_loss)
-
-    @property
     def gear_at_rotor(self) -> TurningGear:
         """The gear if it turns with the rotor; nothing behind a part that slips, see `geared_line`."""
-        return self._gear if self.line.before_gear is None else TurningGear()
+        return self.gear if self.line.before_gear is None else NO_LOSS
 
     @property
     def loss_behind_port(self) -> float:
         """`Transmission.loss` of the gear between `motor_torque` and the crank: 0 if the gear is at the rotor."""
-        return self.gear_loss - self.gear_at_rotor.loss
+        return self.gear.loss - self.gear_at_rotor.loss
 
     def at_crank(self, torque: Any) -> Any:
         """The torque at the crank [N m] that a `motor_torque` [N m] gives while the motor drives: the line takes its
@@ -269,8 +259,7 @@ class Drive:
         machine, line = self.foreign_machine, self.geared_line
         if machine is None or machine.model.has_gear() or not (self.line or machine.needs_gear):
             return line
-        gear = Gear.Parameters(ratio=machine.ratio)
-        return line.behind(PlacedPart("gear", Gear, gear, machine.ratio))
+        return line.behind(PlacedPart("gear", Gear, Gear.Parameters(ratio=machine.ratio), machine.ratio))
 
     @cached_property
     def motor_bond(self) -> Bond:
@@ -304,39 +293,6 @@ class Drive:
         crank."""
         bond = self.machine_bond
         return f"{bond.driver}.{bond.flanges[0].members[quantity]}", self.ratio_at_machine
-
-    @property
-    def time_in_star(self) -> float:
-        """Time in a start from rest for which the motor is in star [s]."""
-        return 0.0 if self.star_delta is None else float(self.star_delta.time)
-
-    @property
-    def switched_until(self) -> float:
-        """Time in a start from rest from which the motor is in delta [s]; 0 without star."""
-        starter = self.star_delta
-        return 0.0 if starter is None else float(starter.time + starter.pause + CONTACTOR_EDGE)
-
-    def relay_current(self, time: Any, current: Any) -> Any:
-        """The current of the windings [A], times sqrt(3), for the `current` of the line [A] over the `time` of a run
-        from rest [s], all of shape (n,): in star the whole current of the line is in the windings, in delta 1/sqrt(3)
-        of it. A relay in the phases of the delta is set by it; see `chainunit.study.relay`."""
-        if self.star_delta is None:
-            return current
-        return current * np.where(
-            time < self.star_delta.time + 0.5 * self.star_delta.pause, math.sqrt(3.0), 1.0
-        )
-
-    def switching(self) -> dict[str, Any]:
-        """The signals of the contactor and of the connection in a start from rest."""
-        if self.star_delta is None:
-            return {}
-        begin, pause = self.star_delta.time, self.star_delta.pause
-        opens, closes = (begin, CONTACTOR_EDGE, 0.0), (begin + pause, CONTACTOR_EDGE, 1.0)
-        # the connection changes while no current flows
-        return {
-            "motor.contactor": Profile(1.0, (opens, closes)),
-            "motor.star": Profile(1.0, ((begin + 0.75 * pause, 0.2 * pause, 0.0),)),
-        }
 
     def reference_speed(self, crank_speed: float) -> float:
         """The speed reference of the motor for this mean crank speed [rad/s]."""

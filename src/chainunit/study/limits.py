@@ -141,5 +141,5 @@ def given_motor(
         if current is not None:
             checks["current"] = lasting_current(current, plate.nameplate)
         if not drive.follows:
-            checks["start"] = starting(start, plate.nameplate, drive.time_in_star)
+            checks["start"] = starting(start, plate.nameplate, drive.star.time)
     return checks

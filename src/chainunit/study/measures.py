@@ -100,7 +100,7 @@ def _relay(w: Window) -> float | None:
     assert w.steady is not None
     current = w.value(w.current)
     if w.phase is Phase.LOADED_START:
-        current = w.drive.relay_current(w.since, current)
+        current = w.drive.star.winding_current(w.since, current)
     before = w.steady.rms(w.current)
     lasts = lasting_current(current, before if w.passes and _stall(w) is None else None)
     return relay_trip(w.since, current, setting, before, lasts, w.relay_class)

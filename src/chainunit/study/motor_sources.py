@@ -19,7 +19,7 @@ from ..reading.tables import given_values, read_table, schema
 from ..system import FmuComponent, foreign_component
 from .catalogue_drive import as_used, catalogue_drive, with_inertia, with_slipping_parts
 from .cycle import Cycle
-from .drive import Drive
+from .drive import Drive, TurningGear
 from .foreign_machine import declared_parameters
 from .operation import DriveTables
 from .registry import registered
@@ -70,7 +70,7 @@ class OwnMotor(MotorSource):
             machine,
             follows,
             feed_forward=tables.feed_forward,
-            gear_loss=float(p.gear.loss),
+            gear=TurningGear(loss=float(p.gear.loss)),
             added_inertia=tables.added_inertia,
             flywheel_shaft=tables.flywheel_shaft,
         )

@@ -61,7 +61,7 @@ def torque_before_gear(drive: Drive, run: Dataset) -> Any:
     torque = run[drive.motor_torque].values
     if drive.line.before_gear is not None:
         return torque
-    return torque + lost_torque(np, drive.gear_loss, torque, run[drive.motor_speed].values)
+    return torque + lost_torque(np, drive.gear.loss, torque, run[drive.motor_speed].values)
 
 
 def gear_loss(drive: Drive, run: Dataset) -> Any:
@@ -69,7 +69,7 @@ def gear_loss(drive: Drive, run: Dataset) -> Any:
     if (part := drive.line.before_gear) is not None:
         return run[f"{part.name}.gear_loss"].values
     torque, w = run["motor.tau"].values, run["motor.w"].values
-    return lost_torque(np, drive.gear_loss, torque, w) * w + gear_drag(drive, run)
+    return lost_torque(np, drive.gear.loss, torque, w) * w + gear_drag(drive, run)
 
 
 def gear_speed(drive: Drive, run: Dataset) -> Any:
@@ -82,7 +82,7 @@ def gear_speed(drive: Drive, run: Dataset) -> Any:
 def gear_drag(drive: Drive, run: Dataset) -> Any:
     """Power that the drag of the gear takes [W], shape (time,): at the speed of the shaft that turns the gear."""
     part = drive.geared_line.before_gear
-    drag = drive.gear_friction if part is None else part.parameters.gear.d
+    drag = drive.gear.d if part is None else part.parameters.gear.d
     return drag * gear_speed(drive, run) ** 2
 
 

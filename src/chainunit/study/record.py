@@ -152,7 +152,7 @@ class StudyRuns:
     def start_end(self) -> float | None:
         """Time at which the start ends for the relay [s]: at speed, and in delta; None where it does not end."""
         time = None if self.start is None else self.start.start_time
-        return None if time is None else max(time, self.drive.switched_until)
+        return None if time is None else max(time, self.drive.star.end)
 
     @property
     def not_known(self) -> frozenset[str]:

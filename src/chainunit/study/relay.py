@@ -3,7 +3,7 @@
 The relay of a star-delta starter usually sits in the phases of the delta, behind the main contactor, and is set to
 1/sqrt(3) = 0.58 of the rated current: it carries the current of a winding, in star as in delta. In the supply line it
 is set to the rated current and hardly notices an overload in star. The class of a start is that for the former place
-(`Drive.relay_current`).
+(`StarStart.winding_current`).
 """
 
 from __future__ import annotations

@@ -402,13 +402,13 @@ _STANDS_IN_STAR = warning(
 
 def _on_star(study: StudyRecord) -> None:
     """Warn of a motor that stands in star, and of a change from star to delta at too low a speed, in any start."""
-    drive, time, run = study.setup.drive, study.setup.drive.time_in_star, study.runs.series["start_up"]
+    drive, time, run = study.setup.drive, study.setup.drive.star.time, study.runs.series["start_up"]
     first = speed_in_star(drive, run)
     if first is None or study.setup.plate is None:
         return
     findings, times = StartFindings.found_in(study.findings), run["time"].values
     starts = () if findings is None else findings.starts
-    after = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.switched_until]
+    after = np.abs(run[f"motor.{drive.motor.current}"].values)[times >= drive.star.end]
     delta = float(max([*after, *(start.current for start in starts)], default=0.0))
     by_angle = {start.angle: start.star_speed for start in starts if start.star_speed is not None}
     if held := [angle for angle, share in by_angle.items() if share < _STANDING]:
@@ -418,7 +418,7 @@ def _on_star(study: StudyRecord) -> None:
         study.findings.say(_STANDS_IN_STAR, START, where=where, share=least, delta=delta)
         return
     share, angle = min([(first, 0.0), *((share, angle) for angle, share in by_angle.items())])
-    if times[-1] <= drive.switched_until or share >= _LITTLE_STAR:
+    if times[-1] <= drive.star.end or share >= _LITTLE_STAR:
         return
     if share < FULL_STAR:
         study.findings.say(_STAR_TOO_SHORT, START, time=time, share=share, angle=angle, delta=delta)

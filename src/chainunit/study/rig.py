@@ -118,7 +118,7 @@ class Rig:
             loads = {full: self._coming(empty[full], value) for full, value in loads.items()}
         signals = {
             **loads,
-            **(self.drive.switching() if ramp else {}),
+            **(self.drive.star.signals() if ramp else {}),
             **(changes or {}),
             **self.drive.reference(run.crank_speed, run.ramp if ramp else None),
         }

@@ -250,7 +250,7 @@ class Runner:
         if time is None or rated is None or drive.follows:
             return
         rise = run.sel(time=slice(None, time))
-        current = drive.relay_current(rise["time"].values, rise[f"motor.{drive.motor.current}"].values)
+        current = drive.star.winding_current(rise["time"].values, rise[f"motor.{drive.motor.current}"].values)
         runs.relay_class = class_holding(start_seconds(rise["time"].values, current, rated))
         if proposal is not None:
             runs.relay_class = max(runs.relay_class, proposal.start_class)

@@ -119,7 +119,7 @@ def _starts_from(
             for simulation, run in zip(simulations, runs, strict=True)
         ]
         # the change from star to delta is a part of the start
-        ends = {k: max(t, drive.switched_until) + _AFTER for k, t in enumerate(reached) if t is not None}
+        ends = {k: max(t, drive.star.end) + _AFTER for k, t in enumerate(reached) if t is not None}
         later = run_together([simulations[k] for k in ends], list(ends.values()), step, names=names)
     for k, run in zip(ends, later, strict=True):
         runs[k] = join([runs[k], run])
@@ -154,8 +154,8 @@ def _numbers(
     time, current = run["time"].values, np.abs(run[f"motor.{drive.motor.current}"].values)
     relay, seconds, rated = None, None, drive.rated_current
     if reached is not None and rated is not None and not drive.follows:
-        starting = time <= max(reached, drive.switched_until)
-        seconds = start_seconds(time[starting], drive.relay_current(time, current)[starting], rated)
+        starting = time <= max(reached, drive.star.end)
+        seconds = start_seconds(time[starting], drive.star.winding_current(time, current)[starting], rated)
         relay = class_holding(seconds)
     return StartNumbers(
         angle=angle,
@@ -193,11 +193,9 @@ def _synchronous(drive: Drive) -> float:
 def speed_in_star(drive: Drive, run: Dataset) -> float | None:
     """The speed of the motor at the end of its time in star in a run from rest, over the synchronous one; None for
     another start."""
-    if drive.star_delta is None:
+    if not drive.star:
         return None
-    return float(np.interp(drive.time_in_star, run["time"].values, run["motor.w"].values)) / _synchronous(
-        drive
-    )
+    return float(np.interp(drive.star.time, run["time"].values, run["motor.w"].values)) / _synchronous(drive)
 
 
 def exceeded_for(time: np.ndarray, current: np.ndarray, longest: float) -> float:

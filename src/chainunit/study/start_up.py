@@ -80,9 +80,9 @@ def _start_empty(
             break
         stop = min(stop + piece, longest)
         run = join([run, simulation.run(stop, rig.step, progress, guards=speed_limit)])
-    if simulation.time < rig.drive.switched_until and abs(float(run[name][-1])) >= (1.0 - 1e-9) * goal:
+    if simulation.time < rig.drive.star.end and abs(float(run[name][-1])) >= (1.0 - 1e-9) * goal:
         # in star the motor is too weak for the feed
-        run = join([run, simulation.run(rig.drive.switched_until, rig.step, progress, guards=guards)])
+        run = join([run, simulation.run(rig.drive.star.end, rig.step, progress, guards=guards)])
     rig = replace(rig, fed_from=simulation.time)
     simulation.signals = rig.signals(ramp=True)
     return run, rig

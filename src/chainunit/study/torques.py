@@ -72,8 +72,8 @@ def quasi_static_torque(drive: Drive, run: Dataset, before: float = 0.0) -> Any:
     inertia = load_inertia(drive, run)
     load = run["machine.tau_bias"].values * drive.ratio_at_machine / ratio
     motor = np.maximum(motor, np.minimum(load, 0.0))
-    a = geared_acceleration(numpy_(), load, inertia, w, p.rotor.J, motor, drive.gear_loss)
-    return ratio * (load + (inertia + before / (1.0 + drive.gear_loss)) * a)
+    a = geared_acceleration(numpy_(), load, inertia, w, p.rotor.J, motor, drive.gear.loss)
+    return ratio * (load + (inertia + before / (1.0 + drive.gear.loss)) * a)
 
 
 def _is_of_run(drive: Drive, run: Dataset) -> bool:

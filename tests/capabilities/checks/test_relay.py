@@ -204,11 +204,13 @@ def test_a_relay_in_the_phases_of_a_delta_carries_the_whole_current_of_star():
     drive = drive_of(parse(f'start = "star-delta"\n{motor}'))
     time = np.linspace(0.0, 8.0, 8001)
     current = np.where(time < 6.0, 2.0, 0.0)
-    in_line, in_phases = (start_seconds(time, i, 1.0) for i in (current, drive.relay_current(time, current)))
+    in_line, in_phases = (
+        start_seconds(time, i, 1.0) for i in (current, drive.star.winding_current(time, current))
+    )
     assert in_phases == pytest.approx(6.0 * 12.0 / 7.2**2, rel=1e-3)
     assert in_phases == pytest.approx(3.0 * in_line)
     late = np.where(time > 7.0, 5.0, 0.0)
-    assert np.array_equal(drive.relay_current(time, late), late)
+    assert np.array_equal(drive.star.winding_current(time, late), late)
     assert parse('[relay]\nplace = "line"').plans["checks"].relay_in_phases is False
 
 

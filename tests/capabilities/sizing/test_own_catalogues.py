@@ -171,9 +171,9 @@ def test_inertia_and_loss_of_the_row_take_part_in_the_computation(sized):
     its inertia takes is the energy of the machine and (1/efficiency - 1) of it, in either direction."""
     config, found = sized
     drive, gear = found.best.drive, found.best.sold
-    assert drive.gear_inertia == gear.data.J == 0.0002
+    assert drive.gear.J == gear.data.J == 0.0002
     # the file gives no drag
-    assert drive.gear_friction == 0.0 and drive.gear_loss == pytest.approx(1.0 / 0.94 - 1.0)
+    assert drive.gear.d == 0.0 and drive.gear.loss == pytest.approx(1.0 / 0.94 - 1.0)
     rig = Rig(config.operation, drive, None)
     with rig.from_rest() as simulation:
         simulation.run(8.0, rig.step)
@@ -239,7 +239,7 @@ def test_with_bearings_of_its_own_the_crank_does_not_load_the_gear(tmp_path):
     chosen = sized_by(study_of(tmp_path, text, weak), tmp_path).chosen_candidate
     assert chosen.sold.designation == "middle"
     # the checks of the study take its ratings
-    assert chosen.drive.gear_rating == dataclasses.replace(chosen.sold.rating, overhung_load=0.0)
+    assert chosen.drive.gear.rating == dataclasses.replace(chosen.sold.rating, overhung_load=0.0)
 
 
 def test_an_overhung_load_beyond_the_permitted_one_rejects_a_gear(tmp_path):

@@ -301,9 +301,9 @@ def test_a_fan_on_the_shaft_of_its_motor_has_no_gear(tmp_path):
         config = parse(text)
         c = trials_of(config, duty_by(config, tmp_path)).candidate(motor)
         assert (c.drive.ratio, c.gear, c.series) == (1.0, DIRECT.title, "")
-        assert c.drive.gear_friction == 0.0 and c.drive.transmission == "coupling" and not c.drive.is_geared
+        assert c.drive.gear.d == 0.0 and c.drive.transmission == "coupling" and not c.drive.is_geared
     named = drive_of(parse(f"{machine}[system]\nmotor = 'IE3 4-pole 2.2 kW, 100L'\n"))
-    assert (named.ratio, named.gear_friction) == (1.0, 0.0)
+    assert (named.ratio, named.gear.d) == (1.0, 0.0)
     with pytest.raises(InputError, match=r'sizing.gear_kind = "none": no motor of the catalogue turns at 4'):
         sized_by(parse(text.replace("1450 rev/min", "420 rev/min")), tmp_path)
     with pytest.raises(InputError, match=r'gear: is of a gear, and sizing.gear_kind = "none"'):

@@ -306,7 +306,7 @@ def test_the_line_of_the_relay_tells_of_the_tolerance_of_the_current(trip_class,
     and the relay trips."""
     values = {v.name: 1.0 for v in variables(StartNumbers)} | {"relay_seconds": seconds}
     found = StartFindings((StartNumbers(**values),), 1.0, math.inf, "steady")
-    drive = SimpleNamespace(follows=False, star_delta=None)
+    drive = SimpleNamespace(follows=False, star=None)
     study = like(drive=drive, relay_class=trip_class, by_analysis={"starts": found}, answers={}, plate=None)
 
     def line():
@@ -328,7 +328,7 @@ def test_a_relay_that_trips_too_late_is_ordered_with_thermistors():
     plate = next(each.nameplate for each in catalogue() if each.designation == "IE3 4-pole 37 kW, 225S")
     plate = dataclasses.replace(plate, locked_time=12.0)
     study = like(
-        drive=SimpleNamespace(follows=False, star_delta=None),
+        drive=SimpleNamespace(follows=False, star=None),
         by_analysis={},
         answers={"steady": SimpleNamespace(current_rms=0.8 * plate.rated_current)},
         plate=SimpleNamespace(nameplate=plate),
@@ -680,10 +680,10 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
     # by load and acceleration, from the motor's side: its torque less that of the rotor; the transient is above it
     p, voltage = drive.fmu_parameters, run["motor.v"].values / drive.fmu_parameters.supply.V
     curve = on_curve(numpy_(), p, w, voltage, run["motor.supply.frequency"].values, p.ambient.T).tau
-    whole = p.rotor.J + (1.0 + drive.gear_loss) * run["machine.J"].values
-    more = drive.ratio / (1.0 + drive.gear_loss)  # at the crank, after the loss of the gear
+    whole = p.rotor.J + (1.0 + drive.gear.loss) * run["machine.J"].values
+    more = drive.ratio / (1.0 + drive.gear.loss)  # at the crank, after the loss of the gear
     by_hand = (
-        np.max(curve - rotor.J * (curve - (1.0 + drive.gear_loss) * run["machine.tau_bias"].values) / whole)
+        np.max(curve - rotor.J * (curve - (1.0 + drive.gear.loss) * run["machine.tau_bias"].values) / whole)
         * more
     )
     quick = np.max(np.abs(run["motor.air_gap_tau"].values - rotor.d * w - rotor.J * a)) * more
@@ -749,10 +749,12 @@ def test_the_torque_through_a_coupling_by_hand(on_line):
     run, drive = on_line.runs.series["start_up"], on_line.setup.drive
     w, a, gap = (run[f"motor.{name}"].values for name in ("w", "a", "air_gap_tau"))
     p = drive.fmu_parameters.rotor
-    loss = drive.gear_loss
+    loss = drive.gear.loss
     passed = (gap - p.d * w - p.J * a) / (1.0 + loss * np.minimum(w, 1.0))
     assert run["motor.tau"].values[passed > 0.0] == pytest.approx(passed[passed > 0.0], rel=1e-9, abs=1e-9)
-    heavier = dataclasses.replace(drive, added_inertia=0.4 * p.J, gear_inertia=0.1 * p.J)
+    heavier = dataclasses.replace(
+        drive, added_inertia=0.4 * p.J, gear=dataclasses.replace(drive.gear, J=0.1 * p.J)
+    )
     behind = run.assign({"motor.tau": run["motor.tau"] - 0.5 * p.J * run["motor.a"] / (1.0 + loss)})
     bare = drive.parameters.rotor
     by_hand = float(np.max(np.abs(gap - bare.d * w - bare.J * a))) * drive.ratio / (1.0 + loss)
@@ -910,7 +912,7 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
 def test_a_relay_of_a_star_delta_starter_has_its_place():
     """It sits in the phases of the delta, where 8.04 A of the line are 4.64 A; that of the line stood alone."""
     started = like(
-        drive=SimpleNamespace(follows=False, star_delta=True),
+        drive=SimpleNamespace(follows=False, star=True),
         relay_class=10,
         by_analysis={},
         answers={},
@@ -927,7 +929,7 @@ def test_a_relay_of_a_star_delta_starter_has_its_place():
         == words
         == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
     )
-    started.setup.drive.star_delta = None
+    started.setup.drive.star = None
     assert "line_current" not in as_data(_relay_of(started, 8.04), titled=True)
 
 

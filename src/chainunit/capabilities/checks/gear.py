@@ -177,7 +177,7 @@ def check_gear(
 def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> GearCheck | None:
     """The gear of a study, and its `checks`; none for a drive without a gear."""
     runs, drive, tables, table = study.runs, study.setup.drive, study.setup.config.drive, plan.gear
-    sold = drive.gear_rating
+    sold = drive.gear.rating
     if drive.ratio == 1.0:
         return None
     limit = tables.gear.torque_limit if "gear.torque_limit" in tables.given else 0.0

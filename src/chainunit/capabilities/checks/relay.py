@@ -201,7 +201,7 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings |
         return None
     plate = None if study.setup.plate is None else study.setup.plate.nameplate
     # a relay in the phases of a delta carries the current of a winding
-    in_phases = drive.star_delta is not None and plan.relay_in_phases
+    in_phases = bool(drive.star) and plan.relay_in_phases
     share = 1.0 / math.sqrt(3.0) if in_phases else 1.0
     locked = share * plate.rated_current * plate.locked_current_ratio if plate else 0.0
     settings = {
@@ -216,12 +216,12 @@ def find(study: StudyRecord, plan: CheckPlan, checks: Checks) -> RelayFindings |
 
     def current_of(run: xr.Dataset) -> Any:
         current = np.abs(run[f"motor.{drive.motor.current}"].values)
-        return share * (drive.relay_current(run["time"].values, current) if in_phases else current)
+        return share * (drive.star.winding_current(run["time"].values, current) if in_phases else current)
 
     rise = study.runs.series["start_up"].sel(time=slice(None, study.runs.start_end))
     seconds = start_seconds(rise["time"].values, current_of(rise), settings["setting"])
     starts = StartFindings.found_in(study.findings)
-    is_usual = in_phases == (drive.star_delta is not None)
+    is_usual = in_phases == bool(drive.star)
     if starts is not None and drive.rated_current and not starts.stuck and is_usual:
         # the hardest of the starts from all crank angles, which are for a relay at the rated current
         times = share * drive.rated_current / settings["setting"]

@@ -136,7 +136,7 @@ def _read(w: Window, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
     parts: dict[str, float | None] = dict.fromkeys(PLACES)
     parts["winding"] = w.mean("motor.heat")
     parts["windage"] = float(drive.parameters.rotor.d) * squared
-    parts["gear"] = w.mean(gear_loss) if drive.gear_friction or drive.gear_loss else None
+    parts["gear"] = w.mean(gear_loss) if drive.gear.d or drive.gear.loss else None
     # behind a part that slips the gear is a part of the line
     geared = parts["gear"] or 0.0 if drive.line.before_gear is not None else 0.0
     parts["line"] = sum(w.mean(full) for full in line if full in turns) - geared if drive.line else None

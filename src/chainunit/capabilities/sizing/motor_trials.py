@@ -85,7 +85,7 @@ class MotorTrials:
             rating = gear.rating
             if plan.separate_bearing:
                 rating = dataclasses.replace(rating, overhung_load=0.0)
-            drive = dataclasses.replace(drive, gear_name=gear.designation, gear_rating=rating)
+            drive = dataclasses.replace(drive, gear=dataclasses.replace(drive.gear, rating=rating))
             return Candidate(
                 motor, drive, margin=plan.demands.margin, unit=unit_of(gear), series="catalogue", sold=gear
             )

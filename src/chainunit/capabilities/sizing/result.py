@@ -47,7 +47,7 @@ def ordered_gear(
     """The gear to order by this `plan`, and the load that decides; None where there is no drive to order. For
     `inertia_factor` see `chainunit.drives.service_factor`."""
     margin, service = float(plan.demands.margin), plan.gear_factor(inertia_factor)
-    if "gear.torque_limit" in study.setup.config.drive.given and study.setup.drive.gear_rating is None:
+    if "gear.torque_limit" in study.setup.config.drive.given and study.setup.drive.gear.rating is None:
         # a limit that the user gives is checked without the factor of a catalogue
         service = 1.0
     order = gear_order(study, setting, margin, service)
@@ -341,7 +341,7 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
     title, caveat = class_words(study.runs.relay_class), _too_slow(study) or _tolerance(study)
     trip_class = {"value": title, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
-    if study.setup.drive.star_delta is None:
+    if not study.setup.drive.star:
         return MotorProtection(
             InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
         )

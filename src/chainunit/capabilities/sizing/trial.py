@@ -123,9 +123,9 @@ class Trial:
         None for an inverter, or without a start."""
         if self._first is None or self.start_time is None or self.drive.follows:
             return None
-        rise = self._from_rest.sel(time=slice(None, max(self._first, self.drive.switched_until)))
+        rise = self._from_rest.sel(time=slice(None, max(self._first, self.drive.star.end)))
         time, current = (rise[name].values for name in ("time", f"motor.{self.drive.motor.current}"))
-        current = self.drive.relay_current(time, current)
+        current = self.drive.star.winding_current(time, current)
         first = start_seconds(time, current, self.motor.nameplate.rated_current)
         return max(first, *(start.relay_seconds for start in self.starts), 0.0)
 
@@ -353,7 +353,7 @@ class Trial:
 
     def _gear_checks(self) -> dict[str, Check]:
         """The checks of a gear whose permitted torque is known; a gear of a catalogue also has a service factor."""
-        gear, rating = self.task.tables.gear, self.drive.gear_rating
+        gear, rating = self.task.tables.gear, self.drive.gear.rating
         checks = {"gear": Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")}
         starts = [quasi_static_peak(self.drive, self.start), *(s.quasi_static for s in self.starts)]
         hardest, title = max(starts), "torque of the gear in a start"
@@ -372,7 +372,7 @@ def start_check(
     task: SizingTask, motor: CatalogueMotor, drive: Drive, start_time: float | None = None
 ) -> Check:
     """The time of a start [s] beside the permitted one."""
-    check = starting(start_time, motor.nameplate, drive.time_in_star)
+    check = starting(start_time, motor.nameplate, drive.star.time)
     return dataclasses.replace(check, limit=1.0 + 1.2 * task.operation.run.ramp) if drive.follows else check
 
 
@@ -398,9 +398,9 @@ def try_motor(
     # three times as long as the rated torque takes to bring all inertia up to speed, and at least the ramp of
     # the start
     inertia = drive.rotor_inertia + duty.numbers.inertia_mean / drive.ratio**2
-    rise = ramp if drive.star_delta else task.tables.starter_time or ramp
-    late = drive.switched_until + max(1.0, _LATE * start_check(task, motor, drive).limit, 1.5 * rise)
-    window = drive.switched_until + max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
+    rise = ramp if drive.star else task.tables.starter_time or ramp
+    late = drive.star.end + max(1.0, _LATE * start_check(task, motor, drive).limit, 1.5 * rise)
+    window = drive.star.end + max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
     window = min(window, late)
     if operation.empty_start:
         # the run ends with a turn without feed
