@@ -166,7 +166,7 @@ def _show_remarks(loaded: Any) -> None:
 
 
 def _platforms(choice: str | None, fmi: int) -> list[str]:
-    """The platforms that --platforms names; `fmi` is the version, by which "all" has those that it knows."""
+    """The platforms that --platforms names; "all" are the platforms of the version `fmi`."""
 
     from ..fmu.native.platforms import PLATFORMS
 

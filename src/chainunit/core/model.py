@@ -131,7 +131,7 @@ Limits = Iterable[tuple[Any, Any, Any]]
 """Value, lower limit and upper limit of each requirement, in order."""
 
 UNSTATED: Any = None
-"""The default of what follows from the rest of a model unless it is stated."""
+"""The default of a field that follows from the others unless it is stated."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -14,8 +14,8 @@ A second table has motors of high slip, 0.75 to 55 kW with 4 and 6 poles, for ma
 NEMA MG 1, of the class with 8 to 13 % slip. Each is the circuit of the motor of its power rewound (all impedances
 times one factor) with another resistance of its cage, which has no skin effect. The two give a rated slip of 10 % and
 the locked-rotor torque that NEMA MG 1 demands of design D, 2.75 times the rated one. All else of its nameplate is of
-this circuit; frame, inertia, mass and locked-rotor time are those of the next larger motor, as the cage gives off
-more heat.
+this circuit; frame, inertia, mass and locked-rotor time are taken from the next larger motor, as the cage gives
+off more heat.
 
 Files of the user have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
 couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`,

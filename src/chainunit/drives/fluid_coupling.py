@@ -93,7 +93,7 @@ FluidCoupling = slipping(
     text="""\
     A fluid coupling with constant filling between a motor and a machine. A motor that starts feels little load at
     first, as the torque grows with the square of its speed, and a machine that is stuck puts no more on it than the
-    stall torque. Rated power, speed and slip, and the peak factor are those of the data sheet.
+    stall torque. Rated power, speed, slip and peak factor stand in the data sheet.
     """,
     description=(
         "Fluid coupling between motor and machine: torque by the square of the speed, rising with the slip; takes a "

@@ -237,7 +237,7 @@ def _shoot(
     p: Cardan, speed: Any, load: Any, guess: Any, count: int, iterations: int, progress: Progress
 ) -> SteadyMotion:
     """The motions of n lines that repeat themselves after half a turn, by Newton's method on the states at its begin
-    (multiple lines at once: those that are done, or have no finite values, take part no longer).
+    (multiple lines at once: a line that is done, or has no finite values, takes part no longer).
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def _newton_step(error: Any, by: Any, scale: Any, weights: Any) -> Any:
     ----------
     error : in parts of `scale`, the sizes of the states, shape (4, n)
     by : the slopes of the states after half a turn by w1, phi4, w4 and the torque, shape (4, 4, n)
-    weights : the sizes of what changes, shape (4, n)
+    weights : the sizes of the slopes, shape (4, n)
     """
     matrix = by - np.eye(4, 5)[:, 1:, None]
     matrix = np.moveaxis(matrix * weights[None] / scale[:, None], 2, 0)

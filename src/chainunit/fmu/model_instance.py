@@ -20,7 +20,7 @@ NAN = float("nan")
 _IDENTITY = __name__.partition(".")[0]
 """Inside an FMU: the name of its package, which has a hash of all contents of the FMU."""
 _GROWTHS = 3
-"""How often outputs are added to those that are evaluated; after that all are."""
+"""How often outputs join the evaluated ones; after that all are evaluated."""
 
 
 class Settable(NamedTuple):

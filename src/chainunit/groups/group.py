@@ -64,8 +64,8 @@ class SolvedGroup:
         return self._matrix.solve([b for joint, third in joints for b in joint.right(self._rates, third)])
 
     def third_derivatives(self, before: Sequence[Third | None]) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of each link and of each pin that the group adds, from those of the pins and lines
-        before the group, by joint."""
+        """Third derivatives by q of each link and of each pin that the group adds; `before` has the third
+        derivatives of the pins and lines before the group, by joint."""
         z = self._next_rates(before)
         thirds = [_rate(z, k) for k in range(len(self.links))]
         return thirds, [self.links[k].third_derivative(arm, *thirds[k]) for k, arm in self._seats]

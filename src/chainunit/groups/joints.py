@@ -87,14 +87,14 @@ class JointData(Protocol):
     def third_before(
         self, m: LinkageInMotion, links: Mapping[str, Third], pins: Mapping[str, Vec2]
     ) -> Third | None:
-        """The third derivatives of its pin or line on a link before the group, from those of the `links` and `pins`;
-        None if it joins two links of the group."""
+        """The third derivatives of its pin or line on a link before the group, from the third derivatives of the
+        `links` and `pins`; None if it joins two links of the group."""
 
     def opposite(self, m: LinkageInMotion, carrier: str, reaction: Vec2) -> Load:
         """What the opposite reaction does to the link `carrier`."""
 
     def turning(self, m: LinkageInMotion, carrier: str | None, reaction: Vec2) -> Iterator[tuple[str, Load]]:
-        """The derivatives by q of what the present reaction does to its links, as arms and lines turn."""
+        """The derivatives by q of the loads of a constant reaction on its links, as arms and lines turn."""
 
 
 class HingeData(NamedTuple):

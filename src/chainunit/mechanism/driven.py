@@ -46,8 +46,8 @@ def motions_of(xp: Any, linkage: Linkage, q: Any, w: Any, free: Free) -> list[Dr
 
 class DrivenLinkage:
     """A linkage whose drivers have these `motions`: `inertia` has the effort of each driver per acceleration of each
-    [kg m2, kg m, kg], `bias` that at a constant speed of the first one and of those that move by themselves
-    [N m, N], of which `friction` is a part; `effects` are those of the loads."""
+    [kg m2, kg m, kg], `bias` the efforts at a constant speed of the first one and of the ones that move by
+    themselves [N m, N], of which `friction` is a part; `effects` are the effects of the loads."""
 
     __slots__ = ("_moved", "_reactions", "alone", "bias", "effects", "friction", "inertia", "motions")
 
@@ -126,7 +126,7 @@ class DrivenLinkage:
 
     def port(self, number: int, geared: Sequence[bool], a: Any = 0.0) -> tuple[Any, Any]:
         """The inertia that a driver feels, and its effort without its own acceleration. The first one, number 0,
-        drives those that are `geared`, too; `a` is its acceleration."""
+        drives the `geared` ones, too; `a` is its acceleration."""
         if number:
             alone = self.inertia[number][number]
             return alone, self.efforts(a)[number] - alone * self.motions[number].added

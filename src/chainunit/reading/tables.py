@@ -398,8 +398,8 @@ _NO_SIGNS = re.compile(
     + "".join(f"{chr(plane + 0xFFFE)}{chr(plane + 0xFFFF)}" for plane in range(0, 0x110000, 0x10000))
     + "]"
 )
-"""Characters that are no signs of a text: control characters except tab and ends of lines, surrogates, and those that
-Unicode assigns to nothing. XML, and with it an FMU, an SVG and a page, has no place for them."""
+"""Characters that are no signs of a text: control characters except tab and ends of lines, surrogates, and characters
+that Unicode assigns to nothing. XML, and with it an FMU, an SVG and a page, has no place for them."""
 
 
 def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:

@@ -298,7 +298,7 @@ class Times(NamedTuple):
 
 def time_places(table: LoggerTable, place: int | None) -> list[int]:
     """The columns of the time: the one of the given `place`, and beside it one with the date or the time of the day;
-    without it those that hold times."""
+    without it the columns that hold times."""
     kinds = {k: kind for k, cell in enumerate(table.rows[0]) if (kind := _kind(table, k))}
     if place is not None and place not in kinds:
         return [place]
@@ -364,7 +364,7 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
     Raises
     ------
     InputError
-        for times that do not rise, and for those that do not resolve the rows.
+        for times that do not rise, and for times that do not resolve the rows.
     """
     head = table.heads[places[0]]
     if has_times(table, places[0]):

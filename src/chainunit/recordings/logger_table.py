@@ -243,7 +243,7 @@ def is_data(cell: str) -> bool:
 
 
 def _is_row(cells: Sequence[str]) -> bool:
-    """Whether cells are those of a row of measurements: at least half of those that are not empty."""
+    """Whether cells are a row of measurements: at least half of the cells that are not empty are numbers."""
     filled = [cell for cell in cells if not MISSING.fullmatch(cell)]
     return len(cells) > 1 and 2 * sum(map(is_data, filled)) >= max(1, len(filled))
 

@@ -340,8 +340,8 @@ BOTH_SIGNS = 0.5
 
 
 def _without_time(table: LoggerTable, places: Iterable[int]) -> InputError:
-    """The fault of a table without a column of the time: it names those that may be it, besides the columns of
-    quantities at `places`."""
+    """The fault of a table without a column of the time: it names the columns that may be the time, beside the
+    columns of quantities at `places`."""
     may_be = [k for k, unit in enumerate(table.units) if not (unit and of_other_kind(unit, "s"))]
     may_be = [k for k in {*may_be} - {*places} if table.has_numbers(k) or has_times(table, k)]
     may_be.sort(key=lambda k: (not has_times(table, k), "time" not in table.heads[k].lower()))

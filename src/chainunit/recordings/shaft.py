@@ -98,7 +98,7 @@ class MeasuredShaft(AnyPlant):
         return MeasuredShaft(self.machine, self._measured, by)
 
     def parameters(self) -> Iterator[tuple[Variable, float]]:
-        """Those of the machine."""
+        """The parameters of the machine."""
         for v in self.machine.model.parameter_layout.variables:
             yield replace(v, name=f"machine.{v.name}"), float(self.machine.by_name[v.name])
 

@@ -1,5 +1,5 @@
 """The sections of a report on the analyses of a study: a turn at constant speed, starts from several angles, and
-those of the capabilities."""
+the analyses of the capabilities."""
 
 from __future__ import annotations
 

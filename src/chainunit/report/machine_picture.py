@@ -71,7 +71,7 @@ def arrows(
     groups: Mapping[str, str] | None = None,
     hidden: Collection[str] = (),
 ) -> Iterator[Arrow]:
-    """An arrow for each reaction, but those of the `hidden` outputs. `groups` gives the group of an output, `force`
+    """An arrow for each reaction whose output is not `hidden`. `groups` gives the group of an output, `force`
     the components of its reaction [N]."""
     for output, title, joint, short in reactions(machine):
         if output not in hidden:

@@ -275,7 +275,7 @@ def _parted(table: Table, units: Units, room: int) -> list[Table]:
 
 
 def _columns(table: Table) -> list[list[Cell]]:
-    """The cells of each column, the first of which is its head, and after them those of the notes."""
+    """The cells of each column, the first of which is its head, and after them the cells of the notes."""
     heads: list[Cell] = [column.short or column.title for column in table.columns] or [""] * table.width
     columns = [[head, *(row.cells[k] for row in table.rows)] for k, head in enumerate(heads)]
     return [*columns, [table.note_title, *(row.note for row in table.rows)]] if table.note_title else columns

@@ -1,4 +1,4 @@
-"""The analyses of a study, in the order in which they are made: those of the base, then those of the capabilities.
+"""The analyses of a study, in the order in which they are made: the base, then the capabilities.
 Two short ones of the base stand here: the ripple without feed-forward, and the loss of the gear."""
 
 from __future__ import annotations

@@ -289,8 +289,8 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
 
 
 def _of_tables(data: Mapping[str, Any], source: str) -> Config:
-    """See `of_tables`. Faults of single values are refused together with those of the whole study that do not depend
-    on them."""
+    """See `of_tables`. Faults of single values are refused together with the faults of the whole study that do not
+    depend on them."""
     in_system, kind_faults = with_frictions(with_linkage(data))
     parts, faults = check_values(in_system, source)
     faults = [*kind_faults, *faults]

@@ -244,7 +244,7 @@ def _of_motor(name: str) -> Iterator[Key]:
 
 
 def _of_section(name: str, section: FileSection) -> Iterator[Key]:
-    """The keys of a declared table of that name: its quantities, its other keys, and those that may stand instead."""
+    """The keys of a declared table of that name: its quantities, its other keys, and keys that may stand instead."""
     values = _study().table(name)
     if values is None:
         values = section.default or section.declaration()
@@ -308,7 +308,7 @@ def _of_event(event_type: type[Event]) -> Iterator[Key]:
 
 
 def _of_entry(entry: TableList) -> Iterator[Key]:
-    """The keys of an entry in a list of tables: those that are no quantities, then its quantities."""
+    """The keys of an entry in a list of tables: first keys that are no quantities, then its quantities."""
     for key in _of_fields(entry.keys):
         yield dataclasses.replace(key, follows=entry.follows.get(key.name, ""))
     if entry.declared is not None:

@@ -170,7 +170,7 @@ def _deviation(entry: Entry, variable: Variable, value: float) -> float:
 def _run(
     entry: Entry, name: str, crank_speed: float, numbers: Mapping[str, tuple[Variable, float]], source: str
 ) -> PlannedRun:
-    """A run of the file; `numbers` are those of the study that an amount may be added to, by their full names."""
+    """A run of the file; `numbers` are the numbers of the study to which a run may add, by their full names."""
     content = entry.given
     if not _NAME.fullmatch(name):
         reason = "must begin with a small letter, and have at most 20 small letters, digits and _"

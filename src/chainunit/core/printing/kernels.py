@@ -141,7 +141,7 @@ def groups_without_slopes(model: Model) -> set[int]:
 def _start(
     t: Trace, unknowns: Any, single: Callable[..., ModelFunction], last: str
 ) -> Iterator[ModelFunction]:
-    """The functions that give the states at the start; `unknowns` are those of the start in symbols,
+    """The functions that give the states at the start; `unknowns` are the unknowns of the start in symbols,
     `single` makes a function with one group, and `last` is the letter of the derived values, or empty."""
     import casadi
 

@@ -1,4 +1,4 @@
-"""Functions in Python from statements ``aN=expression``, each after those that it needs. Python FMUs carry it."""
+"""Functions in Python from statements ``aN=expression``, each after the ones that it needs. Python FMUs carry it."""
 
 from __future__ import annotations
 

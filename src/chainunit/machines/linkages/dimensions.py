@@ -24,8 +24,8 @@ Dimensions = Mapping[str, Dimension | None]
 
 
 def checked_dimension(text: str, dimensions: Dimensions, unit: str | None) -> Dimension | None:
-    """The dimension of an expression; `dimensions` has those of the names, extremes and tables in it, None for one
-    that is not known yet. One of numbers alone takes any dimension, as a number does.
+    """The dimension of an expression; `dimensions` has the dimension of each name, extreme and table in it, None for
+    one that is not known yet. One of numbers alone takes any dimension, as a number does.
 
     Raises
     ------

@@ -268,8 +268,8 @@ class EntryReader(Entry):
         return units_by_name
 
     def count(self, *expressions: Expression) -> None:
-        """Add the points of the tables in the expressions of a load or of a parameter to those of the file: a table
-        over phi counts once in all of them, a table over x as often as it is looked up.
+        """Add the points of the tables in the expressions of a load or of a parameter to the number of the file: a
+        table over phi counts once in all of them, a table over x as often as it is looked up.
 
         Raises
         ------

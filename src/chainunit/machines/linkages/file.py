@@ -545,8 +545,8 @@ class _LinkageReader(LoadReader):
         drivers: list[dict[str, Any]],
         tables: Mapping[str, Any],
     ) -> dict[str, Any]:
-        """The value of the driver at the start, and the poses of all links there; `values` are those of the
-        parameters."""
+        """The value of the driver at the start, and the poses of all links there; `values` are the values
+        of the parameters."""
         table = self.table("start")
         self.keys("start", table, ("phi", "points", "angles", "poses"))
 

@@ -202,8 +202,8 @@ class LinkageDescription(LinkageOutputs):
     # declarations
 
     def _parameters(self) -> Any:
-        """The declaration of the parameters: those of the file, bodies of links with quantities of their own, and the
-        common ones of all machines. The ratio of a driver that swings has one allowed value, see `_FIXED_RATIO`."""
+        """The declaration of the parameters: the ones of the file, bodies of links with quantities of their own, and
+        the common ones of all machines. A driver that swings has one allowed ratio, see `_FIXED_RATIO`."""
         fields = [_field_of(entry) for entry in self.data.get("parameters", ())]
         for link in self.data["links"]:
             if quantities := link.get("own", {}):

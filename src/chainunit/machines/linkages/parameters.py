@@ -1,5 +1,5 @@
-"""The parameters and inputs of a linkage file: those of the user, also as expressions of others, and those that every
-linkage has."""
+"""The parameters and inputs of a linkage file: the ones of the user, also as expressions of others, and the
+ones of every linkage."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ class ParameterReader(EntryReader):
         return self.number("", bound, unit)
 
     def start_values(self, parameters: Iterable[Mapping[str, Any]]) -> dict[str, float]:
-        """The start values of parameters by name, also of those that are expressions of others. Entries that have no
+        """The start values of parameters by name, also of expressions of others. Entries that have no
         finite value with them are faulted."""
         values = {parameter["name"]: float(parameter["value"]) for parameter in parameters}
 

@@ -39,7 +39,7 @@ class LinkageParts:
         Parameters
         ----------
         sides : the assembly modes, of a triad or tetrad the turns of its coordinates, by the first link of each group
-        courses : those of the drivers besides the first one, by the joint of each
+        courses : the courses of further drivers, by the joint of each
         """
         self.geometry, self.structure, self.sides = geometry, geometry.structure, sides
         self.frames: dict[str, LinkFrame] = {GROUND: OWN}

@@ -26,7 +26,7 @@ class PlacedPart:
     inertia_before: float = 0.0
     """inertia that turns with its shaft on the motor's side [kg m2]"""
     table: Any = None
-    """the values of its table with those that follow from the drive, if it has such values"""
+    """the values of its table, completed by the drive, if the drive completes them"""
     slips: bool = False
     """whether its driven shaft has a speed of its own, so that the gear behind it turns with this shaft"""
     decouples: bool = False

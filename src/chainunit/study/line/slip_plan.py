@@ -51,7 +51,7 @@ class SlipPlan(ABC):
         return 0.0
 
     def rated(self, plate: Nameplate | None) -> dict[str, float]:
-        """Its rated power [W] and speed [rad/s]: those of the file, or of the motor.
+        """Its rated power [W] and speed [rad/s]: from the file, or from the motor.
 
         Raises
         ------

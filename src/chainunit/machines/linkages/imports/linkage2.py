@@ -70,7 +70,7 @@ class LinkageDrawing(ForeignLinkage):
         self.drivers.append(ForeignDriver(title, tuple(pins), throw=way))
 
     def pins(self, title: str, ends: list[Element]) -> list[str]:
-        """The pins of connectors; those that are missing are faults."""
+        """The pins of connectors; missing ones are faults."""
         names = {_id(end): self.names["connector"].get(_id(end), "") for end in ends}
         for missing in (end for end, name in names.items() if not name):
             self.fault(title, f"names connector {missing}, which is not in the file")
