@@ -585,7 +585,7 @@ def doubted_words(figures: Mapping[str, Any]) -> str:
     f = figures
     return (
         f"{f['machines']} machines, of which {f['told']} are told. Of these, {f['both']} have both wrong numbers "
-        f"among their suspects, which are {f['suspects']:.0f} (median), {f['shown']} have all those that the "
+        f"among their suspects, which are {f['suspects']:.0f} (median), {f['shown']} have all numbers that the "
         f"recordings show to be wrong if all others are right, and {f['one']} have one at least; "
         f"{f['first']} have the two as first set of suspects. An identification with its suspects takes "
         f"{f['seconds']:.0f} s (median)."
