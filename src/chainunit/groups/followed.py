@@ -8,15 +8,18 @@ In a linkage with one crank the coordinates are smooth periodic functions of the
 follows them once around, from the mode to which `assembly` leads at the crank angle `start`, and keeps them as a
 Fourier series. At any angle the series gives coordinates that are nearly right, and Newton's method makes them exact.
 So they depend on the crank angle alone, independent of the step and the history. The branch cannot jump; a branch
-that ends within the turn has a misfit.
+that ends within the turn has a misfit. A group that comes near to a dead position moves sharply there: it is followed
+in smaller steps, and Newton's method takes more of its own.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from itertools import pairwise, repeat
+from typing import Any, ClassVar, NamedTuple
 
+from ..core.engines import MATH
 from ..core.planar import Motion, Vec2
 from .block import minus_cofactors
 from .group import Group, SolvedGroup
@@ -32,6 +35,14 @@ MOST_MISFIT = 1e-10
 """Largest misfit of a leg that counts as closed, in parts of its length."""
 STEPS = 3
 """Steps of Newton's method from the series: three remove an error of 1e-3, as of a pose that moves sharply."""
+MOST_STEPS = 6
+"""Most steps of Newton's method from the series of a group that moves sharply."""
+MOST_PARTS = 32
+"""Most parts into which the way between two samples of such a group is divided."""
+_CLOSE_LOOK = 720
+"""Number of crank angles at which the misfit of such a group is looked over."""
+_SAME = 1e-6
+"""Difference of coordinates up to which two courses are on the same branch."""
 TERMS = 2 * HARMONICS + 1
 """Number of values in such a series; a group derives two more, the largest misfit and the least margin."""
 
@@ -50,6 +61,19 @@ def corrected(
         moved = (sum(leg.gap * row[k] for leg, row in zip(legs, minus, strict=True)) for k in range(len(x)))
         x = tuple(place + dx * minus_per for place, dx in zip(x, moved, strict=True))
     return x
+
+
+class Tracking(NamedTuple):
+    """How a group is followed: how often each coordinate `turns` counter-clockwise in a turn of the crank, none at
+    all if it is empty (the rest of it is periodic); the number of `parts` of the way between two samples, 1 if it is
+    empty; and the `steps` of Newton's method from the series."""
+
+    turns: Sequence[float] = ()
+    parts: Sequence[int] = ()
+    steps: int = STEPS
+
+
+USUAL = Tracking()
 
 
 class SolvedOnLegs(SolvedGroup):
@@ -84,16 +108,15 @@ class SolvedOnLegs(SolvedGroup):
 
 class FollowedGroup(Group):
     """A group of plates on legs as data. `assembly` are coordinates from which Newton's method leads to the assembly
-    mode at the crank angle `start` [rad]; `turns` is how often each coordinate turns counter-clockwise in a turn of
-    the crank, none at all if it is empty: the rest of it is periodic. Its bars are its `legs`, then its plates;
-    `kind` and `name` are for a refusal."""
+    mode at the crank angle `start` [rad], from which it is followed with a `tracking`. Its bars are its `legs`, then
+    its plates; `kind` and `name` are for a refusal."""
 
     kind: ClassVar[str]
     name: str
     legs: Sequence[Leg]
     assembly: Sequence[Any]
     start: float
-    turns: Sequence[float]
+    tracking: Tracking
 
     def at_position(self, linkage: LinkageInMotion) -> Any:
         """What it needs of the linkage `linkage` before it."""
@@ -111,9 +134,9 @@ class FollowedGroup(Group):
         """The group with the linkage `linkage` before it, on the branch that the series `derived` gives."""
         placed = self.at_position(linkage)
         near = values_of(derived, len(self.assembly), TERMS, xp.cos(q), xp.sin(q))
-        for k, turn in enumerate(self.turns):
+        for k, turn in enumerate(self.tracking.turns):
             near[k] = near[k] + turn * q if turn else near[k]
-        return self.solved(xp, placed, self._corrected(xp, placed, near, STEPS))
+        return self.solved(xp, placed, self._corrected(xp, placed, near, self.tracking.steps))
 
     def _corrected(self, xp: Any, placed: Any, near: Sequence[Any], steps: int) -> tuple[Any, ...]:
         return corrected(lambda x: self.legs_at(xp, placed, x), near, steps)
@@ -122,19 +145,82 @@ class FollowedGroup(Group):
         self, xp: Any, before: Callable[[float], LinkageInMotion], angles: Sequence[float]
     ) -> list[tuple[Any, ...]]:
         """The coordinates at these crank angles, each from the ones before it."""
-        course = [self._corrected(xp, self.at_position(before(angles[0])), self.assembly, 8)]
-        for q in angles[1:]:
-            near = course[-1]
-            if len(course) > 1:
-                near = tuple(2.0 * now - last for now, last in zip(near, course[-2], strict=True))
-            course.append(self._corrected(xp, self.at_position(before(q)), near, STEPS))
+        x, last, ratio = self._corrected(xp, self.at_position(before(angles[0])), self.assembly, 8), None, 1.0
+        course, parts_before = [x], 1
+        for (low, high), parts in zip(pairwise(angles), self.tracking.parts or repeat(1), strict=False):
+            ratio = parts_before / parts
+            x, last = self._moved(xp, before, (x, last), (low, high), parts, ratio)
+            course.append(x)
+            parts_before = parts
         return course
 
-    def turns_in_a_turn(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> tuple[float, ...]:
-        """How often each coordinate turns in a turn of the crank, see `turns`."""
+    def _moved(
+        self,
+        xp: Any,
+        before: Callable[[float], LinkageInMotion],
+        x_last: tuple[tuple[Any, ...], tuple[Any, ...] | None],
+        way: tuple[float, float],
+        parts: int,
+        ratio: float,
+    ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """The coordinates at the end of a way, and before its last part; `x_last` are those at its begin and before
+        it, and `ratio` is the size of its parts over that of the part before it."""
+        (x, last), (low, high) = x_last, way
+        for part in range(1, parts + 1):
+            q, near = (high if part == parts else low + (high - low) * part / parts), x
+            if last is not None:
+                near = tuple((1.0 + ratio) * a - ratio * b for a, b in zip(x, last, strict=True))
+            x, last, ratio = self._corrected(xp, self.at_position(before(q)), near, STEPS), x, 1.0
+        assert last is not None
+        return x, last
+
+    def tracked(self, before: Callable[[float], LinkageInMotion]) -> Tracking:
+        """How the group is followed with numbers, see `Tracking`; `before` gives the linkage before it at a crank
+        angle [rad]."""
+        self.tracking = usual = Tracking(self._turns(before))
+        if self.derive(MATH, before)[-2] <= MOST_MISFIT:
+            return usual
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
-        first, *_, last = self._followed(xp, before, angles)
+        self.tracking = Tracking(parts=[MOST_PARTS] * SAMPLES)
+        parts = self._least_parts(before, angles, self._followed(MATH, before, angles))
+        for steps in range(STEPS, MOST_STEPS + 1):
+            self.tracking = Tracking(parts=parts)
+            self.tracking = Tracking(self._turns(before), parts, steps)
+            if self._largest_misfit(before) <= MOST_MISFIT:
+                return self.tracking
+        return usual
+
+    def _least_parts(
+        self,
+        before: Callable[[float], LinkageInMotion],
+        angles: Sequence[float],
+        course: Sequence[tuple[float, ...]],
+    ) -> list[int]:
+        """The least number of parts of each way between the `angles` that leads to the `course` there."""
+        x, last, chosen = course[0], None, [1]
+        for way, aim in zip(pairwise(angles), course[1:], strict=True):
+            parts = 1
+            while True:
+                end, before_end = self._moved(MATH, before, (x, last), way, parts, chosen[-1] / parts)
+                if math.dist(end, aim) < _SAME or parts == MOST_PARTS:
+                    break
+                parts *= 2
+            x, last = end, before_end
+            chosen.append(parts)
+        return chosen[1:]
+
+    def _turns(self, before: Callable[[float], LinkageInMotion]) -> tuple[float, ...]:
+        """How often each coordinate turns in a turn of the crank."""
+        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
+        first, *_, last = self._followed(MATH, before, angles)
         return tuple(float(round((b - a) / (2.0 * math.pi))) for a, b in zip(first, last, strict=True))
+
+    def _largest_misfit(self, before: Callable[[float], LinkageInMotion]) -> float:
+        """The largest misfit of a leg around the turn, looked over closely."""
+        series = self.derive(MATH, before)
+        angles = (2.0 * math.pi * k / _CLOSE_LOOK for k in range(_CLOSE_LOOK))
+        groups = (self.solve(MATH, q, before(q), series) for q in angles)
+        return max(min(float(leg.misfit(MATH)), 1.0) for group in groups for leg in group.legs)
 
     def derive(self, xp: Any, before: Callable[[float], LinkageInMotion]) -> list[Any]:
         """The series of the coordinates over the crank angle, the largest misfit and the least margin around;
@@ -142,7 +228,7 @@ class FollowedGroup(Group):
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
         courses = zip(*self._followed(xp, before, angles), strict=True)
         series: list[Any] = []
-        for course, turn in zip(courses, self.turns or [0.0] * len(self.assembly), strict=True):
+        for course, turn in zip(courses, self.tracking.turns or [0.0] * len(self.assembly), strict=True):
             values = [x - turn * q for x, q in zip(course, angles, strict=True)] if turn else course
             series += series_of(values, angles, HARMONICS)
         # the misfit as in a run, at angles halfway between the samples

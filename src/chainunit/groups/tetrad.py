@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar
-from .followed import TERMS, FollowedGroup, SolvedOnLegs
+from .followed import TERMS, USUAL, FollowedGroup, SolvedOnLegs, Tracking
 from .joints import Guide, GuideData, Hinge, HingeData, Joint, JointData, LinkageInMotion, Rail, Slide
 from .legs import PLATE, Leg, LegAt
 
@@ -82,7 +82,7 @@ class Tetrad(FollowedGroup):
     legs: tuple[Leg, Leg]
     assembly: tuple[Any, Any]
     start: float = 0.0
-    turns: Sequence[float] = ()
+    tracking: Tracking = USUAL
 
     @property
     def bars(self) -> tuple[Bar, ...]:

@@ -29,7 +29,7 @@ from ..core.engines import MATH
 from ..core.model import Requirement
 from ..core.planar import Motion, Vec2
 from .body import Bar, Mass
-from .followed import MOST_MISFIT, TERMS, FollowedGroup, SolvedOnLegs, corrected
+from .followed import MOST_MISFIT, TERMS, USUAL, FollowedGroup, SolvedOnLegs, Tracking, corrected
 from .joints import JointData, LinkageInMotion
 from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
@@ -75,7 +75,7 @@ class Triad(FollowedGroup):
     points: Mapping[str, tuple[Any, Any]]
     assembly: Pose
     start: float = 0.0
-    turns: Sequence[float] = ()
+    tracking: Tracking = USUAL
 
     @property
     def bars(self) -> tuple[Bar, ...]:

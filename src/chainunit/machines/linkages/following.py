@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from ...core.engines import MATH
 from ...core.errors import InputError
-from ...groups.followed import MOST_MISFIT, FollowedGroup
+from ...groups.followed import MOST_MISFIT, FollowedGroup, Tracking
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
 from .closing import LEAST_MARGIN, dead_group, open_group
@@ -289,17 +289,17 @@ def lesser(xp: Any, a: Any, b: Any) -> Any:
 # groups without a closed form
 
 
-def turns_of_followed(linkage: Linkage) -> dict[str, tuple[float, ...]]:
-    """How often the coordinates of each triad and tetrad turn in a turn of the crank, by name; the groups of the
-    linkage have them from here on. Those from the first one on that does not close have none."""
-    turns = {}
+def trackings(linkage: Linkage) -> dict[str, Tracking]:
+    """How each triad and tetrad is followed around the turn, by name; the groups of the linkage have it from here on.
+    From the first group on that does not close there is none."""
+    tracks = {}
     with suppress(ArithmeticError, ValueError):
         for k, group in enumerate(linkage.groups):
             if isinstance(group, FollowedGroup):
                 before = linkage.before(k)
                 placed = partial(Mechanism, MATH, before, derived=derived_numbers(MATH, before))
-                turns[group.name] = group.turns = group.turns_in_a_turn(MATH, placed)
-    return turns
+                tracks[group.name] = group.tracking = group.tracked(placed)
+    return tracks
 
 
 def misfits(linkage: Linkage, derived: Sequence[Any]) -> Iterator[tuple[FollowedGroup, Any]]:

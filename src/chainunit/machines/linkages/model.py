@@ -38,7 +38,7 @@ from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import DirectMachine, InverseMachine, names_of, slopes, words_on_motion
 from .closing import LEAST_MARGIN
 from .declarations import LinkageMotion, LinkBody, common_parameters, with_differing
-from .following import FollowedLinkage, lesser, misfits, signed, turns_of_followed
+from .following import FollowedLinkage, lesser, misfits, signed, trackings
 from .further import BACK, FurtherDrivers
 from .geometry import LinkGeometry, start_sides
 from .joint_kind import CAM
@@ -185,7 +185,7 @@ class LinkageDescription(LinkageOutputs):
         geometry = LinkGeometry(MATH, self.structure, self.values(MATH, p, u))
         self.sides: dict[str, Any] = dict(start_sides(geometry))
         self.at_start = self._loaded(self._parts(geometry, u), p)
-        self.sides |= turns_of_followed(self.at_start)
+        self.sides |= trackings(self.at_start)
         self.followed = self._followed(self.at_start)
         self.link_turns = self._turns()
         self.start_derived = self.followed.derived

@@ -10,6 +10,7 @@ from ...core.planar import Vec2, rotated
 from ...groups.body import Bar, Mass
 from ...groups.driver import Course, Crank, Cylinder, Driver, Elbow, Ram
 from ...groups.dyad import PRP, RPP, RPR, RRP, Dyad
+from ...groups.followed import USUAL
 from ...groups.group import Group
 from ...groups.joints import GuideData, HingeData, Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
@@ -38,7 +39,7 @@ class LinkageParts:
         """
         Parameters
         ----------
-        sides : the assembly modes, of a triad or tetrad the turns of its coordinates, by the first link of each group
+        sides : the assembly modes, of a triad or tetrad its `Tracking`, by the first link of each group
         courses : the courses of further drivers, by the joint of each
         """
         self.geometry, self.structure, self.sides = geometry, geometry.structure, sides
@@ -281,7 +282,7 @@ class LinkageParts:
             plate.points,
             Pose(*self.structure.poses[ternary]),
             self.structure.start,
-            self.sides.get(ternary, ()),
+            self.sides.get(ternary, USUAL),
         )
 
     def _tetrad(self, links: Sequence[str], joints: Sequence[JointEntry]) -> Group:
@@ -290,8 +291,8 @@ class LinkageParts:
         first, x1 = self._plate(links[0], joints[0], joints[2:4])
         second, x2 = self._plate(links[1], joints[1], joints[4:])
         one, other = (self._leg(links[k], joints[k], joints[k + 2], links[1]) for k in (2, 3))
-        turns = self.sides.get(links[0], ())
-        return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, turns)
+        tracking = self.sides.get(links[0], USUAL)
+        return Tetrad(links[0], (first, second), (one, other), (x1, x2), start, tracking)
 
     def _plate(self, link: str, outer: JointEntry, inner: Sequence[JointEntry]) -> tuple[Plate, Any]:
         """A plate of a tetrad, by its `outer` joint and those with the legs, and its rough coordinate."""
