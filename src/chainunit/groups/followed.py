@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import pairwise, repeat
 from typing import Any, ClassVar, NamedTuple
 
@@ -178,17 +179,23 @@ class FollowedGroup(Group):
         """How the group is followed with numbers, see `Tracking`; `before` gives the linkage before it at a crank
         angle [rad]."""
         self.tracking = usual = Tracking(self._turns(before))
-        if self.derive(MATH, before)[-2] <= MOST_MISFIT:
-            return usual
+        with suppress(ArithmeticError, ValueError):
+            if self.derive(MATH, before)[-2] <= MOST_MISFIT or self._finely_tracked(before):
+                return self.tracking
+        return usual
+
+    def _finely_tracked(self, before: Callable[[float], LinkageInMotion]) -> bool:
+        """Whether the group closes all the way round if it is followed in smaller steps, which it keeps."""
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
         self.tracking = Tracking(parts=[MOST_PARTS] * SAMPLES)
         parts = self._least_parts(before, angles, self._followed(MATH, before, angles))
+        self.tracking = Tracking(parts=parts)
+        turns = self._turns(before)
         for steps in range(STEPS, MOST_STEPS + 1):
-            self.tracking = Tracking(parts=parts)
-            self.tracking = Tracking(self._turns(before), parts, steps)
+            self.tracking = Tracking(turns, parts, steps)
             if self._largest_misfit(before) <= MOST_MISFIT:
-                return self.tracking
-        return usual
+                return True
+        return False
 
     def _least_parts(
         self,
