@@ -477,7 +477,8 @@ class _LinkageReader(LoadReader):
                 self.fault(
                     f"{key}.link",
                     f"{link} must have one revolute joint with the ground; it has {len(pivots)}: give it a point "
-                    "with the name of a point in [ground]",
+                    'with the name of a point in [ground]; a motor between two moving links has joint = "NAME", their '
+                    "pin, in place of link",
                 )
                 return {}, None
             pivot = pivots[0]
