@@ -67,6 +67,9 @@ class Multibody:
         if self.wheels:
             x = self.closed(self.start, self.rough)
             phases = {joint["name"]: self.lag(x, joint) for joint in self.joints if joint["type"] == "gear"}
+            phases |= {
+                joint["name"]: self.belt(x, joint)[0] for joint in self.joints if joint["type"] == "belt"
+            }
             for joint in self.joints:
                 if joint["type"] == "rack":
                     d, radius = self.pitch_line(x, joint)
@@ -128,6 +131,17 @@ class Multibody:
         d = self.line(x, guide)
         (p, _), (c, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
         return d, turned(d) @ (p - c)
+
+    def belt(self, x, joint):
+        """How far a belt has run off the pulley `on` and not onto that of `by`, and its derivatives by the unknowns:
+        the pulleys wind it, and so does the line of their centres as it turns around both."""
+        r, s = (0.5 * diameter for diameter in joint["diameters"])
+        s = -s if joint["crossed"] else s
+        (c, c_by), (e, e_by) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+        (on, on_by), (by, by_by) = (self.angle(x, joint[end][0]) for end in ("on", "by"))
+        turn_by = turned(e - c) @ (e_by - c_by) / ((e - c) @ (e - c))
+        arm = self.angle(x, joint["third"])[0]
+        return r * on - s * by + (s - r) * arm, r * on_by - s * by_by + (s - r) * turn_by
 
     def at_the_start(self, x, joint):
         """The gap of the wheel of a gear at the start, or of the rack, which has its rough place."""
@@ -195,6 +209,14 @@ class Multibody:
                     gaps.append(angle - self.rough[self.columns(wheel)][2])
                 rows.append(row)
                 continue
+            if joint["type"] == "belt":
+                gap, row = self.belt(x, joint)
+                gap -= self.phases.get(joint["name"], 0.0)
+                if joint["name"] not in self.phases:
+                    gap, row = self.angle(x, self.wheels[joint["name"]])
+                    gap -= self.rough[self.columns(self.wheels[joint["name"]])][2]
+                gaps, rows = [*gaps, gap], [*rows, row]
+                continue
             if joint["type"] == "rack":
                 d, radius = self.pitch_line(x, joint)
                 (p, p_by), (c, c_by) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
@@ -256,7 +278,7 @@ class Multibody:
         """The numbers of the equations of angles."""
         found, k = set(), 0
         for joint in self.joints:
-            k += 1 if joint["type"] in ("gear", "rack") else 2
+            k += 1 if joint["type"] in ("gear", "belt", "rack") else 2
             if joint["type"] == "prismatic":
                 found.add(k - 1)
         return found | {k + n for n, driver in enumerate(self.drivers) if not driver["linear"]}
@@ -335,6 +357,11 @@ class Multibody:
         left = iter(factors)
         for joint in self.joints:
             one, name = next(left), joint["name"]
+            if joint["type"] == "belt":
+                (c, _), (e, _) = (self.place(x, *self.end(joint, end)) for end in ("on", "by"))
+                force = (e - c) / np.hypot(*(e - c)) * one
+                found |= {f"{name}.fx": force[0], f"{name}.fy": force[1]}
+                continue
             if joint["type"] in ("gear", "rack"):
                 force = (
                     self.mesh(x, joint)[1] if joint["type"] == "gear" else self.pitch_line(x, joint)[0]

@@ -232,7 +232,7 @@ CHANGES = [
      [(35, "joints.mesh.teeth", "is missing; must be two whole numbers > 0, the teeth of ram and of crank"),
       (39, "joints.mesh.ratio", "unknown key; known here")]),
     (added('[joints.mesh]\ntype = "belt"\non = "ram.C"\nby = "crank.A"'),
-     [(36, "joints.mesh.type", "a belt between links is not possible yet")]),
+     [(35, "joints.mesh.diameters", "is missing; must be two lengths > 0, the pitch diameters of ram and of crank")]),
     (added('[joints.A]\non = "rod.A"\nby = "crank.A"\nfriction = 0.2\ndiameter = "30 mm"'),
      [(38, "joints.A.friction", "stands in [pins.A], or for all in [pins]"),
       (39, "joints.A.diameter", "stands in [pins.A], or for all in [pins]")]),

@@ -40,8 +40,7 @@ from .load_entries import LoadReader
 from .model import machine_of
 from .names import model_name, name_fault
 from .shared_pins import shared_pins
-from .start import StartPose
-from .start_branches import check_start
+from .start import StartPose, check_start
 from .way import WHOLE
 
 TABLES = (
@@ -53,7 +52,6 @@ _LAW_PLACES = 96
 """Places of the first driver at which a law is checked."""
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
-_DRIVES = ("belt", "chain", "rolling")
 """Kinds of joints of other programs."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 _FURTHER_KEYS = (*_DRIVER_KEYS, "phi", "by", "start")
@@ -348,9 +346,8 @@ class _LinkageReader(LoadReader):
         kind_name = kind_of(table)
         kind = KINDS.get(str(kind_name))
         if kind is None:
-            drive = "; a belt between links is not possible yet" * (kind_name in _DRIVES)
             possible = " or ".join(f'"{possible_name}"' for possible_name in KINDS)
-            self.fault(f"{key}.type", f"is {shown(kind_name)}; must be {possible}{drive}")
+            self.fault(f"{key}.type", f"is {shown(kind_name)}; must be {possible}")
             return None
         loss_table, loss_keys = kind.losses
         for loss in {*loss_keys} & {*table}:
@@ -477,8 +474,8 @@ class _LinkageReader(LoadReader):
                 self.fault(
                     f"{key}.link",
                     f"{link} must have one revolute joint with the ground; it has {len(pivots)}: give it a point "
-                    'with the name of a point in [ground]; a motor between two moving links has joint = "NAME", their '
-                    "pin, in place of link",
+                    "with the name of a point in [ground]; a motor between two moving links has "
+                    'joint = "NAME", their pin, in place of link',
                 )
                 return {}, None
             pivot = pivots[0]

@@ -68,7 +68,8 @@ class Rolling(NamedTuple):
         return arm.u, rotated(source.u, mirrored(arm.u))
 
 
-class MeshData(NamedTuple):
+@dataclass(frozen=True)
+class MeshData:
     """The mesh of two wheels as data: the pitch point `pin`, a point of the arm, the wheel `link` on which its force
     acts, on the pin `centre`, the wheel `by` from which it acts, None for the ground, and how the first one turns."""
 
@@ -157,7 +158,16 @@ class GearedLink(Group):
     def joints(self) -> tuple[JointData, ...]:
         """Its pin and its mesh."""
         bar = self.bar
-        return HingeData(bar.pin, bar.name), MeshData(self.mesh, bar.name, bar.pin, self.by, self.rolling)
+        return HingeData(bar.pin, bar.name), self.mesh_data
+
+    @property
+    def mesh_data(self) -> MeshData:
+        """Its mesh as data."""
+        return MeshData(self.mesh, self.bar.name, self.bar.pin, self.by, self.rolling)
+
+    def mesh_at(self, linkage: LinkageInMotion, centre: Motion, turns: Sequence[Any]) -> Placed:
+        """Its mesh with the wheel at its `centre`; `turns` are the derivatives by q of the angle of the wheel."""
+        return Mesh(linkage.pins[self.mesh].p - centre.p, centre, turns)
 
     @property
     def circles(self) -> tuple[tuple[str, str], ...]:
@@ -187,8 +197,9 @@ class GearedLink(Group):
         u = rotated(rotated(wheel, Vec2(derived[2], derived[3])), arm)
         links = linkage.links
         turns = rolling.turn(lambda name: links[name].t1), rolling.turn(lambda name: links[name].t2)
-        mesh = Mesh(linkage.pins[self.mesh].p - centre.p, centre, turns)
-        return SolvedGroup([(centre, u)], (Hinge(0, base=centre), mesh), margin)
+        return SolvedGroup(
+            [(centre, u)], (Hinge(0, base=centre), self.mesh_at(linkage, centre, turns)), margin
+        )
 
 
 class GearKind(SingleLinkKind):
@@ -224,9 +235,24 @@ class GearKind(SingleLinkKind):
             )
         joint |= {"teeth": teeth, "internal": internal}
 
+    def ratio(self, joint: JointEntry, link: str) -> Fraction:
+        """How often a wheel turns per turn of the other one, seen from the arm."""
+        on, by = joint.table["teeth"]
+        ratio = Fraction(by, on) if link == joint.on[0] else Fraction(on, by)
+        return ratio if joint.table["internal"] else -ratio
+
     def complete(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> None:
         """Add the arm with its points at the centres, and the pitch point, which it carries by the name of the
         joint."""
+        if self.held(reader, joint, joints):
+            (z, other), sign = joint["teeth"], -1 if joint["internal"] else 1
+            share, arm = z / (z + sign * other), joint["third"]
+            a, b = (reader.points[arm][point] for point in joint["held"])
+            place = [f"({x}) + {share!r} * (({y}) - ({x}))" for x, y in zip(a, b, strict=True)]
+            joint |= {"points": {arm: {joint["name"]: place}}}
+
+    def held(self, reader: EntryReader, joint: JointTable, joints: Sequence[JointTable]) -> bool:
+        """Add the arm with its points at the centres; returns whether the file has no fault so far."""
         key, wheels = f"joints.{joint['name']}", (joint["on"][0], joint["by"][0])
         centres = [_pinned(reader, joint[end], joints) for end in ("on", "by")]
         arm = next(
@@ -240,11 +266,9 @@ class GearKind(SingleLinkKind):
                 "the ground; name the centres of the wheels in `on` and `by`",
             )
         elif not reader.errors:
-            (z, other), sign = joint["teeth"], -1 if joint["internal"] else 1
-            share, held = z / (z + sign * other), [centre[arm] for centre in centres]
-            a, b = (reader.points[arm][point] for point in held)
-            place = [f"({x}) + {share!r} * (({y}) - ({x}))" for x, y in zip(a, b, strict=True)]
-            joint |= {"third": arm, "held": held, "points": {arm: {joint["name"]: place}}}
+            joint |= {"third": arm, "held": [centre[arm] for centre in centres]}
+            return True
+        return False
 
     def start_faults(
         self, joint: Mapping[str, Any], points: Mapping[str, Mapping[str, tuple[float, float]]]
@@ -260,11 +284,11 @@ class GearKind(SingleLinkKind):
 
     def rate(self, joint: JointEntry, link: str) -> float:
         """See `SingleLinkKind`; seen from an arm that turns, too, the ground turns."""
-        ratio, other = _ratio(joint, link), joint.other_link(link)
+        ratio, other = self.ratio(joint, link), joint.other_link(link)
         rate = abs(1 - ratio) * (joint.third != GROUND) + abs(ratio) * (other != GROUND)
         if rate > _MOST:
             raise InputError(
-                f"{link} may turn {float(rate):.3g} times in a turn of the links before it by the teeth of "
+                f"{link} may turn {float(rate):.3g} times in a turn of the links before it by the {self.noun} "
                 f"{joint.name}, and must turn {_MOST} times at most; leave the fast wheel out: a gear to the motor "
                 "is the `ratio` at the top of the file",
                 key=f"links.{link}",
@@ -277,15 +301,22 @@ class GearKind(SingleLinkKind):
         wheel that drives it, by the product of both ratios."""
         other, arm = joint.other_link(link), joint.third
         idler = next((g for g in parts.groups if isinstance(g, GearedLink) and g.bar.name == other), None)
-        rolling = Rolling(_moving(arm), _moving(other), _ratio(joint, link))
+        rolling = Rolling(_moving(arm), _moving(other), self.ratio(joint, link))
         if idler is not None and idler.rolling.arm == rolling.arm:
             rolling = idler.rolling._replace(ratio=rolling.ratio * idler.rolling.ratio)
-        bar, mesh = parts.hung(link, first), parts.pin(arm, joint.name)
+        bar, centre = parts.hung(link, first), parts.pin(other, joint.at(other))
+        mesh, angle = self.mesh_pin(parts, joint, centre), parts.structure.poses[link][2]
         parts.receive(joint, mesh, link)
-        structure, centre = parts.structure, parts.pin(other, joint.at(other))
-        return GearedLink(
-            bar, mesh, _moving(other), centre, rolling, structure.poses[link][2], structure.start
-        )
+        wheel = GearedLink(bar, mesh, _moving(other), centre, rolling, angle, parts.structure.start)
+        return self.wheel(parts, joint, wheel)
+
+    def mesh_pin(self, parts: JointParts, joint: JointEntry, centre: str) -> str:
+        """The pin of the mesh: the pitch point; `centre` is the pin at the centre of the other wheel."""
+        return parts.pin(joint.third, joint.name)
+
+    def wheel(self, parts: JointParts, joint: JointEntry, wheel: GearedLink) -> GearedLink:
+        """The group of the kind, from a wheel with teeth."""
+        return wheel
 
     def dead(self, group: AssurGroup, where: str) -> str:
         """See `SingleLinkKind`: the ratio is no whole number."""
@@ -293,9 +324,9 @@ class GearKind(SingleLinkKind):
         other = joint.other_link(link)
         return (
             f"{other} has turned by nearly half a turn from its start at {where}, and {link} does not turn a whole "
-            f"number of times as fast by the teeth of {joint.name}, so that it would not be back after a turn; drive "
-            "the slower of the two wheels with a whole ratio of the teeth, or let it swing by less than 168 deg "
-            "about its start"
+            f"number of times as fast by the {self.noun} {joint.name}, so that it would not be back after a turn; "
+            "drive the slower of the two wheels with a whole ratio, or let it swing by less than 168 deg about its "
+            "start"
         )
 
 
@@ -483,10 +514,3 @@ def _pinned(reader: EntryReader, end: Sequence[str], joints: Sequence[JointTable
 def _moving(link: str) -> str | None:
     """The name of a link that may move, None for the ground."""
     return None if link == GROUND else link
-
-
-def _ratio(joint: JointEntry, link: str) -> Fraction:
-    """How often a wheel turns per turn of the other one, seen from the arm."""
-    on, by = joint.table["teeth"]
-    ratio = Fraction(by, on) if link == joint.on[0] else Fraction(on, by)
-    return ratio if joint.table["internal"] else -ratio

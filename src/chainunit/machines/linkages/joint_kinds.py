@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...mechanism.assur import REVOLUTE, JointOf
+from .belt import BeltKind
 from .cam import CamKind
 from .gear import GearKind, RackKind
 from .joint_kind import GuideKind, JointEntry, JointKind, PinKind, SingleLinkKind
 
 KINDS: Mapping[str, JointKind] = {
-    kind.name: kind for kind in (PinKind(), GuideKind(), GearKind(), RackKind(), CamKind())
+    kind.name: kind for kind in (PinKind(), GuideKind(), GearKind(), BeltKind(), RackKind(), CamKind())
 }
 """The kinds by their names."""
 SINGLES: Mapping[str, SingleLinkKind] = {
