@@ -41,14 +41,14 @@ class ForeignSlot(NamedTuple):
 
 
 class ForeignDriver(NamedTuple):
-    """A pin of the ground about which a motor turns its link, at a `speed` [rev/min] if the source has one for each;
-    or two pins and a cylinder between them, which grows by `throw` from its drawn length, or shrinks if that is below
-    0."""
+    """A pin of the ground about which a motor turns its link, at a `speed` [rev/min]; or two pins and a cylinder
+    between them. It moves by a `span` about its drawn place, an angle [rad] in its direction or a length; a motor
+    without one turns round."""
 
     title: str
     pins: tuple[str, ...]
     clockwise: bool = False
-    throw: float = 0.0
+    span: tuple[float, float] | None = None
     speed: float = 1.0
 
 
@@ -93,6 +93,14 @@ class ForeignLinkage(Faults):
         name = free_name(text, self.links)
         self.links[name] = ForeignLink()
         return name
+
+    def motor(
+        self, title: str, pin: str, clockwise: bool, speed: float, span: tuple[float, float] | None = None
+    ) -> None:
+        """Add a motor about a pin, and what the drawing says of its speed."""
+        self.drivers.append(ForeignDriver(title, (pin,), clockwise, span, speed))
+        way = "clockwise" if clockwise else "counter-clockwise"
+        self.remarks.append(f"the drawing turns {pin} {way} at {abs(speed):g} rev/min; give --speed for it")
 
     def slot(self, title: str, pin: str, track: str, angle: float, stiff: bool) -> None:
         """Add a slot through the drawn place of a pin, at an `angle` [rad] of the drawing."""
