@@ -323,7 +323,7 @@ def test_what_only_draws_is_left_out_and_named(tmp_path):
     )
     source = imported(written(tmp_path, text))
     assert source.tables == imported(written(tmp_path, KLANN)).tables
-    assert "2 connectors and links that only draw or measure are left out" in source.remarks
+    assert "2 connectors and links only draw or measure: left out" in source.remarks
     assert "the link L10 has fewer than two pins, and is left out" in source.remarks
     assert any('--scale "0.2645833 mm"' in remark for remark in source.remarks)
 
@@ -358,6 +358,28 @@ def test_two_cylinders_have_names_of_their_own(tmp_path):
     assert abs(at[1] - (0.2 - 0.3j)) == pytest.approx(first - 0.02, abs=1e-12)
     assert abs(at[2] - at[4]) == pytest.approx(second + 0.015, abs=1e-12)
     assert abs(at[2] - at[1]) == pytest.approx(math.hypot(0.1, 0.16), abs=1e-12)
+
+
+@pytest.mark.parametrize("ends", ["03", "30"])
+def test_a_cylinder_along_a_slot_drives_its_guide(ends, tmp_path):
+    """It stands on the ground and pulls a block, which pulls a rod; the place is the way from the first limit."""
+    first, second = ends
+    text = f"""<linkage2>
+<connector anchor="true" x="500" y="50" id="0"/><connector x="200" y="50" id="1" slider="true">
+<slidelimit id="{first}"/><slidelimit id="{second}"/></connector><connector x="350" y="250" id="2"/>
+<connector anchor="true" x="0" y="50" id="3"/><connector anchor="true" x="520" y="60" id="4"/>
+<Link id="0" actuator="true" throw="40" cpm="-5"><connector id="0"/><connector id="1"/></Link>
+<Link id="1"><connector id="0"/><connector id="3"/></Link><Link id="2"><connector id="1"/><connector id="2"/></Link>
+<Link id="3"><connector id="2"/><connector id="4"/></Link></linkage2>"""
+    source = imported(written(tmp_path, text))
+    assert "Link 0 drives C1_guide, and has no mass" in source.remarks
+    model = Machine(source.machine()[0])
+    start, pulled = (0.3, 0.26) if first == "0" else (0.2, 0.24)
+    assert model.model.described_by.span == pytest.approx(sorted([start, pulled]), abs=1e-15)
+    out = model.evaluate({"phi": pulled})
+    assert float(out["L2.C1.x"]) == pytest.approx(0.24, abs=1e-12)
+    pin = meets(0.24 + 0.05j, 0.52 + 0.06j, 0.25, abs(-0.17 + 0.19j))
+    assert complex(float(out["L3.C2.x"]), float(out["L3.C2.y"])) == pytest.approx(pin, abs=1e-11)
 
 
 def test_an_address_whose_block_has_no_numbers():

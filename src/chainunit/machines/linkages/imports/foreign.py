@@ -48,7 +48,7 @@ class ForeignDriver(NamedTuple):
     title: str
     pins: tuple[str, ...]
     clockwise: bool = False
-    span: tuple[float, float] | None = None
+    span: tuple[float, ...] = ()
     speed: float = 1.0
 
 
@@ -94,9 +94,7 @@ class ForeignLinkage(Faults):
         self.links[name] = ForeignLink()
         return name
 
-    def motor(
-        self, title: str, pin: str, clockwise: bool, speed: float, span: tuple[float, float] | None = None
-    ) -> None:
+    def motor(self, title: str, pin: str, clockwise: bool, speed: float, *span: float) -> None:
         """Add a motor about a pin, and what the drawing says of its speed."""
         self.drivers.append(ForeignDriver(title, (pin,), clockwise, span, speed))
         way = "clockwise" if clockwise else "counter-clockwise"

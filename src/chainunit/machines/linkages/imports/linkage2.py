@@ -13,7 +13,6 @@ from .foreign import ForeignDriver, ForeignLinkage, ForeignSlot
 
 _MECHANISM = 16
 """Bit of the layer of a mechanism; what has no layer is on it."""
-_ELEMENTS = ("connector", "Link", "element")
 
 
 def read(data: bytes, name: str) -> ForeignLinkage:
@@ -34,13 +33,9 @@ def read(data: bytes, name: str) -> ForeignLinkage:
 
 
 def _mended(data: bytes) -> bytes:
-    """A content that the program reads, and that is no XML: attributes without a space between them, a bare `&`,
-    letters of Windows."""
-    try:
-        text = data.decode()
-    except UnicodeDecodeError:
-        text = data.decode("cp1252", "replace")
-    return re.sub(r'"(?=\w+=")', '" ', re.sub(r"&(?!#?\w+;)", "&amp;", text)).encode()
+    """A content that Linkage reads, and no XML: attributes without a space between them, a bare `&`, any letters."""
+    text = re.sub(r"&(?!#?\w+;)", "&amp;", data.decode(errors="replace"))
+    return re.sub(r'"(?=\w+=")', '" ', text).encode()
 
 
 class LinkageDrawing(ForeignLinkage):
@@ -49,17 +44,14 @@ class LinkageDrawing(ForeignLinkage):
 
     def __init__(self, nodes: list[Element]) -> None:
         super().__init__("Linkage", "mm")
-        self.remarks.append(
-            'Linkage itself shows 96 units of its file as an inch: --scale "0.2645833 mm" gives this size'
-        )
+        self.remarks.append('Linkage shows 96 units of a file as an inch: --scale "0.2645833 mm" does so')
         self.names: dict[str, dict[str, str]] = {"connector": {}, "Link": {}}
-        drawn = [node for node in nodes if node.tag in _ELEMENTS and not _is_mechanism(node)]
+        drawn = [node for node in nodes if not _is_mechanism(node)]
         self.drawn = {_id(node) for node in drawn if node.tag == "connector"}
-        if drawn:
-            self.remarks.append(f"{len(drawn)} connectors and links that only draw or measure are left out")
+        self.remarks += [f"{len(drawn)} connectors and links only draw or measure: left out"] * bool(drawn)
         nodes = [node for node in nodes if _is_mechanism(node)]
         connectors = [node for node in nodes if node.tag == "connector"]
-        links = [node for node in nodes if node.tag in _ELEMENTS[1:]]
+        links = [node for node in nodes if node.tag in ("Link", "element")]
         for read, chosen in (
             (self.connector, connectors), (self.body, links), (self.fasten, (*connectors, *links)),
             (self.slide, connectors), (self.gears, [ratio for node in nodes for ratio in node.iterfind("ratio")]),
@@ -78,8 +70,8 @@ class LinkageDrawing(ForeignLinkage):
         if node.get("input") == "true":
             keys = ("rpm", "15"), ("limitangle", "0"), ("startoffset", "0")
             speed, limit, offset = self.numbers(title, [node.get(*key) for key in keys])
-            span = (math.radians(-offset), math.radians(limit - offset)) if limit > 0.0 else None
-            self.motor(title, pin, speed > 0.0, speed, span)
+            span = (-offset, limit - offset) if limit > 0.0 else ()
+            self.motor(title, pin, speed > 0.0, speed, *map(math.radians, span))
 
     def body(self, title: str, node: Element) -> None:
         """A link, or an actuator."""

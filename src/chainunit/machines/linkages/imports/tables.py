@@ -56,14 +56,13 @@ class _Tables:
                 self.body = {name: first if body in ends else body for name, body in self.body.items()}
             pairs = [*self.pairs(2, {*self.places})]
         self.pins = self.pins_by_body()
-        # a link with one pin alone moves nothing; in a slot it is the block
-        single = [body for body, pins in self.pins.items() if body != GROUND and len(pins) < 2]
-        for body in single:
-            pins = {*self.pins[body]}
-            if not stiff & pins:
+        sliding = {slot.pin for slot in linkage.slots}
+        for body, pins in [*self.pins.items()][1:]:
+            # a link with one pin alone moves nothing; in a slot it is the block
+            if len(pins) < 2 and not stiff & {*pins}:
                 del self.pins[body]
-            if not {slot.pin for slot in linkage.slots} & pins:
-                linkage.remarks.append(f"the link {body} has fewer than two pins, and is left out")
+                if not sliding & {*pins}:
+                    linkage.remarks.append(f"the link {body} has fewer than two pins, and is left out")
 
     def pins_by_body(self) -> dict[str, list[str]]:
         """The pins of each body, the ground first."""
@@ -102,14 +101,13 @@ class _Tables:
         named = self.linkage.drivers or [ForeignDriver(self.linkage.program, (*cranks, "")[:1])]
         # of motors the slowest one stands first, so that the others turn a whole number of times in a turn; of
         # cylinders one on the ground
-        ground_pins = {*self.pins[GROUND]}
+        fixed = {*self.pins[GROUND]}
         first, *others = sorted(
-            named,
-            key=lambda x: (len(x.pins), x.span is not None, ground_pins.isdisjoint(x.pins), abs(x.speed)),
+            named, key=lambda x: (len(x.pins), bool(x.span), fixed.isdisjoint(x.pins), abs(x.speed))
         )
+        self.guides()
         driver, phi = self.driver(first)
         drivers = dict(self.further(first, other) for other in others)
-        self.guides()
         loads = {
             point: {**load, "on": f"{self.body[link]}.{point}"}
             for point, (link, load) in self.linkage.loads.items()
@@ -187,10 +185,22 @@ class _Tables:
         return {**table, **({"range": [*driver.span]} if driver.span else {})}, 0.0
 
     def cylinder(self, driver: ForeignDriver, start: str, end: str) -> tuple[dict[str, Any], float]:
-        """Add barrel and rod of a cylinder; its table, and its length at the start."""
+        """Add barrel and rod of a cylinder; its table, and its length at the start. One that stands on the ground and
+        pushes a block along its slot drives the guide instead."""
         (x, y), (u, v) = self.places[start], self.places[end]
         length, middle = math.dist((x, y), (u, v)), (0.5 * (x + u), 0.5 * (y + v))
-        ends = [self.scale * (length + way) for way in driver.span or ()]
+        ends = [self.scale * (length + way) for way in driver.span]
+        for guide, joint in self.joints.items():
+            (_, block), (track, base) = (joint[key].split(".") for key in ("on", "by"))
+            foot = {start: end, end: start}.get(block, "")
+            if track == GROUND and foot in self.pins[GROUND]:
+                a, b, p, q = (complex(*self.places[x]) for x in (base, joint["toward"], block, foot))
+                place, reach = ((p - x) * abs(b - a) / (b - a) for x in (a, q))
+                if abs(place.imag) + abs(reach.imag) < 1e-6 * abs(reach):
+                    self.linkage.remarks.append(f"{driver.title} drives {guide}, and has no mass")
+                    sense, start_place = self.scale * reach.real / abs(reach), self.scale * place.real
+                    limits = sorted(start_place + sense * way for way in driver.span)
+                    return {"joint": guide, "range": limits}, start_place
         if ends[0] <= 0.0:
             self.linkage.fault(driver.title, f"is {length:g} long; it must be longer than it shrinks")
         axis = self.linkage.pin(f"{end}_axis", (u, v))
