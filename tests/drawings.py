@@ -42,7 +42,7 @@ class Drawing:
         lines = ["<linkage2>", '\t<program zoom="1" units="Millimeters"/>']
         for name, (x, y) in self.places.items():
             more = ' anchor="true"' * (name in self.fixed)
-            more += ' input="true" rpm="30"' * (name == self.crank[0])
+            more += ' input="true" rpm="-30"' * (name == self.crank[0])
             limits = [slot[2] for slot in self.slots if slot[0] == name]
             inside = "".join(f'<slidelimit id="{ids[end]}"/>' for ends in limits for end in ends)
             more += ' slider="true"' * bool(limits)

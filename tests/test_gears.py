@@ -531,7 +531,7 @@ def on_one_centre():
         (changed(by="ground.O1"), "joints.mesh", "wheel.O2 and ground.O1 must be pinned to one link"),
         (changed(teeth=[20, 30]), "links.wheel", "drive the slower of the two wheels"),
         (changed(teeth=[30, 20]), "links.wheel", "does not turn a whole number of times"),
-        (changed(teeth=[1, 13]), "links.wheel", "must turn 12 times at most"),
+        (changed(teeth=[1, 21]), "links.wheel", "must turn 20 times at most"),
         (twice_in_mesh(), "links.wheel", "fix the link wheel more than once"),
         (on_one_centre(), "joints.mesh", "cannot be in mesh; place them apart"),
         (on_the_dyad(), "links.", "form one group with 3 links and 5 joints: a class that is not covered"),

@@ -82,7 +82,7 @@ KLANN = """<linkage2>
 \t<connector x="-84" y="126" id="1"/>
 \t<connector anchor="true" x="-100" y="-48" id="2"/>
 \t<connector x="-98" y="14" id="3"/>
-\t<connector anchor="true" input="true" rpm="15" x="0" y="0" id="4"/>
+\t<connector anchor="true" input="true" rpm="-15" x="0" y="0" id="4"/>
 \t<connector x="-1.5" y="-37" id="5"/>
 \t<connector draw="true" x="-320" y="-125" id="8"/>
 \t<connector x="-160" y="73" id="9"/>
@@ -276,6 +276,137 @@ def test_links_that_are_one(tmp_path):
     machine(written(tmp_path, text))
 
 
+def test_a_motor_that_swings_by_a_limit(tmp_path):
+    """The range of the driver is that of the drawing, about the drawn place and in the direction of the speed."""
+    text = KLANN.replace('rpm="-15"', 'rpm="-15" limitangle="90" startoffset="30"')
+    model = machine(written(tmp_path, text))
+    assert model.model.described_by.span == pytest.approx((-math.pi / 6, math.pi / 3), abs=1e-15)
+    foot = complex(*(float(model.evaluate({"phi": 0.0})[f"L5.C8.{axis}"]) for axis in "xy"))
+    assert foot == pytest.approx(-0.32 - 0.125j, abs=1e-12)
+    turned = complex(*(float(model.evaluate({"phi": 1.0})[f"L2.C5.{axis}"]) for axis in "xy"))
+    assert turned == pytest.approx((-1.5e-3 - 0.037j) * np.exp(1j), abs=1e-12)
+    clockwise = machine(written(tmp_path, text.replace('rpm="-15"', 'rpm="15"')))
+    turned = complex(*(float(clockwise.evaluate({"phi": 1.0})[f"L2.C5.{axis}"]) for axis in "xy"))
+    assert turned == pytest.approx((-1.5e-3 - 0.037j) * np.exp(-1j), abs=1e-12)
+    # one that swings beside one that turns round is an input
+    five_bar = FIVE_BAR.replace('id="4" anchor="true"', 'id="4" anchor="true" limitangle="20"')
+    tables = imported(written(tmp_path, five_bar)).tables
+    assert tables["driver"]["link"] == "L0" and "phi" not in tables["drivers"]["motor_C4"]
+    assert tables["drivers"]["motor_C4"]["range"] == pytest.approx([0.0, math.radians(20)])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("utf-8", ' y="0" id="4"', 'y="0"id="4"'),
+        ("utf-8", 'id="8"', 'id="8" name="feet & toes &amp; heel"'),
+        ("cp1252", 'id="8"', 'id="8" name="Fu\xdf & Zeh"'),
+    ],
+    ids=range(3),
+)
+def test_what_the_program_reads_and_no_reader_of_xml(change, tmp_path):
+    encoding, old, new = change
+    assert old in KLANN
+    file = tmp_path / "leg.linkage2"
+    file.write_bytes(KLANN.replace(old, new).encode(encoding))
+    assert imported(str(file)).tables == imported(written(tmp_path, KLANN)).tables
+
+
+def test_what_only_draws_is_left_out_and_named(tmp_path):
+    """Connectors on the layer of drawings, also if they are fastened to a link, and links of one pin."""
+    text = KLANN.replace(
+        '<connector id="8"/>', '<connector id="8"/><fastenconnector id="70"/><fastenconnector id="71"/>'
+    ).replace(
+        "</linkage2>",
+        '<connector id="70" layer="1" x="5" y="6"/><Link id="9" layer="1"><connector id="70"/></Link>'
+        '<Link id="10"><connector id="2"/></Link></linkage2>',
+    )
+    source = imported(written(tmp_path, text))
+    assert source.tables == imported(written(tmp_path, KLANN)).tables
+    assert "2 connectors and links only draw or measure: left out" in source.remarks
+    assert "the link L10 has fewer than two pins, and is left out" in source.remarks
+    assert any('--scale "0.2645833 mm"' in remark for remark in source.remarks)
+
+
+@pytest.mark.parametrize("radius", ["150.5", "-150.5"])
+def test_a_curved_slot_is_refused_on_either_side(radius, tmp_path):
+    text = SLIDER_CRANK.replace('slider="true"', f'slider="true" slideradius="{radius}"')
+    assert "connector 2: slides along an arc; only a straight slot" in refusal(written(tmp_path, text))
+
+
+def test_two_cylinders_have_names_of_their_own(tmp_path):
+    """The one on the ground is the first driver, also if it stands last in the file; each is an input. The other one
+    holds two bars of an arm at their angle."""
+    text = """<linkage2>
+<connector anchor="true" x="0" y="0" id="0"/><connector x="300" y="100" id="1"/><connector x="400" y="-60" id="2"/>
+<connector anchor="true" x="200" y="-300" id="3"/><connector x="120" y="140" id="4"/>
+<Link id="0"><connector id="0"/><connector id="1"/><connector id="4"/></Link>
+<Link id="1"><connector id="1"/><connector id="2"/></Link>
+<Link id="2" actuator="true" throw="20" cpm="15"><connector id="4"/><connector id="2"/></Link>
+<Link id="3" actuator="true" throw="50" cpm="-15"><connector id="3"/><connector id="1"/></Link>
+</linkage2>"""
+    source = imported(written(tmp_path, text))
+    assert source.tables["driver"]["joint"] == "cylinder"
+    (name,) = source.tables["drivers"]
+    assert name == source.tables["drivers"][name]["joint"] == "cylinder_1"
+    assert "Link 2 is the cylinder_1 of barrel_1 and rod_1" in source.remarks
+    model = Machine(source.machine()[0])
+    first, second = math.hypot(0.1, 0.4), math.hypot(0.28, 0.2)
+    out = model.evaluate({"phi": first - 0.02, "cylinder_1_driver.phi": second + 0.015})
+    at = {pin: complex(*(float(out[f"{link}.C{pin}.{axis}"]) for axis in "xy"))
+          for link, pin in (("L0", 1), ("L0", 4), ("L1", 2))}  # fmt: skip
+    assert abs(at[1] - (0.2 - 0.3j)) == pytest.approx(first - 0.02, abs=1e-12)
+    assert abs(at[2] - at[4]) == pytest.approx(second + 0.015, abs=1e-12)
+    assert abs(at[2] - at[1]) == pytest.approx(math.hypot(0.1, 0.16), abs=1e-12)
+
+
+@pytest.mark.parametrize("ends", ["03", "30"])
+def test_a_cylinder_along_a_slot_drives_its_guide(ends, tmp_path):
+    """It stands on the ground and pulls a block, which pulls a rod; the place is the way from the first limit."""
+    first, second = ends
+    text = f"""<linkage2>
+<connector anchor="true" x="500" y="50" id="0"/><connector x="200" y="50" id="1" slider="true">
+<slidelimit id="{first}"/><slidelimit id="{second}"/></connector><connector x="350" y="250" id="2"/>
+<connector anchor="true" x="0" y="50" id="3"/><connector anchor="true" x="520" y="60" id="4"/>
+<Link id="0" actuator="true" throw="40" cpm="-5"><connector id="0"/><connector id="1"/></Link>
+<Link id="1"><connector id="0"/><connector id="3"/></Link><Link id="2"><connector id="1"/><connector id="2"/></Link>
+<Link id="3"><connector id="2"/><connector id="4"/></Link></linkage2>"""
+    source = imported(written(tmp_path, text))
+    assert "Link 0 drives C1_guide, and has no mass" in source.remarks
+    model = Machine(source.machine()[0])
+    start, pulled = (0.3, 0.26) if first == "0" else (0.2, 0.24)
+    assert model.model.described_by.span == pytest.approx(sorted([start, pulled]), abs=1e-15)
+    out = model.evaluate({"phi": pulled})
+    assert float(out["L2.C1.x"]) == pytest.approx(0.24, abs=1e-12)
+    pin = meets(0.24 + 0.05j, 0.52 + 0.06j, 0.25, abs(-0.17 + 0.19j))
+    assert complex(float(out["L3.C2.x"]), float(out["L3.C2.y"])) == pytest.approx(pin, abs=1e-11)
+
+
+def test_an_address_whose_block_has_no_numbers():
+    """An older address has Null for the mass of a block, and in place of an angle. Its speed is told, as is friction
+    that is left out."""
+    address = "j=a,0,0,ab,R,t,Null,t\nb,0,3,ab|bc,R,f,Null,f\nc,10,2,bc|cd,R,f,Null,f\nd,10,2,cd,P,t,Null,f\n"
+    address += "&l=ab,R,1,1,0,1,a|b,,line\nbc,R,1,1,5,2,b|c,,line\ncd,P,Null,Null,Null,Null,c|d,,Null\n"
+    address += "&f=&s=20,true,true,cm"
+    source = imported(address)
+    out = Machine(source.machine()[0]).evaluate({"phi": 1.0})
+    crank = 0.03j * np.exp(-1j)
+    assert float(out["cd.c.x"]) == pytest.approx(
+        crank.real + math.sqrt(0.0101 - (crank.imag - 0.02) ** 2), abs=1e-11
+    )
+    assert any("clockwise at 20 rev/min" in remark for remark in source.remarks)
+    assert not any("friction" in remark for remark in source.remarks)
+    assert any("the friction of the drawing is left out" in remark for remark in imported(FORCE).remarks)
+
+
+@pytest.mark.parametrize(
+    "comment", ["#[ of\n several # lines #] and more\n", "# one\n#[ two\n lines #]\n\n", "  # M[ ]\n"]
+)
+def test_a_comment_before_an_expression(comment, tmp_path):
+    source = written(tmp_path, comment + COUPLER_POINT, "drawing.txt")
+    assert imported(source).tables == imported(COUPLER_POINT).tables
+
+
 # what cannot be carried over
 
 FIVE_BAR = (
@@ -296,17 +427,20 @@ CYLINDER_BAR = FIVE_BAR.replace('id="4" anchor="true" input="true"', 'id="4" anc
 
 
 def test_two_inputs_are_two_drivers(tmp_path):
-    """Motors turn in step by their speeds, the slowest one first; a cylinder is an input of its own."""
+    """Motors turn in step by their speeds, the slowest one first, clockwise above 0; a cylinder is an input of its
+    own."""
     five_bar = FIVE_BAR.replace('id="0" anchor="true"', 'id="0" anchor="true" rpm="-30"').replace(
         'id="4" anchor="true"', 'id="4" anchor="true" rpm="15"'
     )
     source = imported(written(tmp_path, five_bar), density="20 kg/m")
-    assert source.tables["driver"]["link"] == "L3"
-    assert source.tables["drivers"] == {"motor_C0": {"link": "L0", "phi": "-2.0 * phi", "by": "motor"}}
+    clockwise = {"positive": "clockwise"}
+    assert source.tables["driver"] == {"link": "L3", **clockwise}
+    follower = {"link": "L0", **clockwise, "phi": "-2.0 * phi", "by": "motor"}
+    assert source.tables["drivers"] == {"motor_C0": follower}
     assert any("connector 0 turns -2 times as fast as connector 4" in remark for remark in source.remarks)
     out = Machine(source.machine()[0]).evaluate({"phi": 0.4, "w": 2.0})
     assert out["motor_C0.phi"] == pytest.approx(-0.8) and out["motor_C0.w"] == pytest.approx(-4.0)
-    assert out["L0.w"] == pytest.approx(-4.0) and out["L3.w"] == pytest.approx(2.0)
+    assert out["L0.w"] == pytest.approx(4.0) and out["L3.w"] == pytest.approx(-2.0)
     cylinder = imported(written(tmp_path, CYLINDER_BAR), density="20 kg/m").tables
     (name,) = cylinder["drivers"]
     assert cylinder["drivers"][name]["joint"] == name and cylinder["drivers"][name]["range"][0] > 0.0
@@ -322,6 +456,41 @@ def test_two_inputs_are_two_drivers(tmp_path):
     assert imported(address).tables["drivers"]["motor_E"]["phi"] == "1.0 * phi"
 
 
+WHEELS = """<linkage2>
+<connector id="0" x="0" y="0" anchor="true" input="true" rpm="30"/>
+<connector id="1" x="0" y="100"/>
+<connector id="2" x="60" y="100"/>
+<connector id="3" x="60" y="130"/>
+<Link id="0"><connector id="0"/><connector id="1"/><connector id="2"/></Link>
+<Link id="1" gear="true"><connector id="1"/></Link>
+<Link id="2" gear="true"><connector id="2"/></Link>
+<Link id="3" fastenlink="2"><connector id="2"/><connector id="3"/></Link>
+<Link id="4" gear="true" fastenconnector="0"><connector id="0"/></Link>
+<ratios>
+<ratio type="chain" sizeassize="true"><link id="4" size="20"/><link id="1" size="20"/></ratio>
+<ratio type="gears"><link id="2" size="1"/><link id="1" size="3"/></ratio>
+</ratios></linkage2>"""
+
+
+@pytest.mark.parametrize("has_radii", [True, False])
+def test_gears_and_a_chain(has_radii, tmp_path):
+    """A chain of 1:1 from a fixed wheel: the first wheel on the arm does not turn, so that the second one turns with
+    the arm, and three turns more."""
+    text = WHEELS if has_radii else WHEELS.replace('sizeassize="true"', 'sizeassize="false"')
+    unit = machine(written(tmp_path, text), density="10 kg/m")
+    diameter = 0.04 if has_radii else 0.05
+    chain = unit.model.described_by.structure.joints["chain"].table
+    assert chain["diameters"] == pytest.approx([diameter, diameter], rel=1e-12)
+    q = np.linspace(0.0, 6.0, 7)
+    out = unit.outputs(q, 2.0)
+    assert out.L1.angle == pytest.approx(np.zeros(7), abs=1e-12)
+    assert out.L2.angle == pytest.approx(-4.0 * q, abs=1e-11)  # the drawn motor turns clockwise
+    with pytest.raises(
+        InputError, match="are wheels of which one has not one pin, its centre; fasten the others"
+    ):
+        imported(written(tmp_path, text.replace('<link id="1" size="3"/>', '<link id="0" size="3"/>')))
+
+
 def test_a_linkage_that_lacks_an_input_is_refused():
     five_bar = COUPLER_POINT.replace("L[L2, L3]", "L[L2, L4]").replace(
         "P[35, 95], L[L2]", "P[90, 50], L[L4, L3]"
@@ -335,14 +504,14 @@ def test_all_faults_come_at_once(tmp_path):
         '<connector x="1" y="1e99" id="1"/><connector x="1" y="nan" id="30" slider="true" slideradius="4">'
         '<slidelimit id="2"/><slidelimit id="3"/></connector><Link id="8"><connector id="77"/></Link>'
         '<Link id="9" fastenlink="55"><connector id="30"/><connector id="5"/></Link>'
-        '<ratios><ratio type="gears"><link id="0" size="2"/><link id="1" size="3"/></ratio></ratios></linkage2>',
+        '<ratios><ratio type="gears"><link id="0" size="2"/><link id="88" size="3"/></ratio></ratios></linkage2>',
     )
     lines = refusal(written(tmp_path, text)).splitlines()
     beginnings = (
         'connector 1: has "-8 4" in place of a number', "connector 1: stands there twice",
-        'connector 30: has "nan" in place of a number', "Link 8: names connector 77, which is not in the file",
+        'connector 30: has "nan" in place of a number', "Link 8: names connector 77, which is not in the ",
         "Link 9: is fastened, but not to a link of the file", "connector 30: slides along an arc",
-        "Link 0 and Link 1: are joined by gears",
+        "Link 0 and Link 88: are wheels of a gear or a chain; they must be two links of the file",
     )  # fmt: skip
     assert len(lines) == len(beginnings)
     for line, begin in zip(lines, beginnings, strict=True):

@@ -621,11 +621,10 @@ class _LinkageReader(LoadReader):
                 moved = f"{whole:.6g} m" if entry["linear"] else f"{turns:.6g} turns"
                 speeds = [float(point.rates[0]) for point in course_places]
                 is_even = not entry["linear"] and max(speeds) - min(speeds) < BACK * max(map(abs, speeds))
-                remedy = (
-                    "take the slower of both for [driver]"
-                    if is_even
-                    else "give a law with the same place at 0 and 360 deg"
-                )
+                remedy = "give a law with the same place at 0 and 360 deg"
+                if is_even:
+                    slower = "take the slower of both for [driver]" if abs(turns) < 1.0 else ""
+                    remedy = slower or "turn the faster one a whole number of times as fast"
                 raise InputError(
                     f"moves by {moved} in a turn of the first driver, and must come back after it: {remedy}, or "
                     "let [driver] swing by a range"

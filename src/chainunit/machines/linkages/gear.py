@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from .entries import EntryReader
 
 _AT_REST = Link(Motion(ZERO), Vec2(1.0, 0.0), 0.0, 0.0)
-_MOST = 12
+_MOST = 20
 """Largest number of turns of a wheel in a turn of the links before it: a linkage is checked at so many places."""
 _LEAST_RADIUS = 1e-9
 """Least pitch radius of the pinion of a rack [m]; a smaller one is zero but for rounding."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -40,15 +40,26 @@ class ForeignSlot(NamedTuple):
     stiff: bool = False
 
 
+class ForeignGear(NamedTuple):
+    """Two links that turn together as wheels of these sizes: with teeth, or as sprockets of a chain, whose sizes may
+    be radii in the unit of the drawing."""
+
+    title: str
+    links: Sequence[str]
+    sizes: Sequence[float]
+    is_chain: bool
+    has_radii: bool
+
+
 class ForeignDriver(NamedTuple):
-    """A pin of the ground about which a motor turns its link, at a `speed` [rev/min] if the source has one for each;
-    or two pins and a cylinder between them, which grows by `throw` from its drawn length, or shrinks if that is below
-    0."""
+    """A pin of the ground about which a motor turns its link, at a `speed` [rev/min]; or two pins and a cylinder
+    between them. It moves by a `span` about its drawn place, an angle [rad] in its direction or a length; a motor
+    without one turns round."""
 
     title: str
     pins: tuple[str, ...]
     clockwise: bool = False
-    throw: float = 0.0
+    span: tuple[float, ...] = ()
     speed: float = 1.0
 
 
@@ -64,6 +75,7 @@ class ForeignLinkage(Faults):
         self.links = {GROUND: ForeignLink()}
         self.fastened: list[tuple[str, str]] = []
         self.slots: list[ForeignSlot] = []
+        self.gears: list[ForeignGear] = []
         self.drivers: list[ForeignDriver] = []
         self.loads: dict[str, tuple[str, dict[str, Any]]] = {}
         self.remarks: list[str] = []
@@ -93,6 +105,12 @@ class ForeignLinkage(Faults):
         name = free_name(text, self.links)
         self.links[name] = ForeignLink()
         return name
+
+    def motor(self, title: str, pin: str, clockwise: bool, speed: float, *span: float) -> None:
+        """Add a motor about a pin, and what the drawing says of its speed."""
+        self.drivers.append(ForeignDriver(title, (pin,), clockwise, span, speed))
+        way = "clockwise" if clockwise else "counter-clockwise"
+        self.remarks.append(f"the drawing turns {pin} {way} at {abs(speed):g} rev/min; give --speed for it")
 
     def slot(self, title: str, pin: str, track: str, angle: float, stiff: bool) -> None:
         """Add a slot through the drawn place of a pin, at an `angle` [rad] of the drawing."""

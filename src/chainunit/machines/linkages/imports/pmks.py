@@ -8,7 +8,7 @@ from urllib.parse import unquote
 
 from ....core.errors import InputError, shown
 from ....mechanism.assur import GROUND
-from .foreign import ForeignDriver, ForeignLink, ForeignLinkage
+from .foreign import ForeignLink, ForeignLinkage
 
 _TRUE, _FALSE = ("t", "true"), ("f", "false")
 _MASSES = {"cm": (1e-3, 1e-4), "m": (1.0, 1.0)}
@@ -26,6 +26,7 @@ def read(text: str, name: str) -> ForeignLinkage:
     sections = {}
     for section in unquote(text[text.find("j=") :]).split("&"):
         key, _, rows = section.partition("=")
+        rows = rows.replace("Null", "0")
         sections[key] = [[x.strip() for x in row.split(",")] for row in rows.splitlines() if row.strip(" ,")]
     if not sections.get("j") or not sections.get("l"):
         raise InputError(f"{name}: has no joints and links; must be the plain address, ?j=...&l=...&f=...")
@@ -36,11 +37,14 @@ class PmksDrawing(ForeignLinkage):
     """The linkage of one address; `joints` and links have `names` by their ids in it."""
 
     def __init__(self, sections: dict[str, list[list[str]]]) -> None:
-        _, clockwise, gravity, unit = ([*sections.get("s", []), []][0] + [""] * 4)[:4]
+        speed, clockwise, gravity, unit = ([*sections.get("s", []), []][0] + [""] * 4)[:4]
         super().__init__("PMKS+", unit if unit in _MASSES else "cm")
         if unit not in ("", *_MASSES):
             self.fault("settings", f"the unit of length is {shown(unit)}; set it to cm or m")
+        (self.speed,) = self.numbers("settings", [speed or "10"])
         self.clockwise, self.weightless = clockwise in _TRUE, gravity in _FALSE
+        if any(row[7:8] not in ([], ["0"], *([x] for x in (*_TRUE, *_FALSE))) for row in sections["j"]):
+            self.remarks.append("the friction of the drawing is left out; give that of [pins] and [guides]")
         self.remarks += ["gravity is off in the drawing, and so it is here"] * self.weightless
         self.joints: dict[str, str] = {}
         self.names: dict[str, str] = {}
@@ -76,7 +80,7 @@ class PmksDrawing(ForeignLinkage):
         for link in filter(None, row[3].split("|")):
             self.named(link).pins.append(pin)
         if [x for x in row[6:] if x in (*_TRUE, *_FALSE)][-1:] in (["t"], ["true"]):
-            self.drivers.append(ForeignDriver(title, (pin,), self.clockwise))
+            self.motor(title, pin, self.clockwise, self.speed)
 
     def body(self, title: str, row: list[str]) -> None:
         """A link: its mass and its joints."""
@@ -92,7 +96,7 @@ class PmksDrawing(ForeignLinkage):
     def slide(self, title: str, row: list[str]) -> None:
         """A joint that slides: a link with further places turns in the slot, a block does not."""
         pin = self.joints[row[0]]
-        angle = next((x for x in row[6:] if x not in (*_TRUE, *_FALSE, "", "Null")), "0")
+        angle = next((x for x in row[6:] if x not in (*_TRUE, *_FALSE, "")), "0")
         riders = [link for link in self.links.values() if pin in link.pins]
         places = {self.places[other] for link in riders for other in link.pins}
         self.slot(title, pin, GROUND, self.numbers(title, [angle])[0], len(places) == 1)

@@ -12,7 +12,7 @@ from ....mechanism.assur import GROUND
 from .foreign import ForeignLinkage
 
 _COMMENT = re.compile(r"#[^\n]*")
-_BEGIN = re.compile(r"\s*(#[^\n]*\n\s*)*M\s*\[")
+_BEGIN = re.compile(r"\s*M\s*\[")
 _WHOLE = re.compile(r"\s*M\s*\[(.*)\]\s*", re.DOTALL)
 _JOINT = re.compile(r"\s*J\s*\[\s*(\w+)\s*,((?:[^\[\]]|\[[^\[\]]*\])*)\]\s*(?:,|$)")
 _TERM = re.compile(r"([A-Za-z]+)\s*\[([^\[\]]*)\]")
@@ -20,7 +20,15 @@ _TERM = re.compile(r"([A-Za-z]+)\s*\[([^\[\]]*)\]")
 
 def begins(text: str) -> bool:
     """Whether a text looks like an expression of Pyslvs."""
-    return bool(_BEGIN.match(text))
+    return bool(_BEGIN.match(_bare(text)))
+
+
+def _bare(text: str) -> str:
+    """A text without comments: from a # to the end of its line, or from #[ to the line of the last #]."""
+    before, _, rest = text.partition("#[")
+    if "#]" in rest:
+        text = f"{before}#{rest.rpartition('#]')[2]}"
+    return _COMMENT.sub("", text)
 
 
 def read(text: str, name: str) -> ForeignLinkage:
@@ -32,7 +40,7 @@ def read(text: str, name: str) -> ForeignLinkage:
         for what is no expression; other faults are collected.
     """
     linkage, links, sliders = ForeignLinkage("Pyslvs", "mm"), {GROUND: GROUND}, []
-    for number, (kind, terms) in enumerate(_joints(_COMMENT.sub("", text), name)):
+    for number, (kind, terms) in enumerate(_joints(_bare(text), name)):
         title, place, riders = f"joint {number}", terms.get("P", []), terms.get("L", [])
         angle = terms.get("A", [])
         if kind not in ("R", "P", "RP") or len(place) != 2 or len(angle) != (kind != "R"):

@@ -62,7 +62,8 @@ def imported(source: str, density: str | None = None, scale: str | None = None) 
         linkage = (pyslvs if pyslvs.begins(text) else pmks).read(text, name)
     elif re.match(r"\w+://", text):
         raise InputError(
-            f"{name}: is an address without joints; the address of a machine in PMKS+ has ?j= and &l="
+            f"{name}: is an address without joints; the address of a machine in PMKS+ has ?j= and &l=; a shorter "
+            "one of a newer version is not read: write its joints as M[J[R, P[x, y], L[ground, L1]], ...]"
         )
     elif density or scale:
         raise InputError(f"--density, --scale: {source} is a linkage file, and these are for drawings alone")

@@ -10,11 +10,13 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 from ....mechanism.assur import GROUND
 from .foreign import ForeignDriver, ForeignLinkage, Place, free_name
 
+_MOST_TEETH = 1000
 Body = tuple[float, float, Place]
 """Mass [kg], inertia about the centroid [kg m2], and the place of the centroid."""
 
@@ -55,12 +57,15 @@ class _Tables:
                 first = next(name for name in self.body if name in ends)
                 self.body = {name: first if body in ends else body for name, body in self.body.items()}
             pairs = [*self.pairs(2, {*self.places})]
-        # a link with one pin alone moves nothing
-        self.pins = {
-            body: pins
-            for body, pins in self.pins_by_body().items()
-            if body == GROUND or len(pins) > 1 or stiff & {*pins}
-        }
+        self.pins = self.pins_by_body()
+        sliding = {slot.pin for slot in linkage.slots}
+        wheels = {self.body[name] for gear in linkage.gears for name in gear.links}
+        for body, pins in [*self.pins.items()][1:]:
+            # a link with one pin alone moves nothing; in a slot it is the block
+            if len(pins) < 2 and not stiff & {*pins} and body not in wheels:
+                del self.pins[body]
+                if not sliding & {*pins}:
+                    linkage.remarks.append(f"the link {body} has fewer than two pins, and is left out")
 
     def pins_by_body(self) -> dict[str, list[str]]:
         """The pins of each body, the ground first."""
@@ -97,11 +102,16 @@ class _Tables:
         moving, slots = self.moving(), {slot.pin for slot in self.linkage.slots}
         cranks = [pin for pin in self.pins[GROUND] if len(moving[pin]) == 1 and pin not in slots]
         named = self.linkage.drivers or [ForeignDriver(self.linkage.program, (*cranks, "")[:1])]
-        # of motors the slowest one stands first, so that the others turn a whole number of times in a turn
-        first, *others = sorted(named, key=lambda driver: (len(driver.pins), abs(driver.speed)))
+        # of motors the slowest one stands first, so that the others turn a whole number of times in a turn; of
+        # cylinders one on the ground
+        fixed = {*self.pins[GROUND]}
+        first, *others = sorted(
+            named, key=lambda x: (len(x.pins), bool(x.span), fixed.isdisjoint(x.pins), abs(x.speed))
+        )
+        self.guides()
+        self.gears()
         driver, phi = self.driver(first)
         drivers = dict(self.further(first, other) for other in others)
-        self.guides()
         loads = {
             point: {**load, "on": f"{self.body[link]}.{point}"}
             for point, (link, load) in self.linkage.loads.items()
@@ -145,16 +155,16 @@ class _Tables:
         return {pin: [body for body in [*self.pins][1:] if pin in self.pins[body]] for pin in self.places}
 
     def further(self, first: ForeignDriver, driver: ForeignDriver) -> tuple[str, dict[str, Any]]:
-        """The name and the table of a driver besides the first one: a motor turns in step with it, a cylinder is an
-        input of its own."""
-        table, start = self.driver(driver)
-        if "joint" in table:
-            return table["joint"], {**table, "start": start}
+        """The name and the table of a driver besides the first one: a motor that turns round is in step with it,
+        another driver is an input of its own."""
+        name = free_name(f"motor_{driver.pins[0]}", self.links)
+        table, start = self.driver(driver if driver.span else driver._replace(clockwise=first.clockwise))
+        if driver.span:
+            return table.get("joint", name), {**table, "start": start}
         if not first.speed or not driver.speed:
             self.linkage.fault(driver.title, "is an input that stands; give it a speed, or take it out")
             return driver.title, table
         ratio = driver.speed / first.speed
-        name = free_name(f"motor_{driver.pins[0]}", self.links)
         self.linkage.remarks.append(
             f"{driver.title} turns {ratio:g} times as fast as {first.title}, with a motor of its own, as "
             f"[drivers.{name}] says"
@@ -175,22 +185,57 @@ class _Tables:
             return {}, 0.0
         if not self.linkage.drivers:
             self.linkage.remarks.append(f"the source names no input: {turned[0]} is the driver")
-        return {"link": turned[0], **({"positive": "clockwise"} if driver.clockwise else {})}, 0.0
+        table = {"link": turned[0], **({"positive": "clockwise"} if driver.clockwise else {})}
+        return {**table, **({"range": [*driver.span]} if driver.span else {})}, 0.0
 
     def cylinder(self, driver: ForeignDriver, start: str, end: str) -> tuple[dict[str, Any], float]:
-        """Add barrel and rod of a cylinder; its table, and its length at the start."""
+        """Add barrel and rod of a cylinder; its table, and its length at the start. One that stands on the ground and
+        pushes a block along its slot drives the guide instead."""
         (x, y), (u, v) = self.places[start], self.places[end]
         length, middle = math.dist((x, y), (u, v)), (0.5 * (x + u), 0.5 * (y + v))
-        if length + min(driver.throw, 0.0) <= 0.0:
+        ends = [self.scale * (length + way) for way in driver.span]
+        for guide, joint in self.joints.items():
+            (_, block), (track, base) = (joint[key].split(".") for key in ("on", "by"))
+            foot = {start: end, end: start}.get(block, "")
+            if track == GROUND and foot in self.pins[GROUND]:
+                a, b, p, q = (complex(*self.places[x]) for x in (base, joint["toward"], block, foot))
+                place, reach = ((p - x) * abs(b - a) / (b - a) for x in (a, q))
+                if abs(place.imag) + abs(reach.imag) < 1e-6 * abs(reach):
+                    self.linkage.remarks.append(f"{driver.title} drives {guide}, and has no mass")
+                    sense, start_place = self.scale * reach.real / abs(reach), self.scale * place.real
+                    limits = sorted(start_place + sense * way for way in driver.span)
+                    return {"joint": guide, "range": limits}, start_place
+        if ends[0] <= 0.0:
             self.linkage.fault(driver.title, f"is {length:g} long; it must be longer than it shrinks")
         axis = self.linkage.pin(f"{end}_axis", (u, v))
         barrel, rod = (free_name(part, self.links) for part in ("barrel", "rod"))
         self.add(barrel, [start, axis], [self.bar((x, y), middle)])
         self.add(rod, [end], [self.bar(middle, (u, v))])
-        name = free_name("cylinder", self.places)
+        name = free_name("cylinder", {*self.places, *self.joints})
+        self.linkage.remarks.append(f"{driver.title} is the {name} of {barrel} and {rod}")
         self.joints[name] = {"on": f"{rod}.{end}", "by": f"{barrel}.{start}", "toward": axis}
-        ends = sorted(self.scale * way for way in (length, length + driver.throw))
         return {"joint": name, "range": ends}, self.scale * length
+
+    def gears(self) -> None:
+        """Add the joint of two wheels, each about the one pin of its link."""
+        for title, links, sizes, is_chain, has_radii in self.linkage.gears:
+            pins = [self.linkage.links[name].pins for name in links]
+            if any(len(names) != 1 for names in pins):
+                self.linkage.fault(
+                    title, "are wheels of which one has not one pin, its centre; fasten the others"
+                )
+                continue
+            on, by = (f"{self.body[name]}.{pin}" for name, (pin,) in zip(links, pins, strict=True))
+            joint: dict[str, Any] = {"type": "gear", "on": on, "by": by}
+            if is_chain:
+                gap = math.dist(*(self.places[pin] for (pin,) in pins))
+                # sizes alone do not tell the diameters: the sprockets then reach over half the gap
+                unit = 2.0 if has_radii else gap / sum(sizes)
+                joint |= {"type": "belt", "diameters": [self.scale * unit * size for size in sizes]}
+            else:
+                ratio = Fraction(sizes[0] / sizes[1]).limit_denominator(_MOST_TEETH)
+                joint["teeth"] = [ratio.numerator, ratio.denominator]
+            self.joints[free_name("chain" if is_chain else "mesh", {*self.joints, *self.places})] = joint
 
     def guides(self) -> None:
         """Add the guide of each slot, and a block if the links on its pin turn in it."""
