@@ -128,7 +128,7 @@ class Study(StudyMethods):
 
     def _take(self, config: Config, source: str, changes: Mapping[str, Any] | None = None) -> Self:
         """Become the study `config`, which has `changes` against its `source`; paths in it are relative to
-        the source."""
+        the source. Methods call it in place of `__init__`, which would read tables."""
         self._source, self._changes = source, dict(changes or {})
         if self._changes:
             config = config.with_file(source=f"{source} with {self._changed}")

@@ -202,11 +202,6 @@ def _origin_words(origin: str) -> str:
     return _ORIGIN.get(origin, "the program's default" if origin == "declared" else f"chosen by {origin}")
 
 
-def _named(value: b.GivenValue) -> str:
-    """The name of a given value, with its file and line."""
-    return f"{value.name}: {value.place}" if value.place else value.name
-
-
 def marks(block: b.Given) -> str:
     """The legend of the marks that stand beside given values."""
     origins = {value.origin for _, values in block.sections for value in values} - {"", "file", "linkage"}
@@ -387,11 +382,11 @@ class Page:
         return self.number(cell.utilisation) + bar + suffix
 
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
-        rows = "".join(
-            f'<tr><th scope="row" title="{escape(_named(value))}">{escape(value.description)}</th>'
-            f"<td>{self.line(value.value)}{self.origin(value)}</td></tr>"
-            for value in values
-        )
+        rows = ""
+        for value in values:
+            name_and_line = f"{value.name}: {value.place}" if value.place else value.name
+            rows += f'<tr><th scope="row" title="{escape(name_and_line)}">{escape(value.description)}</th>'
+            rows += f"<td>{self.line(value.value)}{self.origin(value)}</td></tr>"
         return (
             f'<div class="wide"><table class="numbers"><caption>{escape(title)}</caption>'
             f"<tbody>{rows}</tbody></table></div>"

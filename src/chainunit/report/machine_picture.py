@@ -24,17 +24,17 @@ def picture(machine: Machine, way: Mechanism) -> Animation:
     """The parts of the picture of a machine that no run changes; `way` is its mechanism over the whole way of its
     driver."""
     driver, turns = way.linkage.driver, machine.model.turns
-    circles = [(driver.bar.pin, driver.end)] * (turns and isinstance(driver, Crank))
+    circles = [(driver.bar.pin, driver.end)] if turns and isinstance(driver, Crank) else []
+    outlines = {}
+    for name, outline in way.linkage.outlines.items():
+        corners = outline.points()
+        outlines[name] = {"at": outline.pin, "points": np.round([corners.x, corners.y], 6).T.tolist()}
     return Animation(
         tuple(linkage.links(way.linkage)),
         linkage.supports(way.linkage),
         hanging=linkage.hanging(way),
         circles=(*circles, *way.linkage.circles),
-        outlines={
-            name: {"at": pin, "points": np.round([place.x, place.y], 6).T.tolist()}
-            for name, (pin, _, points) in way.linkage.outlines.items()
-            for place in [points()]
-        },
+        outlines=outlines,
         names=linkage.labels(way.linkage),
         paths=linkage.paths(way, "" if turns else driver.end),
         rails=linkage.rails(way),

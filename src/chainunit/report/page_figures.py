@@ -215,23 +215,25 @@ class _Drawing:
             begin += size + gap
         return changes
 
-    def panel(self, r: int, c: int, panel: Panel) -> None:
-        """Draw a panel into its place."""
-        beside = [y for (row, _), (_, y) in self.places.items() if row == r]
-        y = f"y{len(self.places) + 1 if self.places else ''}"
-        x = self.x_axes.setdefault(
-            (c, self.spec.sharing(r, c)[0]), f"x{len(self.x_axes) + 1 if self.x_axes else ''}"
-        )
-        self.places[r, c] = x, y
-        across = self.axes.setdefault(_long(x), {"domain": self.columns[c], **_axis(panel.x)})
-        if r == self.spec.sharing(r, c)[-1]:
-            across |= {"anchor": y, "title": {"text": panel.x.label}}
-        self.axes[_long(y)] = {"domain": self.rows[r], "anchor": x, **_axis(panel.y)}
-        self.axes[_long(y)] |= {"title": {"text": panel.y.label}} | (
-            {"scaleanchor": x} if panel.equal else {}
-        )
+    def panel(self, row: int, column: int, panel: Panel) -> None:
+        """Draw a panel into its place, with a y axis of its own and an x axis that the panels below it may share.
+        Plotly names axes x, x2, .. and y, y2, .."""
+        beside = [y for (other_row, _), (_, y) in self.places.items() if other_row == row]
+        sharing = self.spec.sharing(row, column)
+        y = f"y{len(self.places) + 1}" if self.places else "y"
+        next_x = f"x{len(self.x_axes) + 1}" if self.x_axes else "x"
+        x = self.x_axes.setdefault((column, sharing[0]), next_x)
+        self.places[row, column] = x, y
+        x_axis = self.axes.setdefault(_long(x), {"domain": self.columns[column], **_axis(panel.x)})
+        if row == sharing[-1]:
+            # the lowest panel has the title
+            x_axis |= {"anchor": y, "title": {"text": panel.x.label}}
+        y_axis = {"domain": self.rows[row], "anchor": x, **_axis(panel.y), "title": {"text": panel.y.label}}
+        if panel.equal:
+            y_axis["scaleanchor"] = x
         if self.spec.level and beside:
-            self.axes[_long(y)]["matches"] = beside[0]
+            y_axis["matches"] = beside[0]
+        self.axes[_long(y)] = y_axis
         if panel.title:
             corner = {"xanchor": "left", "yanchor": "bottom"}
             self._words(f"{x} domain", f"{y} domain", 0.0, 1.0, f"<b>{panel.title}</b>", **corner)

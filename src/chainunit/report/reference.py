@@ -21,7 +21,7 @@ from ..models import MODELS
 from ..reading.results import documented, results_in
 from ..reading.text import number
 from ..study.analyses import all_analyses
-from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
+from ..study.keys import KeyTable, catalogue_columns, key_tables
 from ..study.remark import SEVERITIES
 from ..study.remarks import declared_remarks
 from .blocks import Block, Column, Report, Section, Table, TableRow, Text, heads
@@ -113,11 +113,11 @@ def _block(table: KeyTable, title: str = "") -> Table:
 
 def _key_rows(table: KeyTable) -> tuple[tuple[TableRow, ...], tuple[Column, ...]]:
     """A row for each key of a table, and the heads of the columns."""
-    return tuple(map(_row, table.keys)), _KEY_COLUMNS
-
-
-def _row(key: Key) -> TableRow:
-    return TableRow((key.name, key.left_out or key.follows or "-", key.allowed or "-", key.description))
+    rows = (
+        TableRow((key.name, key.left_out or key.follows or "-", key.allowed or "-", key.description))
+        for key in table.keys
+    )
+    return tuple(rows), _KEY_COLUMNS
 
 
 def reference(

@@ -323,21 +323,22 @@ class BlockRuns:
     # -- from rest
 
     def _started(self, points: Sequence[RunPoint]) -> Runs:
-        """The start from rest until running should be steady."""
-        signals, rest, stops = [], [], []
+        """The start from rest until running should be steady. A machine that starts empty settles twice: at its
+        speed, and once the feed has come."""
+        signals, states, stops = [], [], []
         for point in points:
             operation = point.rig.operation
             fed_from = operation.steady_begin if operation.empty_start else None
-            over_time = replace(point.rig, fed_from=fed_from).signals(ramp=True)
-            # the rate of the reference, which a feed-forward takes, is no profile
-            from_rest = {full: x if is_evaluated(x) else 0.0 for full, x in over_time.items()}
-            begin = self._inputs | {full: at_time(x, 0.0) for full, x in from_rest.items()}
-            signals.append(from_rest)
-            rest.append(self.system.start(begin, {name: point.values[name] for name in self._varying}))
+            profiles = replace(point.rig, fed_from=fed_from).signals(ramp=True)
+            # the rate of the speed reference, for a feed-forward, is no profile that the loop evaluates
+            evaluated = {full: x if is_evaluated(x) else 0.0 for full, x in profiles.items()}
+            signals.append(evaluated)
+            inputs = self._inputs | {full: at_time(x, 0.0) for full, x in evaluated.items()}
+            states.append(self.system.start(inputs, {name: point.values[name] for name in self._varying}))
             turns = operation.run.settle_turns * (2.0 if operation.empty_start else 1.0)
             stops.append(operation.ramp_end + turns * operation.turn)
         step = max(stops) / _ROWS_OF_START
-        return self._run(points, np.array(rest, float).T, 0.0, stops, signals, step=step)
+        return self._run(points, np.array(states, float).T, 0.0, stops, signals, step=step)
 
     def _steadied(self, points: Sequence[RunPoint]) -> tuple[Any, list[RunFault | None], dict[int, Dataset]]:
         """The states in steady running, shape (states, points), the faults of the points, and the run of the last

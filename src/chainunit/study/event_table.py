@@ -276,10 +276,9 @@ def _form(declared: type) -> type[BaseModel]:
 
 
 def _parameters(event_type: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:
-    """The quantities of an event. A refusal begins with `prefix`, and its key with `place` or, without it,
-    with `prefix`."""
+    """The quantities of an event by its `table` in a file. A refusal begins with `prefix`, and its key with `place`
+    or, without it, with `prefix`."""
+    declared = event_type.Parameters
     quantities = {name: x for name, x in table.items() if name not in _TEXTS}
     with each_refusal(lambda fault: InputError(f"{prefix}{fault}", (place or prefix) + fault.key)):
-        return instance(
-            event_type.Parameters, given_values(read_table(_form(event_type.Parameters), quantities))
-        )
+        return instance(declared, given_values(read_table(_form(declared), quantities)))

@@ -84,12 +84,13 @@ class Jam(_Pulses):
         return f"across = {self.p.across:g}: is of rockers a width apart; give machine.width"
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
-        """The pulses, and the place of the whole force across the width."""
-        signals, name = super().signals(normal, begin, state), f"{self.side}.force_across"
-        if name in normal:
-            usual = normal[self.inputs[0]], normal[name]
-            together = middle_of(usual, (self.p.force, self.p.across))
-            signals[name] = self._pulses(begin, normal[name], together)
+        """The pulses of the force, and for a machine with a width those of its place: while the lump adds its force
+        to that of normal running, the place is the middle of both."""
+        signals, place_name = super().signals(normal, begin, state), f"{self.side}.force_across"
+        if place_name in normal:
+            usual_force, usual_place = normal[self.inputs[0]], normal[place_name]
+            middle = middle_of((usual_force, usual_place), (self.p.force, self.p.across))
+            signals[place_name] = self._pulses(begin, usual_place, middle)
         return signals
 
 

@@ -92,8 +92,9 @@ def _recovery(w: Window) -> float | None:
 
 
 def _relay(w: Window) -> float | None:
-    """Time after the event at which the slowest thermal relay of the class of the study trips, set to the rated
-    current of the motor. None after the coupling opened, as no load is left that could trip the relay."""
+    """Time after the event [s] at which the slowest thermal relay of the class of the study trips, set to the rated
+    current of the motor; None where it does not, or no rated current is known. None, too, after the coupling opened,
+    as no load is left that could trip the relay."""
     setting = w.drive.rated_current
     if setting is None or w.trip is not None:
         return None
@@ -101,9 +102,10 @@ def _relay(w: Window) -> float | None:
     current = w.value(w.current)
     if w.phase is Phase.LOADED_START:
         current = w.drive.relay_current(w.since, current)
-    before = w.steady.rms(w.current)
-    lasts = lasting_current(current, before if w.passes and _stall(w) is None else None)
-    return relay_trip(w.since, current, setting, before, lasts, w.relay_class)
+    steady_current = w.steady.rms(w.current)
+    # an event that passes, and does not stall the motor, leads back to steady running
+    afterwards = lasting_current(current, steady_current if w.passes and _stall(w) is None else None)
+    return relay_trip(w.since, current, setting, steady_current, afterwards, w.relay_class)
 
 
 def _stall(w: Window) -> float | None:

@@ -158,8 +158,9 @@ class Window:
 
     @cached_property
     def lasts(self) -> bool:
-        """Whether means of steady running stand for running that lasts. They do not where the moving masses take up
-        more than `LASTING`, or the crank turns and makes no whole turn. Some machines never repeat a turn."""
+        """Whether means of steady running stand for running that lasts: where the moving masses take up at most
+        `LASTING` of the energy over the turns, or the crank stands. A crank that makes a part of a turn is on its
+        way. Of a machine that never repeats a turn, and of other phases, no more is asked."""
         if self.phase is not Phase.STEADY or self.drive.simulated_machine.model.never_repeats:
             return True
         if not has_turn(self.drive, self.run):

@@ -193,14 +193,15 @@ def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
     """By name, the section of each of the `tables` [section.name], with the whole title of its pin."""
 
     def read(entry: Entry, name: str) -> SectionPlan:
+        """The section of a table: texts (pin, notch and the like), and quantities by `SectionTable`."""
         for key in t.SECTION_NEEDS:
             if key not in entry.raw:
                 choice = f", one of {', '.join(t.NOTCHES)}" if key == "notch" else ""
                 entry.fault(key, f"must be given{choice}")
-        keys = {key: entry.raw.pop(key) for key in t.SECTIONS.keys if key in entry.raw}
-        if pin := keys.get("pin"):
-            keys["pin"] = _only_pin(entry, pin, titles)
-        notch = keys.get("notch", "none")
+        texts = {key: entry.raw.pop(key) for key in t.SECTIONS.keys if key in entry.raw}
+        if pin := texts.get("pin"):
+            texts["pin"] = _only_pin(entry, pin, titles)
+        notch = texts.get("notch", "none")
         needed = t.NOTCH_KEYS[t.SHOULDER] if notch == t.SHOULDER else ()
         _check_keys(entry, "notch", notch, needed, t.NOTCH_KEYS)
         entry.refuse()
@@ -209,7 +210,7 @@ def _sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
             entry.fault("bore", "must be less than the diameter")
         if notch == t.SHOULDER:
             _check_shoulder(entry, table)
-        return SectionPlan(table, **keys)
+        return SectionPlan(table, **texts)
 
     return t.SECTIONS.read_named(tables, faults, read)
 

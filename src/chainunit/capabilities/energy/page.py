@@ -9,7 +9,7 @@ from ...report import blocks as b
 from ...report import figure as fig
 from ...report.cited import cited, exact, number
 from ...report.lines import Line, Number, filled, line
-from ...study.record import StudyRecord, StudySetup
+from ...study.record import StudyRecord
 from .analysis import EnergyFindings, MotorComparison, Year
 from .motor_class import MotorClass, words_of
 from .running import PLACES, Losses
@@ -17,22 +17,16 @@ from .running import PLACES, Losses
 PICTURE = "energy.png"
 
 
-def _titles(setup: StudySetup) -> dict[str, str]:
-    """The title of each power; the parts between motor and machine have their noun."""
-    return {v.name: v.template for v in Layout(Losses).variables} | {"gear": setup.drive.transmission}
-
-
 def blocks(study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the energy."""
     findings = EnergyFindings.of_study(study.findings)
-    x, years = (
-        cited(findings, "findings.energy"),
-        exact(cited(study.setup.config.table("usage"), "given.usage").years),
-    )
+    x = cited(findings, "findings.energy")
+    years = exact(cited(study.setup.config.table("usage"), "given.usage").years)
     yield b.Text(_lead(findings, x))
     if (motor_class := MotorClass.found_in(study.findings)) is not None:
         yield b.Text(words_of(motor_class))
-    titles = _titles(study.setup)
+    # the parts between motor and machine have their noun
+    titles = {v.name: v.template for v in Layout(Losses).variables} | {"gear": study.setup.drive.transmission}
     yield _places(findings, x, titles)
     yield _figure(findings, titles)
     yield _year(findings, x, years)
@@ -57,6 +51,7 @@ def _lead(findings: EnergyFindings, x: EnergyFindings) -> Line:
 
 
 def _known(findings: EnergyFindings) -> list[str]:
+    """The names of the powers that are known."""
     return [name for name in PLACES if getattr(findings.own.mean, name) is not None]
 
 

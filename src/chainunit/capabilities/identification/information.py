@@ -73,11 +73,13 @@ class Combination:
     deviation: float
 
     def __str__(self) -> str:
-        first, *others = self.terms
-        rest = "".join(
-            f" {'+' if c > 0.0 else '-'} {_factor(abs(c))}{short_name(name)}" for name, c in others
-        )
-        return short_name(first[0]) + rest
+        """The sum as a formula: ``pin.friction - 0.5 crank.m``."""
+        (first, _), *others = self.terms
+        text = short_name(first)
+        for name, coefficient in others:
+            size = abs(coefficient)
+            text += f" {'+' if coefficient > 0.0 else '-'} {f'{size:.7g} ' if size != 1.0 else ''}{short_name(name)}"
+        return text
 
 
 @result
@@ -323,7 +325,3 @@ def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> Reco
 def short_name(name: str) -> str:
     """A name of the system without that of the machine."""
     return name.removeprefix("machine.")
-
-
-def _factor(x: float) -> str:
-    return "" if x == 1.0 else f"{x:.7g} "

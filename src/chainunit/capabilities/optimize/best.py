@@ -165,18 +165,17 @@ def _from_starts(
 
 
 def _repaired(search: Search, starts: Sequence[Any]) -> tuple[list[Answer], Conflict | None]:
-    """Answers from machines that meet the limits, or the conflict."""
-    first, met = nearest(search, starts)
-    if met and first is not None:
-        objective = search.wishes.objectives[0]
-        answer = search.solve(first.x, objective)
-        if not answer.feasible:
-            # where the limits leave hardly any room, the machine that meets them is the answer
-            answer = replace(answer, x=first.x, value=search.value(objective, first.x), feasible=True)
-        return [answer], None
-    if first is None:
-        first = search.solve(search.base, None)
-    return [], conflict(search, starts[:_RETRIES], first)
+    """The answer of a search from the machine nearest to the limits, where no start led to one that meets them; where
+    this one does not meet them either, the conflict of the limits."""
+    near, met = nearest(search, starts)
+    if near is None or not met:
+        return [], conflict(search, starts[:_RETRIES], near or search.solve(search.base, None))
+    objective = search.wishes.objectives[0]
+    answer = search.solve(near.x, objective)
+    if not answer.feasible:
+        # where the limits leave hardly any room, the machine that meets them is the answer
+        answer = replace(answer, x=near.x, value=search.value(objective, near.x), feasible=True)
+    return [answer], None
 
 
 def _values(search: Search, x: Any) -> dict[str, float]:

@@ -313,13 +313,15 @@ class Search:
         return [share * highest for share in CHECKED] if row.kind == "slack" else [self.wishes.crank_speed]
 
     def _tops(self, row: Row, x: Any, aux: Any) -> Any:
-        """The peaks of a row over the turn near its limit, and the largest one, near which the next solution may be:
-        as of `_peaks`, with the share of its scale by which each exceeds the limit in place of the value."""
+        """The peaks of a row over the turn that come near to its limit or exceed it, and always the largest one: as
+        of `_peaks`, but with the excess over the limit, in parts of the row's scale, in place of the value. `aux` are
+        the auxiliary variables of the program, which shift the row."""
         ((_, column, factor),) = row.terms
         offset = sum(weight * aux[place] for place, weight in row.aux) - row.upper
-        top = self._peaks(x, column, factor, self._speeds(row), -offset - _LOOKED_AT * row.scale)
-        top[:, 0] = (top[:, 0] + offset) / row.scale
-        return top[top[:, 0] >= min(-_NEAR, np.max(top[:, 0]))]
+        peaks = self._peaks(x, column, factor, self._speeds(row), -offset - _LOOKED_AT * row.scale)
+        excess = (peaks[:, 0] + offset) / row.scale
+        peaks[:, 0] = excess
+        return peaks[excess >= min(-_NEAR, np.max(excess))]
 
     def _is_tight(self, row: Row, x: Any) -> bool:
         """Whether a mean is near its limit at a machine."""

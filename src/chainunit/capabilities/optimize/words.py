@@ -22,6 +22,8 @@ _UNITS = {
     "kg.m2": (0.1, "0.1 kg m2"),
 }
 """By unit, a step of a limit that a reader knows, in the unit and in words."""
+_TELLING = 1e-4
+"""Least change of the objective, as a share of it, by which a clearance counts as one that binds."""
 _ACTIVE = 1e-6
 """Least change of the objective, as a share of it, by a step of a limit that binds."""
 
@@ -80,14 +82,14 @@ def _binding(best: Best, name: str, side: str, value: Any, unit: str, slope: flo
 
 
 def clearances(best: Best) -> list[str]:
-    """The requirements of the model whose distance binds."""
+    """The requirements of the model that bind: whose clearance, if it were given up, would change the objective by
+    more than `_TELLING` of it."""
     assert best.answer is not None
-    size = abs(best.answer.value) or 1.0
-    return [
-        subject
-        for (owner, subject), slope in best.answer.sensitivities.items()
-        if owner == TURNS and abs(slope) * best.wishes.clearance > 1e-4 * size
-    ]
+    least = _TELLING * (abs(best.answer.value) or 1.0)
+    slopes = {
+        subject: slope for (owner, subject), slope in best.answer.sensitivities.items() if owner == TURNS
+    }
+    return [subject for subject, slope in slopes.items() if abs(slope) * best.wishes.clearance > least]
 
 
 def idle_sentence(best: Best) -> str:

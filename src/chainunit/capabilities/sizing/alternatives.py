@@ -183,11 +183,12 @@ def _gentlest(
 
 
 def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **more: float) -> WayNumbers:
-    """The numbers of a starter; no setting where the gear does not carry it."""
+    """The numbers of a starter: the least setting of the coupling that neither `running` [N m] nor one of the
+    `starts` opens, or None where the gear does not carry it, and with `more` the values of the starter."""
     start = hardest(starts)
-    least = MARGIN * max(running, start)
+    least_setting = MARGIN * max(running, start)
     return WayNumbers.of(
-        setting=least if least < setting.gear else None,
+        setting=least_setting if least_setting < setting.gear else None,
         running=running,
         start=start,
         start_time=max(entry.start_time for entry in starts),

@@ -241,17 +241,16 @@ class MotorTrials:
 
 
 def _nearest(trials: list[Candidate]) -> Candidate:
-    """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
-    best, last = (
-        min(trials, key=lambda c: c.violation),
-        max(trials, key=lambda c: c.drive.added_inertia),
-    )
-    best.heaviest = last.drive.added_inertia
-    if not last.checks:
+    """The trial that comes nearest to all limits; where none starts, the one without a flywheel. It gets the heaviest
+    flywheel that was tried, and the reason to stop there (`stop`): the first limit that this flywheel exceeds."""
+    best = min(trials, key=lambda c: c.violation)
+    heaviest = max(trials, key=lambda c: c.drive.added_inertia)
+    best.heaviest = heaviest.drive.added_inertia
+    if not heaviest.checks:
         best.stop = FAILED
-    elif last.starts:
-        worse = (name for name in (*WORSE_WITH_INERTIA, "starts") if last.exceeds(name))
-        best.stop = next(worse, EVEN if _has_even_torque(last) else "start")
+    elif heaviest.starts:
+        exceeded = (name for name in (*WORSE_WITH_INERTIA, "starts") if heaviest.exceeds(name))
+        best.stop = next(exceeded, EVEN if _has_even_torque(heaviest) else "start")
     else:
         best.stop = UNSTARTED if any(c.starts for c in trials) else "start"
     return best

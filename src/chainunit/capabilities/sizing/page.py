@@ -383,15 +383,18 @@ def _gears(findings: SizingFindings, x: SizingFindings) -> Iterator[b.Table]:
 
 
 def _ways(runs: StudyRuns, protection: DriveProtection, x: DriveProtection) -> Iterator[b.Table]:
-    """A row for each way to a coupling that a start does not open."""
+    """A row for each way to a coupling that a start does not open; `x` is the cited `protection`."""
+    opened = {
+        way.way: "; ".join(map(runs.title_of, way.opens)) or "nothing" for way in protection.alternatives
+    }
     return table(
-        zip(protection.alternatives, x.alternatives, strict=True),
-        ("way", lambda row: row[1].way),
-        ("set to", lambda row: number(row[1].numbers.setting)),
-        ("running", lambda row: number(row[1].numbers.running)),
-        ("a start", lambda row: number(row[1].numbers.start)),
-        ("start-up", lambda row: number(row[1].numbers.start_time)),
-        ("opens or slips where", lambda row: "; ".join(map(runs.title_of, row[0].opens)) or "nothing"),
+        x.alternatives,
+        ("way", lambda row: row.way),
+        ("set to", lambda row: number(row.numbers.setting)),
+        ("running", lambda row: number(row.numbers.running)),
+        ("a start", lambda row: number(row.numbers.start)),
+        ("start-up", lambda row: number(row.numbers.start_time)),
+        ("opens or slips where", lambda row: opened[row.way]),
         title="Ways to a torque limiter: its setting, and the torques of running and of a start, at the "
         f"{runs.drive.driver_noun}",
         numeric=False,

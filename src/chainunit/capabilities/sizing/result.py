@@ -18,12 +18,10 @@ from ...study.starts import StartFindings, transient_words, weak_in_star
 from ...study.verdict import STEADY
 from .candidate import Candidate, TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
-from .gear_order import gear_order
+from .gear_order import GearOrder, gear_order
 from .parts import PartsList
 from .protection import Alternative, CouplingEffect, Obstacle, Setting, WayNumbers
 from .table import SizingPlan
-
-_OF = {"start": "largest torque by load and acceleration"}
 
 
 @result
@@ -53,34 +51,40 @@ def ordered_gear(
     order = gear_order(study, setting, margin, service)
     if order is None or not study.setup.drive.is_geared:
         return None
-    decides = order.decides
-    reason = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}, rounded up"
-    if order.without > order.rated:
-        reason += f"; without the torque limiter {number(order.without, 'N.m')}"
-    if order.left_out:
-        names = ", ".join(map(study.runs.title_of, order.left_out))
-        reason += (
-            f"; a lower bound, as the energy balance is not kept ({names}): shorten run.step before you order"
-        )
+    reason = _deciding_load(study.runs, order)
     free = number(margin, "1", "percent", full=False)
     title = (
         f"gear, rated output torque at least, with the margin of {free} above running; decided by {reason}"
     )
+    loads = {}
+    for name, load in order.loads.items():
+        size = "largest torque by load and acceleration" if name == "start" else "largest torque"
+        loads[name] = _torque(load.torque, f"{size} of {load.words} on the output of the gear")
+    service_title = f"service factor fB of the gear: {plan.service_words(inertia_factor)}"
     transient = None
     if order.transient is not None:
         transient = _torque(order.transient, transient_words(study.setup))
     return OrderedGear(
-        InUnit(order.rated, "N.m", title=title),
-        {
-            name: _torque(
-                load.torque, f"{_OF.get(name, 'largest torque')} of {load.words} on the output of the gear"
-            )
-            for name, load in order.loads.items()
-        },
-        InUnit(service, "1", title=f"service factor fB of the gear: {plan.service_words(inertia_factor)}"),
-        transient,
-        reason,
+        rated_torque=InUnit(order.rated, "N.m", title=title),
+        loads=loads,
+        service_factor=InUnit(service, "1", title=service_title),
+        transient=transient,
+        decided_by=reason,
     )
+
+
+def _deciding_load(runs: StudyRuns, order: GearOrder) -> str:
+    """The load that decides the order of a gear in words, with its torque, and the runs that are left out."""
+    decides = order.decides
+    text = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}, rounded up"
+    if order.without > order.rated:
+        text += f"; without the torque limiter {number(order.without, 'N.m')}"
+    if order.left_out:
+        names = ", ".join(map(runs.title_of, order.left_out))
+        text += (
+            f"; a lower bound, as the energy balance is not kept ({names}): shorten run.step before you order"
+        )
+    return text
 
 
 def _torque(value: float, title: str) -> InUnit:

@@ -195,17 +195,16 @@ def _gear(interface: Interface) -> float:
 def _turned_shafts(
     interface: Interface, inputs: Mapping[str, float], gear: float, k: int
 ) -> dict[str, float]:
-    """Angle, speed and acceleration of each shaft among the `inputs` of the point `k` whose angle has no bounds: the
-    crank after the gear stands at an angle of its own, and has the speed of the course."""
+    """Angle, speed and acceleration of each shaft among the `inputs` of the point `k`, for shafts whose angle has no
+    bounds. The inputs count as those of the crank: the shaft turns `gear` times as far and as fast, and each point is
+    turned on by `_ANGLE` of the crank."""
     quantities = {s.name: s.variable.quantity for s in interface.signals_of("input")}
     turned = dict[str, float]()
     for terminal in interface.model.terminals:
-        names = [terminal.members.get(key) for key in ("phi", "w", "a")]
-        if set(names) <= set(inputs) and names[0]:
-            angle = quantities[names[0]]
-            if not math.isfinite(angle.high - angle.low):
-                turned |= {name: gear * inputs[name] for name in names if name}
-                turned[names[0]] = gear * (inputs[names[0]] + _ANGLE * k)
+        phi, w, a = (terminal.members.get(key, "") for key in ("phi", "w", "a"))
+        if {phi, w, a} <= inputs.keys() and not math.isfinite(quantities[phi].high - quantities[phi].low):
+            turned[phi] = gear * (inputs[phi] + _ANGLE * k)
+            turned |= {name: gear * inputs[name] for name in (w, a)}
     return turned
 
 

@@ -45,15 +45,13 @@ def _who_notices(runs: StudyRuns, x: ObserverFindings) -> b.Table:
                 times = (number(notice.time, none="not") for notice in notices)
                 yield b.TableRow((f"{title}, after", *times))
                 yield b.TableRow(("rocker torque by then", *(number(notice.carried) for notice in notices)))
-        sides = (_named(x.named[run], x.loaded[run]) for run in names)
+        sides = []
+        for run in names:
+            side, loaded = x.named[run], x.loaded[run]
+            sides.append(f"{side} (wrong)" if side and loaded not in ("", side) else side or "none")
         yield b.TableRow(("side that the observer names", *sides))
 
     return over_runs(runs, names, rows(), "Who notices")
-
-
-def _named(named: str, loaded: str) -> str:
-    """The side that the observer names, and whether it is the loaded one."""
-    return f"{named} (wrong)" if named and loaded not in ("", named) else named or "none"
 
 
 _MASS = fig.Axis("feed of a side", "kg")
