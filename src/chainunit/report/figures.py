@@ -211,45 +211,42 @@ def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
 
 @PICTURES.declare(lambda study: study.setup.statics.loops, "speed_loop.png")
 def _speed_loop(study: StudyRecord) -> fig.Figure:
-    loops = list(enumerate(study.setup.statics.loops.items()))
-    ends = [loop.frequency[k] for _, (_, loop) in loops for k in (0, -1)]
-    frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
-    narrowest = min(study.setup.statics.loops.values(), key=lambda loop: loop.phase_margin)
-    longest = 1.5 * max(loop.settling for loop in study.setup.statics.loops.values())
-    time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
-    panels = (
-        (frequency, fig.Axis("gain of the open loop", log=True), "frequency", "gain", "Gain"),
-        (frequency, fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0), "frequency", "phase", "Phase"),
-        (time, fig.Axis("speed deviation", "rad/(N.m.s)"), "time", "deviation", "Disturbance step"),
-    )
+    """Gain, phase and disturbance step of the speed loops, with crossover and phase margin of the narrowest one."""
+    loops = study.setup.statics.loops
+    narrowest = min(loops.values(), key=lambda loop: loop.phase_margin)
 
-    def items(over: str, ordinate: str) -> Iterator[fig.Item]:
-        yield from (
-            fig.Curve(name, getattr(loop, over), getattr(loop, ordinate), look)
-            for look, (name, loop) in loops
-        )
-        if ordinate == "gain":
-            yield fig.Mark(1.0, axis="y", look="thin")
-        if ordinate == "phase":
-            yield fig.Mark(-180.0, axis="y", look="thin")
-        if ordinate in ("gain", "phase"):
-            yield fig.Mark(narrowest.crossover, "crossover", look="mark")
-        if ordinate == "phase":
-            margin = narrowest.phase_margin
-            yield fig.Label(
-                narrowest.crossover, -180.0 + margin, f"margin {number_words(margin, 'deg')}", "left"
-            )
+    def curves(abscissa: str, ordinate: str) -> Iterator[fig.Curve]:
+        for look, (name, loop) in enumerate(loops.items()):
+            yield fig.Curve(name, getattr(loop, abscissa), getattr(loop, ordinate), look)
+
+    crossover = fig.Mark(narrowest.crossover, "crossover", look="mark")
+    margin = f"margin {number_words(narrowest.phase_margin, 'deg')}"
+    margin_label = fig.Label(narrowest.crossover, -180.0 + narrowest.phase_margin, margin, "left")
+    gain_items: tuple[fig.Item, ...] = (
+        *curves("frequency", "gain"),
+        fig.Mark(1.0, axis="y", look="thin"),
+        crossover,
+    )
+    limit = fig.Mark(-180.0, axis="y", look="thin")
+    phase_items: tuple[fig.Item, ...] = *curves("frequency", "phase"), limit, crossover, margin_label
+    ends = [loop.frequency[k] for loop in loops.values() for k in (0, -1)]
+    frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
+    phase = fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0)
+    longest = 1.5 * max(loop.settling for loop in loops.values())
+    time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
+    deviation = fig.Axis("speed deviation", "rad/(N.m.s)")
+    panels = (
+        fig.Panel(frequency, fig.Axis("gain of the open loop", log=True), gain_items, "Gain"),
+        fig.Panel(frequency, phase, phase_items, "Phase"),
+        fig.Panel(time, deviation, tuple(curves("time", "deviation")), "Disturbance step"),
+    )
 
     return fig.Figure(
         "speed-loop",
         "The speed loop, linearised",
         "Gain and phase of the open speed loop over the frequency, and the deviation of the motor speed after a step "
         "of the load torque.",
-        (
-            tuple(
-                fig.Panel(x, y, tuple(items(over, ordinate)), title) for x, y, over, ordinate, title in panels
-            ),
-        ),
+        (panels,),
         heights=(1.4,),
     )
 

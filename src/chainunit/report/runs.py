@@ -105,10 +105,11 @@ def _doubt(setup: StudySetup) -> str:
 
 
 def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
-    """Of the table of all runs, steady running beside the overload with the largest crank torque, for one screen."""
+    """Of the table of all runs (`whole`), steady running beside the overload with the largest crank torque, for one
+    screen."""
     runs, setup = study.runs, study.setup
     names = by_side(runs, runs.answers)
-    shown = [run for run in ("steady",) if run in names] or names[:1]
+    shown = ["steady"] if "steady" in names else names[:1]
     peaks = {run: runs.answers[run].crank_torque_peak for run in runs.overloads if run in names}
     title = whole.title
     if peaks:
@@ -117,9 +118,10 @@ def _beside_the_worst(study: StudyRecord, whole: b.Table) -> b.Table:
         bare = " (without torque limiter)" if is_bare else ""
         worst = f"{run_names.title(runs, shown[-1])}{_doubt(setup)}"
         title = f"Steady running beside the worst overload{bare}: {worst}"
-    places = [0, *(1 + names.index(run) for run in shown)]
-    rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)
-    columns = tuple(whole.columns[i] for i in places)
+    # the first column has the descriptions
+    columns_shown = [0, *(1 + names.index(run) for run in shown)]
+    rows = (replace(row, cells=tuple(row.cells[k] for k in columns_shown)) for row in whole.rows)
+    columns = tuple(whole.columns[k] for k in columns_shown)
     return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")
 
 

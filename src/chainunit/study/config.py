@@ -228,8 +228,7 @@ class Config:
         return self.motor is None or self.plate is not None
 
     def table(self, name: str) -> Any:
-        """The values of a table; None for an optional table that the file does not
-        have."""
+        """The values of a table; None for an optional table that the file does not have."""
         if name in _OF_DRIVE:
             return getattr(self.drive, name)
         return getattr(self, name) if name in _OWN_TABLES else self.values[name]

@@ -28,8 +28,7 @@ from .line.placed import Line, PlacedPart
 
 
 class AbsentError(InputError):
-    """A quantity that this motor or machine does not have; `part` is the name of motor or machine in the
-    system."""
+    """A quantity that this motor or machine does not have; `part` is the name of motor or machine in the system."""
 
     def __init__(self, part: str, text: str) -> None:
         super().__init__(text)

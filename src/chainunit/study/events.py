@@ -173,16 +173,20 @@ class OneSidedFeed(Event):
         return bool(self.p.share == 1.0)
 
     def ends(self, normal: Mapping[str, float]) -> dict[str, float]:
-        """The inputs of both sides after the feed has moved."""
+        """The inputs of both sides after a share of each load has moved to the side of the event; on a machine with a
+        width, the load there lies in the middle of both."""
         ends, share = {}, self.p.share
-        for load in PLACES:
-            here, there = (filled(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
-            ends[there] = (1.0 - share) * normal[there]
-            ends[here] = normal[here] + share * normal[there]
-            name, from_name = (filled(f"{{{side}}}.{PLACES[load]}", self.side) for side in ("side", "other"))
-            if name in normal:
-                moved = share * normal[there], normal[from_name]
-                ends[name] = middle_of((normal[here], normal[name]), moved)
+        for load, place_name in PLACES.items():
+            (load_here, place_here), (load_there, place_there) = (
+                (f"{side}.{load}", f"{side}.{place_name}")
+                for side in (self.side, filled("{other}", self.side))
+            )
+            moved = share * normal[load_there]
+            ends[load_there] = (1.0 - share) * normal[load_there]
+            ends[load_here] = normal[load_here] + moved
+            if place_here in normal:
+                present = normal[load_here], normal[place_here]
+                ends[place_here] = middle_of(present, (moved, normal[place_there]))
         return ends
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
@@ -212,8 +216,7 @@ class LoadedStart(OneSidedFeed):
 
     @declaration
     class Parameters(FeedShare):
-        """Quantities of the feed in the start. The start begins at rest and is followed as long as the
-        start-up."""
+        """Quantities of the feed in the start. The start begins at rest and is followed as long as the start-up."""
 
     def signals(self, normal: Values, begin: float, state: Values) -> Signals:
         """The feed on one side from rest on."""

@@ -324,37 +324,41 @@ def _means(
     return (0.0 if abs(mean) <= _LOSSLESS * size else float(mean), torque_rms), forces_rms
 
 
+class _MovingPart(NamedTuple):
+    """A joint or link that moves, the class of its motion, and the outputs of its place and its rate."""
+
+    name: str
+    motion: type[Stroke | Swing]
+    place: str
+    rate: str
+
+
 def _motions(
     description: LinkageDescription, way: _Way, q: Any
 ) -> Iterator[tuple[str, Stroke | Swing, list[float]]]:
     """The motion of each sliding joint besides the driver and of each link that swings, each with its name and with
     the places of the driver at which it turns back."""
     structure, turns = description.structure, way.machine.model.turns
-    moving: list[tuple[str, type[Stroke | Swing], str, str, str]] = [
-        (name, Stroke, "s", "v", description.variable("joint", name))
-        for name, joint in structure.joints.items()
-        if joint.kind == PRISMATIC and name != structure.driver.joint
-    ]
-    moving += [
-        (name, Swing, "angle", "w", description.variable("link", name))
-        for name in structure.links
-        if description.link_turns[name][0] == 0.0 or not turns
-    ]
-    parts = [
-        (name, kind, f"{variable}.{place}", f"{variable}.{rate}")
-        for name, kind, place, rate, variable in moving
-    ]
+    parts: list[_MovingPart] = []
+    for name, joint in structure.joints.items():
+        if joint.kind == PRISMATIC and name != structure.driver.joint:
+            variable = description.variable("joint", name)
+            parts.append(_MovingPart(name, Stroke, f"{variable}.s", f"{variable}.v"))
+    for name in structure.links:
+        if description.link_turns[name][0] == 0.0 or not turns:
+            variable = description.variable("link", name)
+            parts.append(_MovingPart(name, Swing, f"{variable}.angle", f"{variable}.w"))
     _, outputs = way.state(q)
-    parts = [part for part in parts if np.ptp(outputs[part[2]]) > STANDS]
-    dead_centres = roots(way.outputs(rate for *_, rate in parts), q, around=turns) if parts else []
-    for (name, motion_type, output, _), back in zip(parts, dead_centres, strict=True):
+    parts = [moving for moving in parts if np.ptp(outputs[moving.place]) > STANDS]
+    dead_centres = roots(way.outputs(moving.rate for moving in parts), q, around=turns) if parts else []
+    for moving, back in zip(parts, dead_centres, strict=True):
         # a driver with a range has ends of its own
         places = back if turns and len(back) else np.array([q[0], *back, q[-1]])
-        course = way.outputs([output])(places)[0]
+        course = way.outputs([moving.place])(places)[0]
         low, high = int(np.argmin(course)), int(np.argmax(course))
         whole = 2.0 * math.pi
         forth = float(places[high] - places[low]) % whole if turns else None
-        motion = motion_type(
+        motion = moving.motion(
             least=_plain(course[low]),
             least_at=_folded(float(places[low]), turns),
             largest=_plain(course[high]),
@@ -363,7 +367,7 @@ def _motions(
             forth=forth,
             time_ratio=max(forth, whole - forth) / min(forth, whole - forth) if forth else None,
         )
-        yield name, motion, sorted(_folded(float(x), turns) for x in back)
+        yield moving.name, motion, sorted(_folded(float(x), turns) for x in back)
 
 
 def _folded(q: float, turns: bool) -> float:

@@ -199,8 +199,7 @@ def measure(
     card: bool = False,
     minor: bool = False,
 ) -> Any:
-    """A field that declares a `Measure`, as `quantity` does; its description is the subject `of` and the
-    `phrase`."""
+    """A field that declares a `Measure`, as `quantity` does; its description is the subject `of` and the `phrase`."""
     own_field = quantity(unit, f"{of}, {phrase}" if of else phrase, kind=kind)
     declared = Measure(reader, during, phrase, of or phrase, card, minor)
     return dataclasses.field(metadata={**own_field.metadata, "measure": declared})
@@ -210,8 +209,7 @@ def measure(
 class Answers:
     """The demands of a run on the drive. Torques and speeds are the crank's unless they are called the motor's. Means
     and RMS of steady running are over the time of whole turns of the crank, the turns in `load_cycle.csv`; those of
-    an event are over all the time that it is followed, as its peaks are.
-    Times count from the event.
+    an event are over all the time that it is followed, as its peaks are. Times count from the event.
 
     - ripple: (largest - least)/mean of the speed
     - `power_peak`: the largest power that the motor gives, 0 where it only brakes

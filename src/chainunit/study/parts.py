@@ -144,7 +144,8 @@ def is_designation(motor: str) -> bool:
 
 
 def parts_of(data: Mapping[str, Any], source: str) -> Parts:
-    """Machine and motor of a file. They are checked first, as the other tables depend on them.
+    """Machine and motor of a file. They are checked first, as the other tables depend on them. A file that leaves the
+    motor open has the one of its example; a name that is none of a model or an FMU is a designation of a catalogue.
 
     Raises
     ------
@@ -300,8 +301,7 @@ def with_frictions(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Inp
 
 @cache
 def _examples_of_machines() -> dict[str, str]:
-    """By machine, the first example with that machine; a study takes the values that its file leaves out from
-    it."""
+    """By machine, the first example with that machine; a study takes the values that its file leaves out from it."""
     tables = {name: named_table(toml(example(name)), "system") for name in reversed(EXAMPLES)}
     return {read_table(SystemTable, table, "system.").machine: name for name, table in tables.items()}
 

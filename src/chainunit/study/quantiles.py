@@ -30,9 +30,8 @@ that repeats itself: then nothing is random, and the interval holds all values."
 
 
 def quantile(values: Any, q: float) -> Estimate | None:
-    """The quantile `q` of independent values, shape (n,), or of runs with several values each, shape (runs,
-    n); its interval is between two of the ordered values. None where the values count as fewer than
-    `runs_needed`."""
+    """The quantile `q` of independent values, shape (n,), or of runs with several values each, shape (runs, n); its
+    interval is between two of the ordered values. None where the values count as fewer than `runs_needed`."""
     from scipy.stats import binom
 
     values = np.asarray(values, float)

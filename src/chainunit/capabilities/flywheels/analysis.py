@@ -206,21 +206,23 @@ def _wheel(
 ) -> Wheel:
     """A flywheel with its answers; a machine that stands or creeps has no answers of steady running."""
     turning = steady.speed_mean > CREEPS * setup.config.run.crank_speed
-    drive, motor_ripple = setup.drive, None
+    drive, motor_ripple, by_hand = setup.drive, None, findings.by_hand(flywheel)
     if drive.line and turning:
-        motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
-    numbers = {
+        w = turns[drive.motor_speed].values
+        motor_ripple = float(np.ptp(w) / np.mean(w))
+    further = {
         "flywheel": flywheel,
         "inertia": findings.inertia(flywheel),
         "start_time": start.start_time,
         # the formula does not hold for a ripple of more than 2
-        "by_hand": by_hand if (by_hand := findings.by_hand(flywheel)) < 2.0 else None,
+        "by_hand": by_hand if by_hand < 2.0 else None,
         "motor_ripple": motor_ripple,
         "residual": residual,
     }
-    names = Layout(FlywheelAnswers).names
-    values = {name: numbers.get(name, getattr(steady, name, None) if turning else None) for name in names}
-    answers = FlywheelAnswers(**values)
+    measures = set(Layout(FlywheelAnswers).names) - set(further)
+    answers = FlywheelAnswers(
+        **further, **{name: getattr(steady, name) if turning else None for name in measures}
+    )
     checks = given_motor(
         drive,
         setup.config.plate,
@@ -466,8 +468,7 @@ def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
 
 
 def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
-    """Warn where the motor runs evenly enough and the crank does not: the ripple is made behind the
-    flywheel."""
+    """Warn where the motor runs evenly enough and the crank does not: the ripple is made behind the flywheel."""
     ripples = [(wheel, wheel.answers.motor_ripple) for wheel in findings.wheels]
     even = [
         wheel for wheel, ripple in ripples if ripple is not None and ripple <= findings.permitted_fluctuation

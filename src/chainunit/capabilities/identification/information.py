@@ -136,34 +136,31 @@ def _covariance(problem: Problem, fisher: Any, wider: float) -> Any:
 
 
 def _determinations(problem: Problem, fisher: Any) -> tuple[Determination, ...]:
-    alone, both = (np.sqrt(np.diag(_covariance(problem, fisher, x))) for x in (WEAK, 1.0))
+    """The standard deviations of each sought number: by its prior, by the runs alone, and by both."""
+    by_runs, by_both = (np.sqrt(np.diag(_covariance(problem, fisher, wider))) for wider in (WEAK, 1.0))
     return tuple(
-        Determination(u.name, u.unit, u.prior_deviation, float(a), float(k))
-        for u, a, k in zip(problem.sought, alone, both, strict=True)
+        Determination(u.name, u.unit, u.prior_deviation, float(by_runs[k]), float(by_both[k]))
+        for k, u in enumerate(problem.sought)
     )
 
 
 def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
-    """For each number that is not determined, the sum with the fewest others that is."""
-    covariance, both = (_covariance(problem, fisher, wider) for wider in (WEAK, 1.0))
+    """For each number that the runs alone (priors wider by `WEAK`) do not determine, the sum with the fewest others
+    that they do: others are added one at a time, each time the one that leaves the least variance."""
+    by_runs, by_both = (_covariance(problem, fisher, wider) for wider in (WEAK, 1.0))
     sought, sums = problem.sought, dict[frozenset[str], Combination]()
     for first, unknown in enumerate(sought):
-        if math.sqrt(covariance[first, first]) < DETERMINED * unknown.prior_deviation:
+        if math.sqrt(by_runs[first, first]) < DETERMINED * unknown.prior_deviation:
             continue
         others: list[int] = []
-        while len(others) < MOST_TERMS - 1:
-            left = set(range(len(sought))) - {first, *others}
-            if not left:
-                break
-            others.append(min(left, key=lambda k: _rest(covariance, first, [*others, k])))
-            deviation = math.sqrt(_rest(covariance, first, others))
-            if deviation < SHARP * unknown.prior_deviation:
-                factors, deviation = _factors(covariance, both, first, others)
+        while len(others) < MOST_TERMS - 1 and (left := set(range(len(sought))) - {first, *others}):
+            others.append(min(left, key=lambda k: _rest(by_runs, first, [*others, k])))
+            if math.sqrt(_rest(by_runs, first, others)) < SHARP * unknown.prior_deviation:
+                factors, deviation = _factors(by_runs, by_both, first, others)
                 names = [sought[k].name for k in others]
                 terms = ((unknown.name, 1.0), *zip(names, factors, strict=True))
-                sums.setdefault(
-                    frozenset((unknown.name, *names)), Combination(terms, unknown.unit, deviation)
-                )
+                combination = Combination(terms, unknown.unit, deviation)
+                sums.setdefault(frozenset((unknown.name, *names)), combination)
                 break
     return tuple(sums.values())
 

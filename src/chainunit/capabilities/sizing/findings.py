@@ -201,11 +201,11 @@ class SizingFindings(Findings):
         """The drive with its protection by the runs of the study."""
         setting, trial = self.coupling(study), self.best.trial
         return SizedDrive(
-            self.best,
-            bool(study.setup.insufficient),
-            study.setup.driver_noun,
-            study.findings.verdict.caveat if study.findings.verdict else None,
-            weak_in_star(study.findings) and not study.setup.config.empty_start,
+            best=self.best,
+            insufficient=bool(study.setup.insufficient),
+            driver=study.setup.driver_noun,
+            caveat=study.findings.verdict.caveat if study.findings.verdict else None,
+            needs_empty_start=weak_in_star(study.findings) and not study.setup.config.empty_start,
             gear=ordered_gear(study, setting, self.plan, trial.inertia_factor),
             protection=drive_protection(
                 study, setting, self.alternatives, self.best.motor.nameplate.rated_current

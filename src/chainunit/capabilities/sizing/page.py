@@ -279,16 +279,19 @@ def _numbers(study: StudyRecord, findings: SizingFindings, drive: SizedDrive) ->
 def _best(setup: StudySetup, drive: SizedDrive, x: SizedDrive, best: Candidate) -> Iterator[b.Block]:
     """The sentences on what is ordered, and on the reason for the choice."""
     doubt = line(" (", cited(drive.caveat, "verdict.model.caveat"), ")") if drive.caveat else ()
-    # a motor that does not suffice is not ordered
     parts = () if drive.parts is None else drive.parts.items
-    motor = [line("motor ", best.designation, " of ", source) for source in _data(setup)]
-    order: list[Line] = [line(title, *_how_to_order(drive, x, 0)) for title in motor]
+    cited_parts = () if x.parts is None else x.parts.items
+    order: list[Line] = []
+    # the motor is the first part
+    for motor_data in _data(setup):
+        order.append(line("motor ", best.designation, " of ", motor_data, *_how_to_order(drive, x, 0)))
     if not any(part.kind == "gear" for part in parts):
         order += (*_belt(x.belt), *_gear_torque(x))
-    for k, item in enumerate(x.parts.items if x.parts is not None else ()):
-        if k:
-            order.append(line(f"{parts[k].kind} ", item.designation, *_how_to_order(drive, x, k)))
+    for k in range(1, len(cited_parts)):
+        designation = cited_parts[k].designation
+        order.append(line(f"{parts[k].kind} ", designation, *_how_to_order(drive, x, k)))
     order += _starter(setup, drive, x, best.numbers)
+    # a motor that does not suffice is not ordered
     if order and not drive.insufficient:
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
     begin = "Insufficient: " if drive.insufficient else "Chosen: "

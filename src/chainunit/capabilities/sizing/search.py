@@ -499,17 +499,17 @@ def _without_flywheel(
         return None
     tried = {c.motor.designation for c in candidates}
     poles = best.motor.nameplate.poles
-    rest = [
+    larger = [
         m
         for m in motors
         if m.nameplate.poles == poles and m.nameplate.power > best.power and m.designation not in tried
     ]
-    # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
-    least = None
-    while rest:
-        middle = len(rest) // 2
-        candidate = trials.candidates_of(rest[middle], trials.with_least_boost)[-1]
+    # halve the list: above a motor that is too weak, below one that fits or is too hard on the gear in its start
+    smallest = None
+    while larger:
+        middle = len(larger) // 2
+        candidate = trials.candidates_of(larger[middle], trials.with_least_boost)[-1]
         if candidate.keeps_margin:
-            least = candidate
-        rest = rest[middle + 1 :] if _is_weak(candidate) else rest[:middle]
-    return least
+            smallest = candidate
+        larger = larger[middle + 1 :] if _is_weak(candidate) else larger[:middle]
+    return smallest

@@ -307,8 +307,7 @@ class Trial:
         )
 
     def checks(self) -> dict[str, Check]:
-        """Each value beside its limit, by name; the value is None where the machine does not get up to
-        speed."""
+        """Each value beside its limit, by name; the value is None where the machine does not get up to speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
         run_up = motor_run_up(self.drive, self._from_rest, self.start_time)
