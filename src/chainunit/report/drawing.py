@@ -500,15 +500,13 @@ def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground:
 
 
 def _svg(canvas: _Canvas, title: str, height: float) -> str:
+    """The picture as a text of SVG: the tips of its arrows, and the pieces of the canvas."""
+    looks = (("tip", "#c1440e"), ("axis", "#555555"), ("end", "#777777"), ("begin", "#777777"))
     tips = "".join(
         f'<marker id="drawing-{name}" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" markerHeight="7" '
-        f'orient="auto"><path d="M0 0L8 4L0 8z" fill="{colour}"/></marker>'
-        for name, colour in (("tip", "#c1440e"), ("axis", "#555555"), ("end", "#777777"))
-    )
-    tips += (
-        tips[tips.rindex("<marker") :]
-        .replace("drawing-end", "drawing-begin")
-        .replace('"auto"', '"auto-start-reverse"')
+        f'orient="{"auto-start-reverse" if name == "begin" else "auto"}">'
+        f'<path d="M0 0L8 4L0 8z" fill="{colour}"/></marker>'
+        for name, colour in looks
     )
     size = f"{WIDTH + COLUMN:.0f} {height:.0f}"
     return (

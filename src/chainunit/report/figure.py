@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from ..reading.text import Units, plain, scales_of_size, unit_text
-from ..study.arrays import stretches
 from .lines import Line
 
 
@@ -230,7 +229,8 @@ _SPACING = 0.035
 
 
 def hatch_lines(hatch: Hatch) -> tuple[Any, Any]:
-    """The lines of a hatch: x and y of their ends, with NaN between two lines."""
+    """The lines of a hatch over the true `cells` of a map: x and y of their ends, with NaN between two lines. Within,
+    u and v go from 0 to 1 over the map, and t along a line."""
     (x0, x1), (y0, y1) = ((float(e[0]), float(e[-1])) for e in (np.asarray(hatch.x), np.asarray(hatch.y)))
     x, y = (np.asarray(hatch.x) - x0) / (x1 - x0), (np.asarray(hatch.y) - y0) / (y1 - y0)
     a, b = _DIRECTIONS[hatch.look % len(_DIRECTIONS)]
@@ -247,7 +247,9 @@ def hatch_lines(hatch: Hatch) -> tuple[Any, Any]:
         inside = (column >= 0) & (column < len(x) - 1) & (row >= 0) & (row < len(y) - 1)
         drawn = np.zeros(len(middle), bool)
         drawn[inside] = cells[row[inside], column[inside]]
-        ends += [[t[begin], t[end], u0, v0] for begin, end in stretches(drawn)]
+        edges = np.diff(np.concatenate([[False], drawn, [False]]).astype(int))
+        for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+            ends.append([t[begin], t[end], u0, v0])
     begins, stops, u_feet, v_feet = np.array(ends).reshape(-1, 4).T
     gaps = np.full(len(begins), np.nan)
     u = np.stack([u_feet - b * begins, u_feet - b * stops, gaps], axis=1).ravel()

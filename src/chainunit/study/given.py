@@ -112,17 +112,18 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         values = config.table(name) if placed is None or placed.table is None else placed.table
         if values is None or not section.is_used(study):
             continue
-        prefix = f"{name}."
-        keys = {
-            full.removeprefix(prefix): x for full, x in config.file.choices.items() if full.startswith(prefix)
-        }
-        events = [key for key in section.random_events if keys.pop(key, None) is not None]
+        choices = {}
+        for full, x in config.file.choices.items():
+            table, _, key = full.partition(".")
+            # the findings have the entries of a list of tables, and random events are sections of their own
+            if table == name and x and key not in {*section.lists.entries, *section.random_events}:
+                choices[key] = x
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.file.given else ())
-        # the findings have the entries of a list of tables
-        choices = {key: x for key, x in keys.items() if x and key not in section.lists.entries}
         yield GivenSection(name, section.title, values, choices, unused_names=follows)
-        for key in events:
+        for key in (
+            key for key in section.random_events if config.file.choices.get(f"{name}.{key}") is not None
+        ):
             random = randoms[f"{name}.{key}"]
             side = {"side": random.side} if random.side else {}
             title = f"Overload at random: {random.heading}"

@@ -75,8 +75,8 @@ def _start_empty(
     run = simulation.run(stop, rig.step, progress, guards=speed_limit)
     while stop - 0.5 * rig.step <= simulation.time < longest:
         speed = float(run[name][-1])
-        before = float(run[name].sel(time=stop - piece, method="nearest"))
-        if goal - speed > (speed - before) / piece * (longest - stop):
+        acceleration = (speed - float(run[name].sel(time=stop - piece, method="nearest"))) / piece
+        if goal - speed > acceleration * (longest - stop):
             break
         stop = min(stop + piece, longest)
         run = join([run, simulation.run(stop, rig.step, progress, guards=speed_limit)])

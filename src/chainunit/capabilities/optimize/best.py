@@ -243,18 +243,16 @@ def _dominates(a: FrontPoint, b: FrontPoint) -> bool:
 
 
 def _compromise(search: Search, front: Sequence[FrontPoint]) -> Answer:
-    """The point of the front that is nearest to the least values of both, each as a share of its range; solved
-    again with the second objective limited to its value."""
+    """The point of the front that is nearest to the least values of both objectives, each counted over its range;
+    solved again for the first one, with the second one limited to its value there."""
     values = np.array([point.values for point in front])
     span = np.ptp(values, axis=0)
     shares = (values - np.min(values, axis=0)) / np.where(span > 0.0, span, 1.0)
     point = front[int(np.argmin(np.hypot(*shares.T)))]
     first, second = search.wishes.objectives
-    limits = [
-        *search.wishes.limits,
-        TurnLimit(second, None, point.values[1] * (1.0 + math.copysign(1e-9, point.values[1]))),
-    ]
-    answer = search.solve(point.x, first, limits)
+    # rounding must not forbid the point itself
+    highest = point.values[1] * (1.0 + math.copysign(1e-9, point.values[1]))
+    answer = search.solve(point.x, first, [*search.wishes.limits, TurnLimit(second, None, highest)])
     return answer if answer.feasible else replace(answer, x=point.x, value=point.values[0], feasible=True)
 
 

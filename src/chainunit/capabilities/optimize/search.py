@@ -359,21 +359,22 @@ class Search:
         is_peak[np.argmax(y)] = True
         places = np.flatnonzero(is_peak)
         places = places[np.argsort(-y.ravel()[places])][:_MOST_PEAKS]
-        (begin, w), top = lanes[:, places], y.ravel()[places]
-        q, step = begin, 2.0 * math.pi / FINE
+        (grid_q, w), grid_value = lanes[:, places], y.ravel()[places]
+        q, step = grid_q, 2.0 * math.pi / FINE
+        # of nine angles around each peak the best is next, within a quarter of the distance
         for k in range(_ROUNDS):
             near = q[:, None] + step * 0.25**k * np.linspace(-1.0, 1.0, 9)
             values = self.columns.values(x, near.ravel(), np.repeat(w, 9), [column]).reshape(near.shape)
             q = near[np.arange(len(q)), np.argmax(factor * values, axis=1)]
+        # value, slope and bend at the peaks, and the values a step of the grid beside them
         around = np.concatenate([q, q - step, q + step])
-        (value, *beside), (slope, *_), (bend, *_) = self.columns.values(
-            x, around, np.tile(w, 3), [column], 2
-        ).reshape(3, 3, -1)
+        derivatives = self.columns.values(x, around, np.tile(w, 3), [column], 2).reshape(3, 3, -1)
+        (value, *beside), (slope, *_), (bend, *_) = derivatives
         least_drop = np.min(factor * (value - beside), axis=0)
         # a kink, or a peak that is narrower than the grid, counts as the angle of the grid
         smooth = (factor * bend < 0.0) & (np.abs(slope) < _EXACT * np.abs(bend))
         smooth &= 0.5 * np.abs(bend) * step**2 < _NARROW * least_drop
-        value, q = np.where(smooth, factor * value, top), np.where(smooth, q, begin)
+        value, q = np.where(smooth, factor * value, grid_value), np.where(smooth, q, grid_q)
         return np.stack([value, q, w, smooth / np.where(smooth, bend, 1.0)], axis=1)
 
     def _answer(

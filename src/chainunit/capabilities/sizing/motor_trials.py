@@ -157,24 +157,25 @@ class MotorTrials:
     def _over_gears(
         self, motor: CatalogueMotor, ratio: float, judge: Callable[[Candidate], Candidate]
     ) -> list[Candidate]:
-        """The candidates with the gears about this ratio, up to the first that fits with the margin."""
-        judged: list[Candidate] = []
-        run: list[Candidate] = []
+        """The candidates with the gears about this ratio, up to the first that fits with the margin. A gear that
+        surely does not hold by the runs with an earlier one has none of its own."""
+        candidates: list[Candidate] = []
+        with_runs: list[Candidate] = []
         for gear in rows_for(self.task.gears, ratio, _TOLERANCE, self.plan.objective):
-            if not helps(gear, run):
+            if not helps(gear, with_runs):
                 continue
             c = self.candidate(motor, gear=gear)
-            if (ruled_out := spent(c, run)) is not None:
-                judged.append(ruled_out)
+            if (ruled_out := spent(c, with_runs)) is not None:
+                candidates.append(ruled_out)
                 continue
             c = judge(c)
             if c.fits and not c.worst_start:
                 c = self.with_least_boost(c, worst_start=True)
-            judged.append(c)
-            run.append(c)
+            candidates.append(c)
+            with_runs.append(c)
             if c.keeps_margin:
                 break
-        return judged
+        return candidates
 
     def best_of(self, motor: CatalogueMotor) -> Candidate:
         """The candidate with the least flywheel, and with an inverter with the least boost. Where it then misses its

@@ -51,16 +51,17 @@ def over_parameters(summary: SweepSummary) -> Iterator[fig.Figure]:
 def _levels(z: Any) -> tuple[float, ...]:
     """Even levels around the finite values, in rounded steps, at most `_CLASSES` + 1; levels that grow where values
     reach over decades, or where most of them would stand in one even class."""
-    low, most, high = (float(level) for level in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
+    low, below_most, high = (float(level) for level in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
     if not high - low > 1e-9 * max(abs(low), abs(high)):
-        wide = max(abs(low), 1e-9)
-        return (low - wide, low, low + wide)
-    raw = (high - low) / _CLASSES
-    if low > 0.0 and (high > WIDE * low or (most < low + raw and high > 4.0 * low)):
+        # all values are equal
+        margin = max(abs(low), 1e-9)
+        return (low - margin, low, low + margin)
+    exact_step = (high - low) / _CLASSES
+    if low > 0.0 and (high > WIDE * low or (below_most < low + exact_step and high > 4.0 * low)):
         return _wide_levels(low, high)
-    size = 10.0 ** np.floor(np.log10(raw))
+    power_of_ten = 10.0 ** np.floor(np.log10(exact_step))
     for factor in (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0):
-        step = factor * size
+        step = factor * power_of_ten
         first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
         if last - first <= _CLASSES:
             break

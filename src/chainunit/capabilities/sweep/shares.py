@@ -152,19 +152,17 @@ def _polynomials(parameters: Sequence[SweptParameter], x: Any, terms: Any) -> An
 
 
 def _of_one(parameter: SweptParameter, x: Any, degree: int) -> Any:
-    """Polynomials up to the degree that are orthonormal for the distribution of a parameter, shape (points,
-    degree + 1)."""
+    """Polynomials up to the degree that are orthonormal for the distribution of a parameter, at its values `x`, shape
+    (points, degree + 1): of Hermite for a normal one, of Legendre for an even one, and by QR for single values."""
     from numpy.polynomial import hermite_e, legendre
 
     if parameter.is_normal:
         t = (x - parameter.centre) / parameter.deviation
         return hermite_e.hermevander(t, degree) / np.sqrt([math.factorial(k) for k in range(degree + 1)])
     low, high = parameter.ends
-    polynomials = legendre.legvander((2.0 * x - low - high) / (high - low), degree) * np.sqrt(
-        2.0 * np.arange(degree + 1) + 1.0
-    )
     if not parameter.values:
-        return polynomials
+        sizes = np.sqrt(2.0 * np.arange(degree + 1) + 1.0)
+        return legendre.legvander((2.0 * x - low - high) / (high - low), degree) * sizes
     values = np.array(parameter.values)
     matrix = legendre.legvander((2.0 * values - low - high) / (high - low), degree)
     q, _ = np.linalg.qr(matrix)
