@@ -127,17 +127,16 @@ def _from_lines(boxes: Sequence[tuple[float, ...]], lines: Collection[Side]) -> 
 def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
     """The parameters that are lengths in the drawing. Keys are ``("link", name)`` for the length of a link,
     ``("point", link, name)`` for the place of a point on a link, and ``("x", pin)`` and ``("y", pin)`` for the place
-    of a ground pin."""
+    of a ground pin. The linkage is made once with a value for each parameter that no other has: a length with this
+    value is that parameter."""
     layout, model = machine.model.parameter_layout, machine.model
-    marks = {v.name: 1.0 + k / 7919.0 for k, v in enumerate(layout.variables)}
-    parameter_names = {value: name for name, value in marks.items()}
-    variables = {v.name: v for v in layout.variables}
-    marked_linkage = model.linkage(MATH, layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
+    variables = {1.0 + k / 7919.0: v for k, v in enumerate(layout.variables)}
+    marked_values = layout.from_names({v.name: mark for mark, v in variables.items()})
+    marked_linkage = model.linkage(MATH, marked_values, Layout(model.Inputs).from_names({}))
     values = layout.by_name(machine.p)
 
-    def dimension_of(x: Any) -> Dimension | None:
-        name = parameter_names.get(abs(float(x)))
-        v = variables.get(name or "")
+    def dimension_of(length: Any) -> Dimension | None:
+        v = variables.get(abs(float(length)))
         return None if v is None or v.unit != "m" else Dimension(v.name, v.description, values[v.name])
 
     matches: dict[tuple[str, ...], Dimension | None] = {}

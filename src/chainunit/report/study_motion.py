@@ -38,17 +38,18 @@ def motion(study: StudyRecord) -> Animation:
     supplements = (part.supplement(drive) for part in capabilities())
     supplement = next((candidate for candidate in supplements if candidate is not None), Supplement(drive))
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
-    parts = machine_picture.picture(machine, whole := machine.drive(angles * machine.ratio))
-    loads = _LOADS if machine_picture.has_loads(whole) else ""
-    thin = f"; a thin line is the {', the '.join(parts.paths)}" if parts.paths else ""
+    whole_turn = machine.drive(angles * machine.ratio)
+    picture = machine_picture.picture(machine, whole_turn)
+    loads = _LOADS if machine_picture.has_loads(whole_turn) else ""
+    thin_lines = f"; a thin line is the {', the '.join(picture.paths)}" if picture.paths else ""
     return replace(
-        parts,
-        links=tuple(_links(parts.links, supplement)),
+        picture,
+        links=tuple(_links(picture.links, supplement)),
         runs=tuple(_run(study.runs, name, interval, supplement) for name in run_names.in_order(study.runs)),
         turn=turn,
-        caption=supplement.caption or _CAPTION.format(loads, thin),
+        caption=supplement.caption or _CAPTION.format(loads, thin_lines),
         groups=tuple(dict.fromkeys(supplement.groups.values())),
-        names={**parts.names, **supplement.names},
+        names={**picture.names, **supplement.names},
     )
 
 

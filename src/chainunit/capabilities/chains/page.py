@@ -147,19 +147,15 @@ def _sweep(x: ChainResult) -> b.Table:
 
 
 def _critical(chain: ChainResult, x: ChainResult) -> Iterator[b.Block]:
-    """Critical crank speeds: all of them in a table, those within the sweep in a sentence."""
+    """Critical crank speeds: all of them in a table of modes and orders, those within the sweep in a sentence."""
     modes: dict[int, dict[int, CriticalSpeed]] = {}
     for speed, shown in zip(chain.critical, x.critical, strict=True):
         modes.setdefault(speed.mode, {})[speed.order] = shown
-    rows = (
-        b.TableRow(
-            (
-                filled("mode {}", exact(next(iter(by_order.values())).mode)),
-                *(number(shown.speed) for shown in by_order.values()),
-            )
-        )
-        for by_order in modes.values()
-    )
+    rows = []
+    for by_order in modes.values():
+        first, *_ = by_order.values()
+        speeds = (number(shown.speed) for shown in by_order.values())
+        rows.append(b.TableRow((filled("mode {}", exact(first.mode)), *speeds)))
     orders = (filled("order {}", exact(shown.order)) for shown in next(iter(modes.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")

@@ -286,16 +286,16 @@ def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:
 
 
 def _other_speeds(problem: Problem, further: RecordedRun) -> Iterator[tuple[str, RecordedRun]]:
-    """The run at other speeds, and at a speed that changes."""
+    """The run at other speeds, and at a speed that changes; without speeds, to 5 %, and changes that the runs
+    have."""
     w, references = float(further.values[REFERENCE]), [run.values.get(REFERENCE, 0.0) for run in problem.runs]
+    first_speeds = [x.start if isinstance(x, Profile) else x for x in references]
     for share in OTHER_SPEEDS:
-        if not any(abs(getattr(x, "start", x) - share * w) < 0.05 * w for x in references):
+        if not any(abs(speed - share * w) < 0.05 * w for speed in first_speeds):
             values = {**further.values, REFERENCE: share * w}
-            yield (
-                f"at {share:g} times the speed",
-                replace(further, values=values, crank_speed=share * further.crank_speed),
-            )
-    if not any(hasattr(x, "changes") for x in references):
+            run = replace(further, values=values, crank_speed=share * further.crank_speed)
+            yield f"at {share:g} times the speed", run
+    if not any(isinstance(x, Profile) for x in references):
         time = further.recording.time
         begins = np.arange(float(time[0]), float(time[-1]), SHAKING)[:MOST_CHANGES]
         changes = tuple((float(t), 0.5 * SHAKING, w * SHAKEN[k % 2]) for k, t in enumerate(begins))

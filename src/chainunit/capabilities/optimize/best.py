@@ -156,6 +156,7 @@ def good_value(answers: Sequence[Answer]) -> float:
 def _from_starts(
     search: Search, starts: Sequence[Any], objective: CycleQuantity, progress: TaskProgress
 ) -> list[Answer]:
+    """The answer from each start, with the least value of the objective that it leads to."""
     answers = []
     for k, x in enumerate(starts):
         progress(f"starts, least {objective.name}", float(k), float(len(starts)))

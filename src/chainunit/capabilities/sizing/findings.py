@@ -140,15 +140,19 @@ class SizingFindings(Findings):
         """The drive of a study by these findings, with the gear of its `tables`."""
         best, trial, fits = self.best, self.best.trial, self.chosen_candidate is not None
         return DriveProposal(
-            "sizing",
-            self,
-            best.drive,
-            best.motor,
-            as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
-            "Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
-            self.answer,
-            lambda study: SizingFindings.of_study(study.findings).sized(study).sentence,
-            lambda study: SizingFindings.of_study(study.findings).currents_until_trip(study),
+            name="sizing",
+            findings=self,
+            drive=best.drive,
+            motor=best.motor,
+            tables=as_used(
+                with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer
+            ),
+            question="Which motor, gear and flywheel does {} need? Its {driver} turns at {}.",
+            reason=self.answer,
+            sentence=lambda study: SizingFindings.of_study(study.findings).sized(study).sentence,
+            currents_until_trip=lambda study: SizingFindings.of_study(study.findings).currents_until_trip(
+                study
+            ),
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,

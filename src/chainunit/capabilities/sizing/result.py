@@ -132,27 +132,18 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
     factor = plan.belt_factor(trial.inertia_factor, is_on_line)
     belt = belt_drive(plate.power, trial.speed or plate.speed, ratio, factor)
     power = number(plate.power, "W")
+    power_title = "V-belt, design power, for which its maker gives number and tension of the belts: "
+    power_title += f"rated {power} of the motor times the service factor"
+    factor_title = f"service factor of the belt: {plan.belt_words(trial.inertia_factor, is_on_line)}"
+    ratio_title = f"ratio of the belt with these pulleys; in the runs {ratio:.4g}"
     return OrderedBelt(
-        InUnit(
-            belt.design_power,
-            "W",
-            title="V-belt, design power, for which its maker gives number and tension of the belts: "
-            f"rated {power} of the motor times the service factor",
-        ),
-        InUnit(
-            factor,
-            "1",
-            title=f"service factor of the belt: {plan.belt_words(trial.inertia_factor, is_on_line)}",
-        ),
-        InUnit(belt.speed, "m/s", title="belt speed"),
-        InUnit(
-            belt.large / belt.small,
-            "1",
-            title=f"ratio of the belt with these pulleys; in the runs {ratio:.4g}",
-        ),
-        InUnit(belt.small, "m", "millimetres", title="pulley of the motor, pitch diameter"),
-        InUnit(belt.large, "m", "millimetres", title="other pulley, pitch diameter"),
-        f"{belt.section}, narrow V-belts",
+        design_power=InUnit(belt.design_power, "W", title=power_title),
+        service_factor=InUnit(factor, "1", title=factor_title),
+        speed=InUnit(belt.speed, "m/s", title="belt speed"),
+        ratio=InUnit(belt.large / belt.small, "1", title=ratio_title),
+        small_pulley=InUnit(belt.small, "m", "millimetres", title="pulley of the motor, pitch diameter"),
+        large_pulley=InUnit(belt.large, "m", "millimetres", title="other pulley, pitch diameter"),
+        section=f"{belt.section}, narrow V-belts",
     )
 
 
@@ -343,21 +334,19 @@ def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.setup.drive.follows:
         device = "electronic motor protection of the inverter"
         return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
-    title, caveat = class_words(study.runs.relay_class), _too_slow(study) or _tolerance(study)
+    title, tolerance = class_words(study.runs.relay_class), _too_slow(study) or _tolerance(study)
     trip_class = {"value": title, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
     if study.setup.drive.star_delta is None:
-        return MotorProtection(
-            InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay", caveat
-        )
-    place = (
-        "in the phases of the delta, behind the main contactor, where it usually sits: 1/sqrt(3) of the rated"
-    )
+        setting = InUnit(rated, "A", title="thermal relay, setting")
+        return MotorProtection(setting, None, trip_class, "relay", tolerance)
+    place = "in the phases of the delta, behind the main contactor, where it usually sits"
+    in_phases = f"thermal relay {place}: 1/sqrt(3) of the rated current, setting"
     return MotorProtection(
-        InUnit(rated / math.sqrt(3.0), "A", title=f"thermal relay {place} current, setting"),
-        InUnit(rated, "A", title="thermal relay in the supply line in place of that, setting"),
-        trip_class,
-        "relay in the phases of the delta",
-        caveat,
+        relay_current=InUnit(rated / math.sqrt(3.0), "A", title=in_phases),
+        line_current=InUnit(rated, "A", title="thermal relay in the supply line in place of that, setting"),
+        relay_class=trip_class,
+        device="relay in the phases of the delta",
+        tolerance=tolerance,
     )
 
 

@@ -169,13 +169,14 @@ def chosen_points(interface: Interface) -> list[StatePoint]:
     start = {s.name: float(s.start or 0.0) for s in parameters}
     quantities = {s.name: s.variable.quantity for s in interface.signals}
     real = [s.name for s in parameters if s.variable.type == "Real" and s.start and "solver." not in s.name]
+    # parameters such as motor.phi_start that are 0
+    motion_starts = {name: name.rpartition(".")[2] for name, x in start.items() if x == 0.0}
     points = []
     for k in range(POINTS):
         inputs = {name: float(x) for name, x in course(0.08 * k).items()}
         inputs |= _turned_shafts(interface, inputs, gear, k)
         motion = {"phi_start": gear * _ANGLE * k, "w_start": gear * 0.2 * k}
-        last_words = {name: name.rpartition(".")[2] for name, x in start.items() if x == 0.0}
-        moved = {name: motion[word] for name, word in last_words.items() if word in motion}
+        moved = {name: motion[last] for name, last in motion_starts.items() if last in motion}
         shifts = {name: 2.0 * rng.random() - 1.0 for name in real}
         for spread in (*SPREADS, 0.0) if k else (0.0,):
             values = start | moved | {name: start[name] * (1.0 + spread * x) for name, x in shifts.items()}
