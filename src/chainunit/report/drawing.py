@@ -481,21 +481,18 @@ def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground:
     ]
     for pin, place in ground.items():
         if "." in getattr(sizes.get(("x", pin)), "name", ""):
-            first, second = (
-                number(float(coordinate), "m", "millimetres", 4, full=False)
-                for coordinate in (place.x, place.y)
-            )
-            rows.append((pin, f"{first.removesuffix(' mm')}, {second}", "bearing: x, y in the frame"))
-    x, y = WIDTH + 4.0, 40.0
+            x, y = (number(float(size), "m", "millimetres", 4, full=False) for size in (place.x, place.y))
+            rows.append((pin, f"{x.removesuffix(' mm')}, {y}", "bearing: x, y in the frame"))
+    left, top = WIDTH + 4.0, 40.0
     # beside the longest name there is room for the values
     right = max([116.0, *(7.0 * len(name) + 66.0 for name, _, _ in rows)])
     for name, value, description in rows:
-        canvas.add("text", name, x=x, y=y, font_style="italic", fill="#1b1b1b")
-        canvas.add("text", value, x=x + right, y=y, text_anchor="end", fill="#1b1b1b")
+        canvas.add("text", name, x=left, y=top, font_style="italic", fill="#1b1b1b")
+        canvas.add("text", value, x=left + right, y=top, text_anchor="end", fill="#1b1b1b")
         for line in textwrap.wrap(description, max(16, 36 - int((right - 116.0) / 6.0))):
-            canvas.add("text", line, x=x + right + 10.0, y=y, fill="#555555", font_size="11.5")
-            y += 15.0
-        y += 7.0
+            canvas.add("text", line, x=left + right + 10.0, y=top, fill="#555555", font_size="11.5")
+            top += 15.0
+        top += 7.0
 
 
 def _svg(canvas: _Canvas, title: str, height: float) -> str:

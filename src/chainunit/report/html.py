@@ -414,12 +414,10 @@ class Page:
 
     def header(self, report: b.Report, title: str, names: Iterable[str]) -> str:
         """Title, source, status, navigation, and the blocks before all sections."""
-        status = (
-            '<p class="alarm"><strong>The run stopped early:</strong> '
-            f"{self.line(report.failure)}. The page shows the results up to there.</p>"
-            if report.failure
-            else ""
-        )
+        status = ""
+        if report.failure:
+            status = '<p class="alarm"><strong>The run stopped early:</strong> '
+            status += f"{self.line(report.failure)}. The page shows the results up to there.</p>"
         headings = {section.name: section.heading for section in report.sections}
         links = "".join(f'<a href="#{name}">{headings[name]}</a>' for name in names)
         opening = self.blocks(b.of_form(report.opening, "long"))

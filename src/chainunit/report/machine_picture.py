@@ -113,11 +113,8 @@ def loads_on_slides(state: MachineState) -> dict[str, tuple[Any, Any]]:
             forces = [wrench.force for wrench in wrenches if wrench.link == joint[1]]
             if joint in m.slides and m.slides[joint].s is not None and carrier is None and forces:
                 slide, place = m.slides[joint], m.pins[joint[0]].p
-                way, force = (
-                    np.broadcast_to(x, np.shape(m.q))
-                    for x in (slide.d.dot(place), sum(f.dot(slide.d) for f in forces))
-                )
-                along[joint[1]] = way, force
+                way, force = slide.d.dot(place), sum(f.dot(slide.d) for f in forces)
+                along[joint[1]] = np.broadcast_to(way, np.shape(m.q)), np.broadcast_to(force, np.shape(m.q))
     return along
 
 

@@ -279,10 +279,8 @@ class _Drawing:
             case Bars():
                 self._bars(item, panel, place)
             case Label():
-                at_x, at_y = (
-                    float(np.log10(v)) if axis.log else float(v)
-                    for axis, v in ((panel.x, item.x), (panel.y, item.y))
-                )
+                at_x = float(np.log10(item.x)) if panel.x.log else float(item.x)
+                at_y = float(np.log10(item.y)) if panel.y.log else float(item.y)
                 white = {"bgcolor": "rgba(255, 255, 255, 0.8)"}
                 self._words(x, y, at_x, at_y, item.words, **white, **_PLACES[item.place])
             case Field():

@@ -204,10 +204,8 @@ def _variables(model: Model) -> Iterator[Block]:
     for causality in ("parameter", "input", "output"):
         for signal in interface.signals_of(causality):
             v = signal.variable
-            start, unit = (
-                f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}",
-                unit_behind(v.unit).strip() or "1",
-            )
+            start = f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}"
+            unit = unit_behind(v.unit).strip() or "1"
             if v.type != "Real":
                 start, unit = written(v.quantity.start or 0.0, v.type), v.type
             allowed = v.quantity.allowed_range if causality != "output" else "-"

@@ -30,9 +30,8 @@ def pin_loads(drive: Drive, run: Dataset) -> dict[str, dict[str, float | None]]:
         forces = pin_force(drive, run, title)
         table[title] = {"peak": float(np.max(forces)), "rms": math.sqrt(mean(run, forces**2))}
         for kind, p in EXPONENT.items():
-            table[title][f"{kind}_equivalent"] = (
-                mean_load(forces, angles[name], p) if name in angles else None
-            )
+            equivalent = mean_load(forces, angles[name], p) if name in angles else None
+            table[title][f"{kind}_equivalent"] = equivalent
     return table
 
 

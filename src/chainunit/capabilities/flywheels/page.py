@@ -89,11 +89,8 @@ def _figure(setup: StudySetup, findings: FlywheelFindings, running: list[Wheel])
     drive, plate = setup.drive, setup.config.plate
     # at most as many flywheels as there are distinct looks of a line, from the least to the largest
     some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]
-    speed, torque, current = (
-        fig.Axis(f"{setup.driver_noun} speed", "rad/s", "speed"),
-        fig.Axis("motor torque, air gap", "N.m"),
-        fig.Axis("motor current", "A"),
-    )
+    speed = fig.Axis(f"{setup.driver_noun} speed", "rad/s", "speed")
+    torque, current = fig.Axis("motor torque, air gap", "N.m"), fig.Axis("motor current", "A")
     items: dict[fig.Axis, list[fig.Item]] = {speed: [], torque: [], current: []}
     if plate is not None:
         items[torque].append(fig.Mark(plate.nameplate.torque, "rated", axis="y", look="reference"))

@@ -123,10 +123,8 @@ def read_identification(
 def _sought(entry: Entry, name: str, variable: Variable, value: float) -> Unknown:
     """A sought number, with its bounds and its prior."""
     content, q, place = entry.given, variable.quantity, entry.place
-    low, high = (
-        entry.quantity(end, variable, content[end]) if end in content else bound
-        for end, bound in (("from", q.low), ("to", q.high))
-    )
+    low = entry.quantity("from", variable, content["from"]) if "from" in content else q.low
+    high = entry.quantity("to", variable, content["to"]) if "to" in content else q.high
     entry.refuse()
     unit = unit_behind(variable.unit)
     if not low < high:

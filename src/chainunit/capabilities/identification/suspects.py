@@ -299,14 +299,12 @@ class _Search:
         if names in self._fits:
             wider, best = self._fits[names]
             values = {name: float(best.z[wider.place[name]]) for name in names}
-        numbers = {u.name: u for u in self._more}
         kinds = {v.name: v.kind for v, _ in self._problem.plant.parameters()}
-        suspects = (
-            Suspect(name, numbers[name].unit, kinds[name], numbers[name].start, x, name not in self._assumed)
-            for name, x in sorted(
-                values.items(), key=lambda item: -abs(item[1] / numbers[item[0]].start - 1.0)
-            )
-        )
+        suspects = []
+        for u in (u for u in self._more if u.name in names):
+            is_stated = u.name not in self._assumed
+            suspects.append(Suspect(u.name, u.unit, kinds[u.name], u.start, values[u.name], is_stated))
+        suspects.sort(key=lambda suspect: -abs(suspect.preferred / suspect.known - 1.0))
         return SuspectSet(tuple(suspects), excess, self._describes(names))
 
 
@@ -405,11 +403,9 @@ class _Freed:
         pull = self._pull[chosen] - form[chosen] @ step - self._prior[chosen] * self._now[chosen]
         matrix = form[np.ix_(chosen, chosen)] + np.diag(self._prior[chosen])
         changes = self._now[chosen] + np.linalg.solve(matrix, pull)
-        low, high = (
-            np.array([getattr(self._more[k], end) - self._more[k].start for k in chosen])
-            for end in ("low", "high")
-        )
-        changes = np.clip(changes, low, high)
+        lowest = np.array([self._more[k].low - self._more[k].start for k in chosen])
+        highest = np.array([self._more[k].high - self._more[k].start for k in chosen])
+        changes = np.clip(changes, lowest, highest)
         step[chosen] = changes - self._now[chosen]
         cost = step @ form @ step - 2.0 * self._pull @ step
         return changes, float(cost + np.sum(self._prior[chosen] * changes**2))

@@ -70,15 +70,14 @@ def _poles(x: LinearModel) -> Iterator[b.Table]:
 
 
 def _bends(linear: LinearModel, x: LinearModel) -> Iterator[b.Block]:
+    """A warning of each input or state by which the slopes change near the point."""
     for bend, shown in zip(linear.bends, x.bends, strict=True):
         names, more = bend.rows[:_MOST_ROWS], len(bend.rows) - _MOST_ROWS
         rows = line(join(map(Name, names)), f" and {more} more" if more > 0 else "")
-        said = (
-            line("the slopes by it jump at this point; the matrices have those of one side: ")
-            if bend.kink
-            else line("the slopes by it bend within ", number(shown.within), " of this point: ")
-        )
-        yield b.Judgement("warning", line(Name(bend.by), ": ", said, rows, "."))
+        slopes = line("the slopes by it bend within ", number(shown.within), " of this point: ")
+        if bend.kink:
+            slopes = line("the slopes by it jump at this point; the matrices have those of one side: ")
+        yield b.Judgement("warning", line(Name(bend.by), ": ", slopes, rows, "."))
 
 
 def _point(x: LinearModel) -> Iterator[b.Block]:

@@ -192,10 +192,8 @@ def _pulls(search: Search, x: Any) -> tuple[float, float] | None:
     parameters `x` [N], see `Best.pulls`; NaN where one does not turn."""
     if not search.wishes.slack_free_speed:
         return None
-    today, pull = (
-        search.least_pull(point) if search.turns(point) else math.nan for point in (search.today, x)
-    )
-    return today, pull
+    today, here = (search.least_pull(p) if search.turns(p) else math.nan for p in (search.today, x))
+    return today, here
 
 
 # -- two objectives

@@ -179,10 +179,9 @@ def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, 
         entry.wrong("", entry.raw, f"must be a table with {needed}")
         entry.refuse()
     entry.keys("", entry.given, _ENDS)
-    low, high = (
-        entry.quantity(end, variable, entry.given[end]) if end in entry.given else missing
-        for end, missing in zip(_ENDS, (-math.inf, math.inf), strict=True)
-    )
+    low_end, high_end = _ENDS
+    low = entry.quantity(low_end, variable, entry.given[low_end]) if low_end in entry.given else -math.inf
+    high = entry.quantity(high_end, variable, entry.given[high_end]) if high_end in entry.given else math.inf
     return low, high, unit_behind(variable.unit)
 
 

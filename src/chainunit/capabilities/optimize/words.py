@@ -103,9 +103,8 @@ def idle_sentence(best: Best) -> str:
 def limit_words(limit: TurnLimit) -> str:
     """A limit in words: ``range(rocker.psi) from 16 deg to 20 deg``."""
     q = limit.quantity
-    low, high = (
-        None if x is None else number(x, q.unit, q.kind, full=False) for x in (limit.low, limit.high)
-    )
+    low = None if limit.low is None else number(limit.low, q.unit, q.kind, full=False)
+    high = None if limit.high is None else number(limit.high, q.unit, q.kind, full=False)
     if low is not None and high is not None:
         return f"{q.name} = {low}" if limit.low == limit.high else f"{q.name} from {low} to {high}"
     return f"{q.name} of at least {low}" if low is not None else f"{q.name} of at most {high}"
@@ -116,9 +115,8 @@ def conflict_sentences(best: Best) -> Iterator[str]:
     assert best.conflict is not None
     wishes, conflict = best.wishes, best.conflict
     quantities = {limit.name: limit.quantity for limit in wishes.limits}
-    alone, together = (
-        [_wish_words(best, name) for name in names] for names in (conflict.alone, conflict.together)
-    )
+    alone = [_wish_words(best, name) for name in conflict.alone]
+    together = [_wish_words(best, name) for name in conflict.together]
     if alone:
         remark = " Each of these limits is impossible alone." if len(alone) > 1 else ""
         yield f"No machine within the bounds has {'; none has '.join(alone)}.{remark}"

@@ -89,10 +89,9 @@ class OrganMotion(Supplement):
         """The places of the inner joints of a chain [m], and its processing force [N]."""
         drive, names = self.drive, NAMES[side]
         p, (walls, webs) = drive.machine.p, _rods(drive)
-        theta, omega = (
-            [part[f"machine.{side}.{x}_{k}"].values for k in range(1, walls + webs + 1)]
-            for x in ("theta", "omega")
-        )
+        rods = range(1, walls + webs + 1)
+        theta = [part[f"machine.{side}.theta_{k}"].values for k in rods]
+        omega = [part[f"machine.{side}.omega_{k}"].values for k in rods]
         chain = pins([p.l1 / walls] * walls + [p.l2 / webs] * webs, theta, omega, numpy_())
         v, force = chain[walls].p1, part[f"machine.{side}.processing_force"].values
         law = Resistance(names.b, force, p.processing)

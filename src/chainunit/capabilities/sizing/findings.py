@@ -87,11 +87,9 @@ class SizingFindings(Findings):
         if self.weak:
             count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
         best = f"{self.best.motor.designation}: {self.best.reason}"
-        return (
-            f"{best} ({count})"
-            if self.chosen_candidate
-            else f"no motor of the catalogue fits ({count}); {best}"
-        )
+        if self.chosen_candidate:
+            return f"{best} ({count})"
+        return f"no motor of the catalogue fits ({count}); {best}"
 
     @property
     def trade(self) -> tuple[Candidate, Candidate] | None:

@@ -66,10 +66,8 @@ def gear_order(
     findings = StartFindings.found_in(study.findings)
     starts, overloads = _starts(setup, findings, peaks), _overloads(setup, setting, peaks)
     left_out = tuple(name for name in wrong if name in overloads)
-    starts, overloads = (
-        {name: torque for name, torque in torques.items() if name not in wrong}
-        for torques in (starts, overloads)
-    )
+    starts = {name: torque for name, torque in starts.items() if name not in wrong}
+    overloads = {name: torque for name, torque in overloads.items() if name not in wrong}
     loads = dict(_loads(study, setting, margin, service, starts, overloads))
     least, bare = max(load.rated for load in loads.values()), _overloads(setup, None, peaks)
     permitted = setup.config.drive.gear.start_factor * (1.0 - margin)

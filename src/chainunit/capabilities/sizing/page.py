@@ -196,9 +196,9 @@ def _starter(setup: StudySetup, drive: SizedDrive, x: SizedDrive, numbers: Drive
 def _winding(setup: StudySetup) -> str:
     """The winding that a start in star and delta needs: one for the voltage of the supply in delta."""
     supply = 0.0 if setup.plate is None else setup.plate.nameplate.voltage
-    in_star, other = (
-        10.0 * round(supply * factor / 10.0) for factor in (math.sqrt(3.0), 1.0 / math.sqrt(3.0))
-    )
+    # to the tens of volts of a nameplate
+    in_star = 10.0 * round(supply * math.sqrt(3.0) / 10.0)
+    other = 10.0 * round(supply * (1.0 / math.sqrt(3.0)) / 10.0)
     return (
         f"motor winding {supply:g}/{in_star:g} V, in delta at the {supply:g} V of the supply (one of "
         f"{other:g}/{supply:g} V, usual up to 3 kW, stays in star there and has no star-delta start)"

@@ -270,11 +270,10 @@ def _behind(c: Candidate, best: Candidate) -> str:
             return f"its {lacking} {'have' if ' and ' in lacking else 'has'} no price"
         return f"dearer: {price_words(c.price)}"
     if c.criterion is Criterion.COST:
-        return (
-            "dearer than the chosen one"
-            if c.price is not None
-            else f"heavier than the chosen one: {_mass(c)}"
-        )
+        if c.price is not None:
+            return "dearer than the chosen one"
+        with_flywheel = " with its flywheel" if c.disc else ""
+        return f"heavier than the chosen one: {number(c.mass, 'kg')}{with_flywheel}"
     if c.criterion is Criterion.USE:
         is_more = c.use > best.use + ALIKE
         return "more used than the chosen one" if is_more else "as good as the chosen one"
@@ -302,10 +301,6 @@ def _weakened(c: Candidate) -> str:
 
 def _margin(c: Candidate) -> str:
     return number(c.margin, "1", "percent", full=False)
-
-
-def _mass(c: Candidate) -> str:
-    return f"{number(c.mass, 'kg')} with its flywheel" if c.disc else number(c.mass, "kg")
 
 
 def _class(c: Candidate) -> str:

@@ -442,13 +442,11 @@ def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
     if best.drive.follows:
         yield from inverter_needs(best, trials.has_given_boost)
     if best.unit is None:
-        largest = UNITS[trials.plan.gear_kind][-1]
-        end = (
-            f"even of makers with large ratios ends at about {largest.made:g}"
-            if trials.is_made
-            else (f"ends at about {largest.largest:g}")
-        )
-        yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
+        unit = UNITS[trials.plan.gear_kind][-1]
+        end = f"ends at about {unit.largest:g}"
+        if trials.is_made:
+            end = f"even of makers with large ratios ends at about {unit.made:g}"
+        yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {unit.title} {end}."
 
 
 def _is_cheapest(candidates: list[Candidate], price: float) -> bool:

@@ -174,9 +174,7 @@ def _stability(analysis: TorsionFindings) -> fig.Figure:
 def _resonance(analysis: TorsionFindings) -> fig.Figure:
     curve, simulation, panels = analysis.resonance, analysis.simulation, []
     for shaft, static in ((2, analysis.operating.static_torque2), (3, analysis.rotation.load)):
-        steady, rigid = (
-            np.asarray(getattr(motion, f"peak{shaft}")) for motion in (curve.motion, curve.rigid)
-        )
+        steady, rigid = (np.asarray(getattr(x, f"peak{shaft}")) for x in (curve.motion, curve.rigid))
         items: list[fig.Item] = [
             fig.Curve("steady motion", curve.speed, steady),
             fig.Curve("rigid shafts", curve.speed, rigid, 2),

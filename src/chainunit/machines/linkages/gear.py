@@ -465,10 +465,8 @@ def _pitch(joint: JointEntry, geometry: Any) -> tuple[Vec2, Any]:
     """The direction of the pitch line of a rack, and how far it lies to the left of the centre of the pinion [m]."""
     rack, point = joint.on
     guide = geometry.structure.joints[joint.table["guide"]]
-    d, place = (
-        geometry.direction(guide, GROUND),
-        geometry.line_through(guide, rack, geometry.point(rack, point)),
-    )
+    d = geometry.direction(guide, GROUND)
+    place = geometry.line_through(guide, rack, geometry.point(rack, point))
     return d, d.cross(place - geometry.point(GROUND, joint.table["centre"]))
 
 
