@@ -109,6 +109,7 @@ def _group_title(runs: StudyRuns, names: list[str]) -> str:
 
 @PICTURES.declare(lambda study: study.setup.statics.cycles, "torque_angle.png")
 def _turn(study: StudyRecord) -> fig.Figure:
+    """Torques and inertia over a turn at constant speed, by load case."""
     setup, driver, cycles = study.setup, study.setup.driver_noun, study.setup.statics.cycles
     torques: dict[str, Callable[[Cycle], Any]] = {driver: lambda c: c.crank_torque}
     organs = bool(setup.drive.machine.model.sides)
@@ -420,6 +421,7 @@ def _assumed(runs: StudyRuns, run: str) -> Line:
 
 @PICTURES.declare(lambda study: study.runs.pins, "reactions.png")
 def _reactions(study: StudyRecord) -> fig.Figure:
+    """Bars of the forces in each bearing: peak and RMS in one run, and the largest peak of all runs."""
     reference = "steady" if "steady" in study.runs.pins else next(iter(study.runs.pins))
     steady, pins = study.runs.pins[reference], list(study.runs.pins[reference])
     largest = {pin: hardest_run(study.runs.pins, pin) for pin in pins}

@@ -75,6 +75,7 @@ def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
 
 
 def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
+    """The figure drawn by matplotlib, `size` times as large as usual."""
     figure = in_units(spec, units)
     rows, columns = len(figure.panels), len(figure.panels[0])
     heights, widths = figure.row_heights, figure.column_widths
@@ -141,6 +142,7 @@ def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
 
 
 def _scale(axis: Any, spec: Axis, side: str) -> None:
+    """Set range, ticks and label of one side ("x" or "y") of an axis."""
     which = getattr(axis, f"{side}axis")
     if spec.names:
         which.set_ticks(range(len(spec.names)), list(spec.names))

@@ -118,6 +118,7 @@ def _not_assumed(report_sections: dict[str, b.Section], setup: StudySetup) -> It
     listed: set[tuple[str, Any]] = set()
 
     def is_shown(value: b.GivenValue) -> bool:
+        """Whether a value is used and not assumed; equal default values of events are shown once."""
         if not _is_used(value, setup) or _is_assumed(value, setup):
             return False
         if not value.name.startswith("event.") or value.origin != "declared":

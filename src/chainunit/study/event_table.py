@@ -62,6 +62,7 @@ def read_events(tables: Sequence[Any], machine: MachineModel | None = None) -> d
     faults = Faults()
 
     def read(entry: Entry, number: int) -> None:
+        """Add the event of a table, with its side and its input, or the faults of the table."""
         event_type = _type(entry)
         entry.title += f" ({event_type.kind})"
         input_name, side = _input(event_type, entry), _side(event_type, entry)

@@ -119,6 +119,7 @@ def as_dict(study: StudyRecord) -> ResultEntries:
 
 
 def _data(study: StudyRecord) -> StudyData:
+    """The declared content of result.json, but for the parts of analyses and given values."""
     setup, findings, failure = study.setup, study.findings, study.findings.failure
     return StudyData(
         heading=Heading.of(setup.config.title, setup.config.file),
@@ -216,6 +217,7 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _driveline(study: StudyRecord) -> dict[str, Any]:
+    """The data of the shaft line, of its torsion, and of the load of its shafts."""
     shaft = shaft_findings(study.findings)
     largest = max((answers.range_largest for answers in shaft.answers.values()), default=0.0)
     return {

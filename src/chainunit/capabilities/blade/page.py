@@ -51,6 +51,7 @@ def _spans(findings: BladeFindings) -> list[fig.Shade]:
 
 
 def _figure(setup: StudySetup, findings: BladeFindings) -> fig.Figure:
+    """The tilt of the blade over the turn, its path, and the linkage while it falls."""
     angle = findings.turn.angle
     fall = (float(angle[np.argmin(findings.blade.y)]) - findings.top) % (2.0 * math.pi)
     metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))

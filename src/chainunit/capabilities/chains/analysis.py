@@ -389,6 +389,7 @@ def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf)
     rocker torque of two bars at rest [N.m]."""
 
     def why(n: SpeedNumbers) -> str:
+        """The reasons to avoid a speed, in words; empty for a good one."""
         reasons = []
         if n.slack_time > AVOID_SLACK:
             reasons.append("rods go slack and snatch")

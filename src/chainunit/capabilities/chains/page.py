@@ -122,6 +122,7 @@ def _at_study_speed(x: ChainResult) -> b.Table:
 
 
 def _sweep(x: ChainResult) -> b.Table:
+    """A row for each speed of the sweep: torques of chains and of two bars, snatch, slack."""
     quantile = exact(x.quantile)
     columns: dict[str, Line] = {
         "crank_torque_median": "crank torque: median",

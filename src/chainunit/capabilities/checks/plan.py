@@ -165,6 +165,7 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
     taken: dict[str, str] = {}
 
     def read(entry: Entry, name: str) -> tuple[list[str], BearingPlan]:
+        """The pins that the name of a table stands for, and the bearing in each of them."""
         pins = _pins_named(name, titles)
         if not pins:
             entry.fault("", _no_pin(name, titles))

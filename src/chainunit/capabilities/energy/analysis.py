@@ -191,6 +191,7 @@ class _Task:
     plan: UsagePlan
 
     def find(self) -> EnergyFindings | None:
+        """The energy of the motor of the study and of the other one; None where a load is not steady."""
         drive, motor = self.study.setup.drive, self.study.setup.plate
         inverter = self._inverter(drive, motor)
         duty = self._duty(drive, inverter, "")

@@ -37,6 +37,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _lead(findings: EnergyFindings, x: EnergyFindings) -> Line:
+    """Mean power, energy, cost and CO2 of a year, as far as they are known, and the temperature of the winding."""
     text, year, shown = "The drive takes {} in the mean, {} in a year of {}", findings.own.year, x.own.year
     sizes = [number(x.own.mean.electric), number(shown.energy), number(x.running)]
     if year.energy_per_tonne is not None:
@@ -56,6 +57,7 @@ def _known(findings: EnergyFindings) -> list[str]:
 
 
 def _places(findings: EnergyFindings, x: EnergyFindings, titles: Mapping[str, str]) -> b.Table:
+    """A row for each power, from electric to the machine; a column for the mean and for each load."""
     columns = [x.own.mean, *(load.losses for load in x.loads.values())]
     rows = [
         b.TableRow((titles[name], *(number(getattr(losses, name)) for losses in columns)))
@@ -69,6 +71,7 @@ def _places(findings: EnergyFindings, x: EnergyFindings, titles: Mapping[str, st
 
 
 def _year(findings: EnergyFindings, x: EnergyFindings, years: Number) -> b.Table:
+    """The numbers of a year for the motor of the study and, if there is one, the other motor."""
     motors = list(filter(None, (findings.own, findings.other)))
     shown = list(filter(None, (x.own, x.other)))
     rows = [

@@ -58,6 +58,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _table(setup: StudySetup, findings: FlywheelFindings) -> b.Table:
+    """A row for each flywheel, with the answers that any of them has."""
     x = cited(findings, PATH)
     rows = [(remark, cited(wheel.answers, path)) for remark, wheel, path in findings.rows]
     columns = [
@@ -86,6 +87,7 @@ def _table(setup: StudySetup, findings: FlywheelFindings) -> b.Table:
 
 
 def _figure(setup: StudySetup, findings: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
+    """Speed, torque and current over the last turn with each flywheel, and the ripple over the inertia."""
     drive, plate = setup.drive, setup.config.plate
     # at most as many flywheels as there are distinct looks of a line, from the least to the largest
     some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]

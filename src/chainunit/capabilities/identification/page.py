@@ -93,6 +93,7 @@ def _opening(x: IdentificationSummary, machine: IdentifiedMachine) -> Iterator[b
 
 
 def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
+    """The sets of known numbers that would explain the recordings, if they were wrong."""
     rows = [
         (i, suspected.describes, suspect)
         for i, suspected in enumerate(x.suspects, 1)
@@ -121,6 +122,7 @@ def _suspects(x: IdentificationSummary) -> Iterator[b.Block]:
 
 
 def _numbers(x: IdentificationSummary) -> Iterator[b.Block]:
+    """The sought numbers before and after the recordings, or else the suspects."""
     if not x.is_described:
         yield from _suspects(x)
 
@@ -165,6 +167,7 @@ def _meaning() -> b.Text:
 
 
 def _limits(x: IdentificationSummary) -> Iterator[b.Block]:
+    """Changes that leave no trace, sums that are determined, correlations."""
     for change in x.blind:
         yield b.Judgement("partly", line("No trace in any column: ", change.text, "."))
     yield from table(
@@ -191,6 +194,7 @@ def _limits(x: IdentificationSummary) -> Iterator[b.Block]:
 
 
 def _residuals(x: IdentificationSummary) -> Iterator[b.Block]:
+    """The tests of the residuals of each column."""
     yield from table(
         x.residuals,
         ("column", lambda residual: line(as_name(residual.run), " ", as_name(residual.column))),
@@ -219,6 +223,7 @@ def _residuals(x: IdentificationSummary) -> Iterator[b.Block]:
 
 
 def _figures(machine: IdentifiedMachine, summary: IdentificationSummary) -> Iterator[b.Block]:
+    """For each run its measured and simulated columns, over the angle or over time."""
     for run, file in zip(machine.plan.runs, pictures(machine), strict=True):
         panels = []
         steady = machine.is_steady(run.name)

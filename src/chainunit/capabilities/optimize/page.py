@@ -136,6 +136,7 @@ TASK: Task[Config, OptimizedStudy] = Task(
 
 
 def _opening(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """The best machine beside that of today, or the reason why there is none."""
     if x.conflict is not None:
         first, *others = x.conflict.sentences
         yield b.Judgement("bad", first)
@@ -182,6 +183,7 @@ def _turns(best: Best) -> fig.Figure:
 
 
 def _machine(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """The free parameters, the objectives and the limits, of today and of the best or nearest machine."""
     head = "best" if best.met else "nearest"
     yield from table(
         x.parameters.items(),
@@ -217,6 +219,7 @@ def _machine(best: Best, x: BestMachine) -> Iterator[b.Block]:
 
 
 def _binding(x: BestMachine) -> Iterator[b.Block]:
+    """Sentences on the limits and bounds that hold the best machine back."""
     if not x.bindings:
         yield b.Text("No limit and no bound holds the best machine back.")
     for binding in x.bindings:
@@ -228,6 +231,7 @@ def _binding(x: BestMachine) -> Iterator[b.Block]:
 
 
 def _front(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """The machines of the front in a table and in a figure."""
     first, second = best.wishes.objectives
     names = best.wishes.names
     yield b.Text(

@@ -211,6 +211,7 @@ def _parameters(best: Best) -> Iterator[tuple[str, FreeParameter]]:
 
 
 def _quantity(best: Best, name: str) -> SoughtQuantity:
+    """An objective or a limited quantity, of the machine of today and of the best one."""
     q, limit = best.quantities[name], _limit_of(best, name)
     return SoughtQuantity(
         title=q.description,

@@ -141,9 +141,11 @@ def wishes_of(plans: Mapping[str, Any]) -> Wishes:
 def _free(
     tables: Mapping[str, Any], model: MachineModel, of_catalogue: bool, faults: Faults
 ) -> dict[str, tuple[float, float]]:
+    """The bounds of the free parameters by name, of the `tables` [optimize.free.name]."""
     variables = {v.name: v for v in model.parameter_layout.variables}
 
     def read(entry: Entry, name: str) -> tuple[str, tuple[float, float]]:
+        """Name and bounds of a free parameter."""
         if name not in variables:
             entry.fault("", f"no such parameter of the machine{_hint(name, variables)}")
             entry.refuse()
@@ -186,6 +188,7 @@ def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, 
 
 
 def _limit(entry: Entry, name: str, model: MachineModel) -> TurnLimit:
+    """The limit that a table states for the quantity of that name."""
     with refusal_prefix("optimize.limits: ", entry.place):
         q = cycle_quantity(name, model)
     variable = Variable(name, q.description, Quantity(q.unit, q.description))

@@ -29,6 +29,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _factors(setup: StudySetup, x: OrganFindings) -> b.Table:
+    """A row for each overload factor, with a column for each side alone."""
     sides = x.overload_factors
     by = f", of {organs}" if (organs := setup.drive.machine.in_place) else ""
     title = line("Overload factor, one side against both, at ", asked_speed(setup), by)
@@ -43,6 +44,7 @@ def _factors(setup: StudySetup, x: OrganFindings) -> b.Table:
 
 
 def _limits(setup: StudySetup, x: OrganFindings) -> Iterator[b.Block]:
+    """The speeds from which two bars are no model of chains, in a sentence and in a table."""
     limits = x.limits
     swing = number(limits.rocker_extreme_left), number(limits.rocker_extreme_right), number(limits.margin)
     yield b.Text(filled("Rocker swings from {} to {}; margin {}.", *swing), form="short")

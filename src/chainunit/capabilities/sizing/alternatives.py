@@ -215,6 +215,7 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting, chosen: Chosen
     usual = longest_start(rig.operation.ramp_end, study.runs.start.start_time)
 
     def trials() -> Iterator[StarterTrial]:
+        """The drive with each pair of voltage and ramp of a soft starter."""
         for voltage, time in SOFT_STARTERS:
             starter = dataclasses.replace(tables.starter, soft_start=SoftStart(voltage=voltage, time=time))
             soft_tables = dataclasses.replace(tables, start="soft", starter=starter)
@@ -266,6 +267,7 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting, chosen: ChosenMoto
     fed = with_starter(inverter_tables, rig.drive.parameters, plate)
 
     def trials(boost: float) -> Iterator[StarterTrial]:
+        """The drive with an inverter of that boost, with each of the ramps, the shortest first."""
         for ramp in RAMPS:
             run = dataclasses.replace(rig.operation.run, ramp=ramp)
             operation = dataclasses.replace(rig.operation, run=run, starter_time=0.0)

@@ -76,6 +76,7 @@ def _store_in(swept: SweptStudy, folder: Path) -> Path:
 
 
 def _opening(x: SweepSummary) -> Iterator[b.Block]:
+    """The size of the sweep, points without results, and limits of the organs."""
     ranges = join(_range(name, swept) for name, swept in x.parameters.items())
     size = "{} points, {}, over {}; {} of them have results."
     yield b.Text(filled(size, exact(x.size.points), x.size.method, ranges, exact(x.size.feasible)))
@@ -106,6 +107,7 @@ def _columns(names: Iterable[str]) -> tuple[b.Column, ...]:
 
 
 def _best(x: SweepSummary) -> Iterator[b.Block]:
+    """The best points with their parameters and results."""
     names = [*x.parameters, *x.results]
     rows = tuple(
         b.TableRow(
@@ -122,6 +124,7 @@ def _best(x: SweepSummary) -> Iterator[b.Block]:
 
 
 def _extremes(x: SweepSummary) -> Iterator[b.Block]:
+    """The points with the least and with the largest value of each result."""
     rows = tuple(
         b.TableRow(
             (
@@ -138,6 +141,8 @@ def _extremes(x: SweepSummary) -> Iterator[b.Block]:
 
 
 def _influences(x: SweepSummary) -> Iterator[b.Block]:
+    """The influence of each parameter on each result: rank correlation, and shares of the variance if they are
+    known."""
     if not x.influences or len(x.parameters) < 2:
         return
     for name, row in x.influences.items():
@@ -206,6 +211,7 @@ def _influence_table(
 
 
 def _spread(x: SweepSummary) -> Iterator[b.Block]:
+    """Mean, deviation and quantiles of each result of a sweep with tolerances."""
     spread = x.spread.spread
     if not spread:
         return
@@ -252,6 +258,7 @@ def _spread(x: SweepSummary) -> Iterator[b.Block]:
 
 
 def _basis(x: SweepSummary, driver: str) -> Iterator[b.Block]:
+    """The swept parameters, the seed and the method."""
     yield from table(
         x.parameters.items(),
         ("parameter", lambda row: Name(row[0])),

@@ -362,6 +362,7 @@ def _organs(findings: SweepFindings) -> list[OrganShare]:
 
 
 def _spread(findings: SweepFindings, sample: Mapping[str, Any]) -> Iterator[tuple[str, ResultSpread]]:
+    """Mean, deviation and quantiles of each result that has finite values."""
     for name in findings.results:
         x, v = sample[name][np.isfinite(sample[name])], findings.variables[name]
         if len(x):

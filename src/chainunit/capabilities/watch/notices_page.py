@@ -36,6 +36,7 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _who_notices(runs: StudyRuns, x: ObserverFindings) -> b.Table:
+    """When observer, current and coupling notice each overload, and the side that the observer names."""
     names = by_side(runs, x.notices)
 
     def rows() -> Iterator[b.TableRow]:

@@ -149,6 +149,7 @@ def _limits(x: WatchSummary) -> Iterator[b.Block]:
 
 
 def _loads(x: WatchSummary, summary: WatchSummary) -> Iterator[b.Block]:
+    """The usual estimates, and the figures of estimates and thresholds over time."""
     usual = [(quantity, x.usual[name]) for name, quantity in _USUAL.items() if name in x.usual]
     yield from table(
         usual,
@@ -215,6 +216,7 @@ def _marks(summary: WatchSummary) -> Iterator[fig.Shade]:
 
 
 def _alarms(x: WatchSummary) -> Iterator[b.Block]:
+    """A row for each alarm, with the outputs of the observer at its begin."""
     if not x.alarms:
         yield b.Text("There is none.")
 
@@ -238,6 +240,7 @@ def _alarms(x: WatchSummary) -> Iterator[b.Block]:
 
 
 def _basis(x: WatchSummary) -> Iterator[b.Block]:
+    """The numbers that were learned at the begin, and the noise."""
     learned = (
         "Angle, zero and loads were learned in the first {}. Alarms of one side with less than two turns between "
         "them are one."
