@@ -142,7 +142,7 @@ def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
 
 
 def _scale(axis: Any, spec: Axis, side: str) -> None:
-    """Set range, ticks and label of one side ("x" or "y") of an axis."""
+    """Set scale, range and ticks of one side ("x" or "y") of the axes of a panel."""
     which = getattr(axis, f"{side}axis")
     if spec.names:
         which.set_ticks(range(len(spec.names)), list(spec.names))

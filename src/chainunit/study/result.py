@@ -217,7 +217,7 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _driveline(study: StudyRecord) -> dict[str, Any]:
-    """The data of the shaft line, of its torsion, and of the load of its shafts."""
+    """The data of the shaft line with its torsion, of its shafts in the runs, and of their cycles of torque."""
     shaft = shaft_findings(study.findings)
     largest = max((answers.range_largest for answers in shaft.answers.values()), default=0.0)
     return {

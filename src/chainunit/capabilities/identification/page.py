@@ -167,7 +167,7 @@ def _meaning() -> b.Text:
 
 
 def _limits(x: IdentificationSummary) -> Iterator[b.Block]:
-    """Changes that leave no trace, sums that are determined, correlations."""
+    """Changes that leave no trace, sums that are determined, and further runs that would tell more."""
     for change in x.blind:
         yield b.Judgement("partly", line("No trace in any column: ", change.text, "."))
     yield from table(

@@ -44,22 +44,19 @@ def _factors(setup: StudySetup, x: OrganFindings) -> b.Table:
 
 
 def _limits(setup: StudySetup, x: OrganFindings) -> Iterator[b.Block]:
-    """The speeds from which two bars are no model of chains, in a sentence and in a table."""
+    """Swing of the rocker, slack speeds and lowest mode in sentences, and the limits of the model in a table."""
     limits = x.limits
     swing = number(limits.rocker_extreme_left), number(limits.rocker_extreme_right), number(limits.margin)
     yield b.Text(filled("Rocker swings from {} to {}; margin {}.", *swing), form="short")
     web = "with two bars a web" if setup.drive.machine.in_place else "a web"
+    slack_speeds = {"with this feed": number(limits.slack_speed), "empty": number(limits.slack_speed_empty)}
     cases, speeds = [], []
-    for case, speed in (
-        ("with this feed", number(limits.slack_speed)),
-        ("empty", number(limits.slack_speed_empty)),
-    ):
-        if speed.value is not None:
-            cases.append(
-                f"{case}, {web} "
-                + ("first goes slack at {} of the crank" if speed.value else "is slack at rest")
-            )
-            speeds += [speed] if speed.value else []
+    for case, speed in slack_speeds.items():
+        if speed.value:
+            cases.append(f"{case}, {web} first goes slack at {{}} of the crank")
+            speeds.append(speed)
+        elif speed.value is not None:
+            cases.append(f"{case}, {web} is slack at rest")
     mode = number(limits.chain_resonance)
     if mode.value is not None:
         cases.append("the lowest mode of a chain lies near {}")

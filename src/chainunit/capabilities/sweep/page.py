@@ -258,7 +258,7 @@ def _spread(x: SweepSummary) -> Iterator[b.Block]:
 
 
 def _basis(x: SweepSummary, driver: str) -> Iterator[b.Block]:
-    """The swept parameters, the seed and the method."""
+    """The swept parameters, the results, and the assumptions behind them."""
     yield from table(
         x.parameters.items(),
         ("parameter", lambda row: Name(row[0])),

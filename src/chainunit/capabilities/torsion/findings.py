@@ -309,7 +309,7 @@ class TorsionFindings(Findings):
                 yield _ORDER.remark(n=f"{n}", speed=speed, **numbers, amplitude=self.excitation[n])
 
     def _in_normal_running(self) -> Iterator[Remark]:
-        """Remarks on large peaks and on a changing sign of the torque in normal running."""
+        """Remarks on large peaks, on a torque that changes its sign, and on instability in normal running."""
         motion, static2 = self.operating.motion, self.operating.static_torque2
         speed, load, factor = self.rotation.speed, self.rotation.load, self.ranges.factor
         for shaft, peak, static in (("2", motion.peak2[0], static2), ("3", motion.peak3[0], load)):

@@ -216,7 +216,7 @@ def _marks(summary: WatchSummary) -> Iterator[fig.Shade]:
 
 
 def _alarms(x: WatchSummary) -> Iterator[b.Block]:
-    """A row for each alarm, with the outputs of the observer at its begin."""
+    """A row for each alarm, with the outputs of the observer where the imbalance is largest."""
     if not x.alarms:
         yield b.Text("There is none.")
 
@@ -240,7 +240,7 @@ def _alarms(x: WatchSummary) -> Iterator[b.Block]:
 
 
 def _basis(x: WatchSummary) -> Iterator[b.Block]:
-    """The numbers that were learned at the begin, and the noise."""
+    """The numbers that were learned at the begin, and the tuning of the observer."""
     learned = (
         "Angle, zero and loads were learned in the first {}. Alarms of one side with less than two turns between "
         "them are one."
