@@ -88,6 +88,7 @@ def _run(runs: StudyRuns, name: str, interval: float, supplement: Supplement) ->
     model = drive.machine.model
     time = run["time"].values
     instants = np.arange(time[0], time[-1] + 0.5 * interval, interval)
+    # the row of the run at or behind each instant
     part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, instants), len(time) - 1)))
     angle, speed = crank_motion(drive, part)
     loads = _loads(drive, part)
@@ -112,14 +113,14 @@ def _run(runs: StudyRuns, name: str, interval: float, supplement: Supplement) ->
     )
     event = run_names.event_time(runs, name)
     return Clip(
-        name,
-        run_names.title(runs, name),
-        part["time"].values - (event or 0.0),
-        {**linkage.places(state.m), **details.joints},
-        readings,
-        (*forces, *machine_picture.load_arrows(state), *details.arrows),
-        details.loads,
-        linkage.blocks(state.m),
-        event is not None,
+        name=name,
+        title=run_names.title(runs, name),
+        time=part["time"].values - (event or 0.0),
+        joints={**linkage.places(state.m), **details.joints},
+        readings=readings,
+        arrows=(*forces, *machine_picture.load_arrows(state), *details.arrows),
+        loads=details.loads,
+        blocks=linkage.blocks(state.m),
+        event=event is not None,
         still=runs.steady_begin if event is None else 0.0,
     )

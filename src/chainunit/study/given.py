@@ -37,8 +37,7 @@ class GivenSection:
 
     @property
     def place(self) -> str:
-        """Its place in the result; it is under `asked` where the result has other things of the same
-        names."""
+        """Its place in the result; it is under `asked` where the result has other things of the same names."""
         table, _, inner = self.name.partition(".")
         sections = all_sections()
         if table not in sections or not sections[table].apart:

@@ -451,25 +451,26 @@ def linkage_data(
     description, unit = f.description, f.machine.model.driver_port.unit
 
     def limits(variable: str, limit_unit: str) -> InUnit:
+        """The least and the largest value of a variable."""
         return InUnit(f.limits[variable], limit_unit)
 
     return LinkageData(
-        __version__,
-        source,
-        f.machine.model.description,
-        f.sentence,
-        1 + len(description.further.free),
-        InUnit(f.speed, unit("rad/s")),
-        WayForces(f.turn, f.joints),
-        f.groups,
-        f.strokes,
-        f.swings,
-        {name: InUnit(places, unit("rad")) for name, places in f.dead_centres.items()},
-        {
+        chainunit=__version__,
+        source=source,
+        title=f.machine.model.description,
+        sentence=f.sentence,
+        degrees_of_freedom=1 + len(description.further.free),
+        speed=InUnit(f.speed, unit("rad/s")),
+        forces=WayForces(f.turn, f.joints),
+        groups=f.groups,
+        strokes=f.strokes,
+        swings=f.swings,
+        dead_centres={name: InUnit(places, unit("rad")) for name, places in f.dead_centres.items()},
+        angles={
             link: limits(f"{description.variable('link', link)}.angle", "rad")
             for link in description.structure.links
         },
-        {
+        points={
             f"{link}.{point}": {
                 axis: limits(f"{description.variable('link', link)}.{point}.{axis}", "m")
                 for axis in ("x", "y")
@@ -477,10 +478,10 @@ def linkage_data(
             for link, entry in description.structure.links.items()
             for point in entry.points
         },
-        {"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
-        _at_rest(f),
-        WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
-        {
+        over_the_way={"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
+        rest=_at_rest(f),
+        back=WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,
+        drivers={
             name: {
                 "peak": InUnit(turn.peak, "N" if turn.linear else "N.m"),
                 "power_mean": InUnit(turn.power_mean, "W"),
@@ -488,9 +489,9 @@ def linkage_data(
             for name, turn in f.drivers.items()
         }
         or None,
-        [*remarks],
-        [str(value) for value in slips_of(tuple(unusual))],
-        [value.sentence for value in unusual if value.with_unit],
+        drawn=[*remarks],
+        slips=[str(value) for value in slips_of(tuple(unusual))],
+        notes=[value.sentence for value in unusual if value.with_unit],
     )
 
 

@@ -18,8 +18,7 @@ from .rig import Rig, join
 from .window import Phase, Window, is_settled, whole_turns
 
 _LONGEST_START = 30.0
-"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `LONGEST_RISE`
-[s]."""
+"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `LONGEST_RISE` [s]."""
 LONGEST_RISE = 600.0
 """Time after the ramp at which an empty machine is fed, however slowly it turns, and for which a machine may speed
 up [s]."""
@@ -63,9 +62,8 @@ class StartUp:
 def _start_empty(
     rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
 ) -> tuple[Dataset, Rig]:
-    """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a
-    guard ends it, or until it is clear that the machine speeds up too slowly; and the rig that is fed
-    from then on."""
+    """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a guard ends
+    it, or until it is clear that the machine speeds up too slowly; and the rig that is fed from then on."""
     # behind a shaft line the crank is not where the motor is
     name, ratio = rig.drive.crank_output("w")
     goal = STARTED * rig.operation.crank_speed * ratio

@@ -160,23 +160,25 @@ class _CurvedDensity:
         self._reduce(best, workers, stiff)
 
     def _reduce(self, best: NormalEquations, workers: int, stiff: Any) -> None:
-        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b. Numbers
-        of active bounds have a further, `stiff` information."""
+        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b: a form of the
+        first three, and b as a normal distribution with a mean that is linear in them. Numbers of active bounds have
+        a further, `stiff` information."""
         problem = self._problem
         even = np.array([u.is_even for u in problem.unknowns])
         priors = np.where(even, 0.0, 1.0 / problem.prior_deviations**2) + stiff
         wide, pairs = self._across.shape[1], len(self._pairs)
         basis = np.hstack([self._across, self._along])
+        # the places of a and b in the form
         linear = 1 + np.r_[0:wide, wide + pairs : wide + pairs + self._along.shape[1]]
         matrix = np.zeros((1 + wide + pairs + self._along.shape[1],) * 2)
         matrix += self._squares(best, workers, linear)
         matrix[np.ix_(linear, linear)] += basis.T @ (priors[:, None] * basis)
         # the gradient is that of all rows; without the pull of a prior where there are bounds alone
         matrix[0, linear] = matrix[linear, 0] = -basis.T @ np.where(stiff > 0.0, 0.0, _score(problem, best))
-        places = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
-        inner = matrix[places[1], places[1]]
-        mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
-        self._form = matrix[places[0], places[0]] + matrix[places[0], places[1]] @ mean
+        kept, of_b = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
+        inner = matrix[of_b, of_b]
+        mean = -np.linalg.solve(inner, matrix[of_b, kept])
+        self._form = matrix[kept, kept] + matrix[kept, of_b] @ mean
         # of `b`, only the share in the sought numbers is sampled
         along = self._along[: len(problem.sought)]
         self._mean = along @ mean

@@ -110,13 +110,13 @@ def read_identification(
     sensors = SENSORS.read(form.sensor, faults, lambda entry, column: _sensor(entry, column, table), _ANALOG)
     faults.refuse()
     return IdentificationPlan(
-        tuple(sought.values()),
-        {name: numbers[name][0] for name in sought},
-        tuple(runs.values()),
-        sensors,
-        SensorKnowledge(float(table.noise), float(table.gain)),
-        int(table.starts),
-        int(table.seed),
+        sought=tuple(sought.values()),
+        variables={name: numbers[name][0] for name in sought},
+        runs=tuple(runs.values()),
+        sensors=sensors,
+        usual=SensorKnowledge(float(table.noise), float(table.gain)),
+        starts=int(table.starts),
+        seed=int(table.seed),
     )
 
 

@@ -179,7 +179,9 @@ class LimitRows:
         factor: float,
         equal: bool = False,
     ) -> None:
-        """Rows by which `factor` times a quantity is at most `upper`, at angles of its own."""
+        """Rows by which `factor` times a quantity is at most `upper`, or exactly `upper` if it is `equal`, at angles
+        that are auxiliary variables: they begin where the extremes of its columns are, and with an equality the
+        slopes there are zero."""
         terms: list[tuple[int, str, float]] = []
         for reduction in ("max", "min", "peak"):
             names = [i.column for i in q.integrands if i.reduction == reduction]

@@ -226,13 +226,15 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
     candidates, least = _least_power(trials, motors, says)
     tried = {c.motor.designation for c in candidates}
     spared: list[CatalogueMotor] = []
-    gears = [gear.price or math.inf for gear in trials.task.gears]
-    cheapest_gear = min(gears, default=0.0)
-    left = [m for m in motors if m.nameplate.power >= least and m.designation not in tried]
-    rest = iter(sorted(left, key=lambda m: m.price or math.inf) if objective == PRICE else left)
-    following = next(rest, None)
+    cheapest_gear = min((gear.price or math.inf for gear in trials.task.gears), default=0.0)
+    untried = [m for m in motors if m.nameplate.power >= least and m.designation not in tried]
+    if objective == PRICE:
+        untried.sort(key=lambda m: m.price or math.inf)
+    queue = iter(untried)
+    following = next(queue, None)
 
     def is_over() -> bool:
+        """Whether no motor of the queue can become the best one."""
         if following is None:
             return True
         if len(tried) < demands.candidates:
@@ -242,6 +244,7 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
         return _is_settled(candidates, following, demands.larger)
 
     def next_spared() -> CatalogueMotor | None:
+        """A motor that was tried without flywheels alone, and may become the best one with them."""
         return next((m for m in spared if not _comes_after(m, candidates, demands.larger)), None)
 
     while True:
@@ -257,7 +260,7 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
                     c.stop = SPARED
             candidates += tries
             tried.add(following.designation)
-            following = next(rest, None)
+            following = next(queue, None)
         while (motor := next_spared()) is not None:
             says(motor)
             spared.remove(motor)

@@ -408,6 +408,7 @@ def try_motor(
         window += turn
     rig = Rig(operation, drive, files)
     shifts, one_sided = [], {}
+    # the start, steady running, and from there all feed on each side in turn
     with rig.from_rest() as simulation:
         start = simulation.run(window, rig.step)
         if operation.empty_start:

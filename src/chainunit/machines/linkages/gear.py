@@ -138,8 +138,7 @@ class Mesh(Placed):
 class GearedLink(Group):
     """A wheel on a pin that moves in a known way, in mesh with another wheel: its bar, the pitch point, the wheel
     `by`, the pin at its centre, and how the wheel turns. It has the angle `angle` [rad] at the place `start` of the
-    driver. Its margin is 1 or, if its ratio is no whole number, 0 if its source has turned by nearly half a
-    turn."""
+    driver. Its margin is 1 or, if its ratio is no whole number, 0 if its source has turned by nearly half a turn."""
 
     bar: Bar
     mesh: str
