@@ -390,10 +390,10 @@ _INTERRUPTED = "interrupted"
 
 def _told(files: Sequence[Path]) -> str:
     """The files that were written before an interrupt, in words."""
-    there = list(dict.fromkeys(printable(str(file), 500) for file in files if file.exists()))
-    if not there:
+    written = list(dict.fromkeys(printable(str(file), 500) for file in files if file.exists()))
+    if not written:
         return "nothing was written"
-    shown, more = there[:_MOST_FILES], len(there) - _MOST_FILES
+    shown, more = written[:_MOST_FILES], len(written) - _MOST_FILES
     return f"written: {', '.join(shown)}{f' and {more} more' if more > 0 else ''}"
 
 

@@ -35,10 +35,10 @@ def angle_axis(setup: StudySetup) -> fig.Axis:
 def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
     """The last turn of a run with these crank angles [rad]: the angles from 0 to 2 pi, and `y` over them."""
     turn = 2.0 * math.pi
-    last = angle > angle[-1] - turn
-    place = angle[last] % turn
+    in_last_turn = angle > angle[-1] - turn
+    place = angle[in_last_turn] % turn
     order = np.argsort(place)
-    return place[order], y[last][order]
+    return place[order], y[in_last_turn][order]
 
 
 def _turn(study: StudyRecord) -> Iterator[b.Block]:

@@ -299,14 +299,14 @@ def _sizes(figure: Figure) -> dict[tuple[Any, ...], float]:
     sizes: dict[tuple[Any, ...], float] = {}
     for row, _, panel in figure.all_panels():
         for on, axis in (("x", panel.x), ("y", panel.y)):
-            every = [
+            values = [
                 np.abs(np.asarray(getattr(item, name), float)).ravel()
                 for item in panel.items
                 for name, along_axis in along(item).items()
                 if along_axis == on
             ]
-            every.append(np.abs([x for x in (axis.low, axis.high) if x is not None]))
-            table = np.concatenate(every)
+            values.append(np.abs([x for x in (axis.low, axis.high) if x is not None]))
+            table = np.concatenate(values)
             key = _shared(figure, on, axis, row)
             sizes[key] = float(np.max(table[np.isfinite(table)], initial=sizes.get(key, 0.0)))
     return sizes

@@ -305,8 +305,8 @@ def _transient(study: StudyRecord, name: str) -> fig.Figure:
         items[TORQUE] = shaft_torque(run, time)
     if event is None and drive.follows:
         asked = study.setup.config.run.crank_speed
-        wanted = run["motor.w_ref"].values * (asked / drive.reference_speed(asked))
-        speed.append(fig.Curve("speed asked for", time, wanted, 1))
+        reference = run["motor.w_ref"].values * (asked / drive.reference_speed(asked))
+        speed.append(fig.Curve("speed asked for", time, reference, 1))
     coasting = study.runs.series.get(name + run_names.COASTING)
     if coasting is not None:
         behind, stands = _coasting(study.setup, coasting, event or 0.0)

@@ -246,8 +246,8 @@ def _ways(f: LinkageFindings) -> dict[str, LinkageFindings]:
 
 def _forces(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
     """Tables and figures of effort, power, inertia and reactions, by way of the driver."""
-    there = ", there and back over its range" if f.back else ""
-    lead = f"Inverse dynamics at {{}} of the driver{there}, with the loads of normal running."
+    both_ways = ", there and back over its range" if f.back else ""
+    lead = f"Inverse dynamics at {{}} of the driver{both_ways}, with the loads of normal running."
     yield b.Text(filled(lead, exact(x.speed, 4)), "lead", central=True)
     effort, inertia = machine_picture.driver_nouns(f.machine)
     for way, forces in {"forth": x.forces, "back": x.back.forces}.items() if x.back else (("", x.forces),):

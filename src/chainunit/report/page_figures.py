@@ -292,7 +292,7 @@ class _Drawing:
         samples = self.samples[id(curve.x)] if curve.has_line and not curve.marker else slice(None)
         look = look_of(curve.look)
         mode = "+".join(
-            name for name, there in (("lines", curve.has_line), ("markers", curve.marker)) if there
+            name for name, is_shown in (("lines", curve.has_line), ("markers", curve.marker)) if is_shown
         )
         symbol, edge = _MARKERS.get(curve.marker, "circle"), {"width": 1.4, "color": look["color"]}
         self._trace(
@@ -392,8 +392,8 @@ def _hover(axis: Axis) -> str:
 
 def classes(field: Field) -> Any:
     """The values of a map on a scale on which its levels are 0, 1, 2, .."""
-    inside = np.interp(field.z, field.levels, np.arange(len(field.levels), dtype=float))
-    return np.where(np.isfinite(field.z), inside, np.nan)
+    place = np.interp(field.z, field.levels, np.arange(len(field.levels), dtype=float))
+    return np.where(np.isfinite(field.z), place, np.nan)
 
 
 def _long(axis: str) -> str:

@@ -143,16 +143,16 @@ def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
 
 def _scale(axis: Any, spec: Axis, side: str) -> None:
     """Set scale, range and ticks of one side ("x" or "y") of the axes of a panel."""
-    which = getattr(axis, f"{side}axis")
+    matplotlib_axis = getattr(axis, f"{side}axis")
     if spec.names:
-        which.set_ticks(range(len(spec.names)), list(spec.names))
+        matplotlib_axis.set_ticks(range(len(spec.names)), list(spec.names))
         getattr(axis, f"set_{side}lim")(len(spec.names) - 0.45, -0.55)
         axis.grid(axis=side, visible=False)
         return
     if spec.log:
         getattr(axis, f"set_{side}scale")("log")
-        which.set_major_formatter(lambda v, _: f"{v:g}")
-        which.set_minor_formatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else "")
+        matplotlib_axis.set_major_formatter(lambda v, _: f"{v:g}")
+        matplotlib_axis.set_minor_formatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else "")
     else:
         axis.ticklabel_format(axis=side, useOffset=False)
     if spec.low is not None or spec.high is not None:
@@ -163,9 +163,9 @@ def _scale(axis: Any, spec: Axis, side: str) -> None:
             # a curve that hardly changes is not on the edge
             getattr(axis, f"set_{side}lim")(low, max(high, largest + _ROOM * (largest - low)))
     if spec.ticks:
-        which.set_ticks(list(spec.ticks))
+        matplotlib_axis.set_ticks(list(spec.ticks))
     elif spec.step is not None and spec.low is not None and spec.high is not None:
-        which.set_ticks(np.arange(spec.low, spec.high + 0.5 * spec.step, spec.step))
+        matplotlib_axis.set_ticks(np.arange(spec.low, spec.high + 0.5 * spec.step, spec.step))
 
 
 def _name(axis: Any, name: str) -> str | None:

@@ -144,8 +144,8 @@ class ReportedResult(Generic[Question, Outcome]):
                 task.clear(place)
             elif place.resolve() != self._folder.resolve():
                 task.clear(place)
-                for kept in task.kept(self._outcome, self._folder):
-                    _copy(kept, place / kept.relative_to(self._folder))
+                for file in task.kept(self._outcome, self._folder):
+                    _copy(file, place / file.relative_to(self._folder))
             return self._write(place, png)
 
     def _write(self, folder: Path, png: bool = False) -> list[Path]:

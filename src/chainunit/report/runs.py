@@ -46,8 +46,8 @@ def _begin(runs: StudyRuns, run: str, answers: Answers, phase: Phase) -> Iterato
     title, x = runs.title_of(run), numbers(cited(answers, f"runs.{run}"))
     sizes = [(v.described(runs.drive.driver_noun), x[v.name]) for v in measures_of(phase)]
     rows = [row for row in sizes if row[1].value is not None]
-    said = join((line(f"{description} ", size) for description, size in rows), "; ")
-    yield b.Text(line(f"{capital(title)}: ", said, "."), form="short")
+    numbers_read = join((line(f"{description} ", size) for description, size in rows), "; ")
+    yield b.Text(line(f"{capital(title)}: ", numbers_read, "."), form="short")
     end = f", and of the end of the start-up, from {100.0 * STARTED:g} % of the speed on"
     head = f"Demands of the {title} on the drive{end if phase is Phase.SETTLING else ''}"
     yield b.Table(tuple(map(b.TableRow, rows)), title=head, form="long")

@@ -63,7 +63,7 @@ def plain_cell(cell: Cell, units: Units) -> str:
 def show(report: Report, console: Console, *, remarks: bool = True) -> None:
     """Print the short form. `remarks` is false where the remarks were printed before the study ran."""
     title = report.title
-    last: list[str] = []
+    closing: list[str] = []
     for block in report.blocks("short"):
         role = _role(block)
         if isinstance(block, Table):
@@ -72,12 +72,12 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
             _show_table(block, console, report.units)
             title = ""
         elif role in _LAST:
-            last += [_LAST[role] + sentence for sentence in _sentences(block, report.units)]
+            closing += [_LAST[role] + sentence for sentence in _sentences(block, report.units)]
         elif remarks or role != "remark":
             prefix = "Remark: " if role == "remark" else ""
             for sentence in _sentences(block, report.units):
                 console.print(prefix + sentence, soft_wrap=True)
-    for sentence in last:
+    for sentence in closing:
         console.print(sentence, soft_wrap=True)
 
 
@@ -91,15 +91,15 @@ def screen(report: Report, console: Console, rest: str) -> None:
     """Print one screen: judgements and the central blocks as far as there is room, warnings of up to two lines each,
     and where the rest is (`rest`)."""
     blocks = report.screen
-    last = [
+    closing = [
         _LAST[_role(block)] + sentence
         for block in blocks
         if _role(block) in _LAST
         for sentence in _sentences(block, report.units)
     ]
-    warnings = [sentence for sentence in last if sentence.startswith(_LAST["warning"])][:_WARNINGS]
-    if len(last) > len(warnings):
-        rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
+    warnings = [sentence for sentence in closing if sentence.startswith(_LAST["warning"])][:_WARNINGS]
+    if len(closing) > len(warnings):
+        rest = f"Warnings and notes not shown: {len(closing) - len(warnings)}. {rest}"
     most = 2 * (console.width - 1) - _RAGGED
     shown = [_with_units(cut(warning, most)) for warning in warnings]
     end = [_printed(console, partial(console.print, text)).replace(_KEPT, " ") for text in shown]

@@ -117,18 +117,18 @@ def plate_of(designation: str, files: Sequence[Path]) -> CatalogueMotor | None:
 def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str, Any]:
     """The tables of a file without the refused values; without any event if one of them is refused."""
     # tables on the way to a refused value are copied one by one: a refused value may be nested without end
-    rest = dict(data)
+    tables = dict(data)
     for key in map(_key, faults):
         names = key.split(".")
         if "event" in names:
             names = names[: names.index("event") + 1]
-        inner: Any = rest
+        inner: Any = tables
         while len(names) > 1 and isinstance(inner.get(names[0]), dict):
             name = names.pop(0)
             inner[name] = dict(inner[name])
             inner = inner[name]
         inner.pop(names[0], None)
-    return rest
+    return tables
 
 
 @cache

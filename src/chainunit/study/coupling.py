@@ -63,16 +63,16 @@ class RamForce:
         """Crank angle [rad] and way [m] before the dead centre within which `torque` [N m] stands for more than
         `TIMES` the working force; None where it does at every angle."""
         n, limit = len(self.angle), torque / (TIMES * self.working)
-        before = np.arange(n) * (2.0 * math.pi / n)
-        lever = self.lever(before)
+        angles_before = np.arange(n) * (2.0 * math.pi / n)
+        lever = self.lever(angles_before)
         k = int(np.argmax(lever >= limit))
         if lever[k] < limit:
             return None
         # at the dead centre itself, where k is 0 for a limit of 0, the lever is nothing
         share = (limit - lever[k - 1]) / (lever[k] - lever[k - 1]) if k else 0.0
-        angle = float(before[max(k - 1, 0)] + share * before[1])
-        within = np.append(before[:k], angle)
-        return angle, float(np.trapezoid(self.lever(within), within))
+        angle = float(angles_before[max(k - 1, 0)] + share * angles_before[1])
+        angles = np.append(angles_before[:k], angle)
+        return angle, float(np.trapezoid(self.lever(angles), angles))
 
 
 def rams(study: StudyRecord) -> Iterator[RamForce]:

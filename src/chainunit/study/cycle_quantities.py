@@ -142,8 +142,8 @@ def cycle_quantity(name: str, model: Model) -> CycleQuantity:
     if reduction == RANGE:
         pair = (Integrand(column, "max"), Integrand(column, "min"))
         return CycleQuantity(name, variable.unit, description, pair, _difference, reduction=reduction)
-    one = (Integrand(column, reduction),)
-    return CycleQuantity(name, variable.unit, description, one, _only, reduction=reduction)
+    single = (Integrand(column, reduction),)
+    return CycleQuantity(name, variable.unit, description, single, _only, reduction=reduction)
 
 
 def _named(name: str, model: Model) -> CycleQuantity:

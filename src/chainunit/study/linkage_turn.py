@@ -180,11 +180,11 @@ class _Way:
 
     def outputs(self, names: Iterable[str]) -> Callable[[Any], Any]:
         """The function that gives outputs at places, shape (names, n)."""
-        kept = tuple(names)
+        variables = tuple(names)
 
         def values(q: Any) -> Any:
             outputs = self.state(q)[1]
-            return np.array([outputs[name] for name in kept]).reshape(-1, len(q))
+            return np.array([outputs[name] for name in variables]).reshape(-1, len(q))
 
         return values
 
@@ -214,10 +214,12 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
     for driver_speed in {speed} if machine.model.turns else {abs(speed), -abs(speed)}:
         description.check_loads(machine.p, driver_speed)
-    rest = machine.equilibria()
+    equilibria = machine.equilibria()
     if machine.model.turns:
-        return _findings(machine, speed, rest)
-    return replace(_findings(machine, abs(speed), rest), back=_findings(machine, -abs(speed), rest))
+        return _findings(machine, speed, equilibria)
+    return replace(
+        _findings(machine, abs(speed), equilibria), back=_findings(machine, -abs(speed), equilibria)
+    )
 
 
 def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindings:

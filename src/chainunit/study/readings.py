@@ -185,11 +185,11 @@ def largest_torque(drive: Drive, run: Dataset, T: float) -> Any:
         # instants that are alike to this resolution are computed once
         unit = resolution * max(peak(x), 1e-9)
         columns.append(np.round(x / unit) * unit)
-    instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
+    instants, place = np.unique(np.stack(columns), axis=1, return_inverse=True)
     limits = [
         drive.motor.largest_torque(drive.fmu_parameters, T, *map(float, instant)) for instant in instants.T
     ]
-    return np.array(limits)[np.reshape(which, -1)]
+    return np.array(limits)[np.reshape(place, -1)]
 
 
 def pull_out_torque(drive: Drive, run: Dataset, T: float) -> float:

@@ -161,9 +161,9 @@ class Runner:
         operation = rig.operation
         self.stop = operation.stop
         """time to which the start-up is run [s]; later where the motor takes longer to settle"""
-        taken = [event for event in study.runs.events.values() if rig.takes(event)]
-        self.events = [event for event in taken if not event.from_rest]
-        self.starts = [event for event in taken if event.from_rest]
+        events = [event for event in study.runs.events.values() if rig.takes(event)]
+        self.events = [event for event in events if not event.from_rest]
+        self.starts = [event for event in events if event.from_rest]
         self.total = self.stop * (1 + len(self.starts))
         self.total += sum(operation.turn + event.time_followed(operation.turn) for event in self.events)
         self._coasting: Path | None = None

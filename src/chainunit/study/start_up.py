@@ -136,8 +136,8 @@ def speeds_up(rig: Rig, run: Dataset, before: float = 0.0) -> bool:
     span = float(time[-1]) - begin
     rise, mean = float(speed[-1]) - slower, 2.0 * math.pi / span
     lack = STARTED * rig.operation.crank_speed - mean
-    left = rig.operation.ramp_end + LONGEST_RISE - before - float(time[-1])
-    return lack > 0.0 and rise > RISES * mean and lack * span <= rise * left
+    remaining = rig.operation.ramp_end + LONGEST_RISE - before - float(time[-1])
+    return lack > 0.0 and rise > RISES * mean and lack * span <= rise * remaining
 
 
 def until_settled(rig: Rig, simulation: Simulation, stop: float, length: float, late: float) -> list[Dataset]:

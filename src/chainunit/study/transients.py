@@ -109,10 +109,10 @@ def coast(rig: Rig, transient: Transient, run: Dataset, stop: float, file: Path)
     model = coasting_model(rig.drive)
     start = model.start_from({k: float(x[-1]) for k, x in machine_series(run).items()})
     p = model.parameter_layout.from_names(coasting_parameters(rig.drive) | start)
-    alone = System({"machine": ModelComponent(model, p, file)})
+    machine_alone = System({"machine": ModelComponent(model, p, file)})
     loads = rig.drive.loads(rig.operation.feed) | transient.signals
     loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
-    with rig.simulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
+    with rig.simulation(machine_alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
         return simulation.run(max(stop, begin) + 1.0, rig.step)
 
 
@@ -121,10 +121,10 @@ def release(rig: Rig, simulation: Simulation, run: Dataset, time: float) -> tupl
     coupling; and the energy that passes in that time [J]."""
     if time <= 0.0:
         return run, 0.0
-    rest = simulation.run(simulation.time + time, min(rig.step, time))
-    torque, speed = (rest[name] for name in (rig.drive.motor_torque, rig.drive.motor_speed))
-    energy = float(np.trapezoid(torque * speed, rest["time"]))
-    return join([run, rest]), energy
+    decay = simulation.run(simulation.time + time, min(rig.step, time))
+    torque, speed = (decay[name] for name in (rig.drive.motor_torque, rig.drive.motor_speed))
+    energy = float(np.trapezoid(torque * speed, decay["time"]))
+    return join([run, decay]), energy
 
 
 def compare(

@@ -229,8 +229,8 @@ def numbers_at(
         is_stopped=is_stopped,
     )
     values, ratio = sample.values, drive.driven_machine.p.ratio
-    two = cycle(drive.machine, crank_speed, feed)
-    snatches, two_bar_snatch = _snatches(drive, feed, values, two)
+    bars = cycle(drive.machine, crank_speed, feed)
+    snatches, two_bar_snatch = _snatches(drive, feed, values, bars)
     is_pushed = drive.chain_unit.mean_pulls(crank_speed, feed.left, feed.right) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
@@ -254,9 +254,9 @@ def numbers_at(
             slack_time_to=slack_time.high,
             slack_rods=float(np.mean(all_rods)),
             fold_largest=float(max(np.max(values[f"{side}.fold_largest"]) for side in SIDES)),
-            two_bar_crank_torque=peak(two.crank_torque),
-            two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
-            two_bar_rocker_torque=peak(two.outputs.rocker.tau),
+            two_bar_crank_torque=peak(bars.crank_torque),
+            two_bar_crank_torque_rms=float(np.sqrt(np.mean(bars.crank_torque**2))),
+            two_bar_rocker_torque=peak(bars.outputs.rocker.tau),
             two_bar_snatch=two_bar_snatch,
             two_bar_slack_time=float(np.mean(np.any(is_pushed, axis=0))),
             energy_residual=gap / max(energy, 1e-300),
@@ -279,9 +279,9 @@ def _snatches(drive: Drive, feed: Feed, values: Mapping[str, Any], two_bars: Cyc
     for side in SIDES:
         bars = getattr(two_bars.outputs, side).rocker_joint
         force = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
-        rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(rods_of(drive)))
-        of_chains.append(_peaks(force) / rest)
-        of_bars.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
+        force_at_rest, bar_force_at_rest = rest_forces(drive.chain_unit, side, feed, sum(rods_of(drive)))
+        of_chains.append(_peaks(force) / force_at_rest)
+        of_bars.append(np.max(np.hypot(bars.fx, bars.fy)) / bar_force_at_rest)
     return np.maximum(*of_chains), float(max(of_bars))
 
 

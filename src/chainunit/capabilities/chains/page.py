@@ -160,12 +160,14 @@ def _critical(chain: ChainResult, x: ChainResult) -> Iterator[b.Block]:
     orders = (filled("order {}", exact(shown.order)) for shown in next(iter(modes.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
-    inside = [
+    within_sweep = [
         line(number(modes[speed.mode][speed.order].speed), f" (mode {speed.mode}, order {speed.order})")
         for speed in sorted(chain.within_speeds(), key=lambda speed: speed.speed)
     ]
-    if inside:
-        yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
+    if within_sweep:
+        yield b.Text(
+            line("Critical speeds within the sweep: ", join(within_sweep), f". {_ORDERS}"), form="short"
+        )
 
 
 @PICTURES.declare(lambda study: len(ChainResult.of_study(study.findings).speeds) > 1, "chain_sweep.png")
@@ -191,22 +193,22 @@ def _over_speed(study: StudyRecord) -> fig.Figure:
         fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 
-    def pair(median: Any, two: Any) -> list[fig.Item]:
+    def pair(median: Any, bars: Any) -> list[fig.Item]:
         return [
             fig.Curve("chains, median", speed, median, 0, "o"),
-            fig.Curve("two bars", speed, two, 1, "s"),
+            fig.Curve("two bars", speed, bars, 1, "s"),
             *marks,
         ]
 
     panels: list[tuple[fig.Axis, list[fig.Item]]] = []
     for part in ("rocker", "crank"):
         names = (f"{part}_torque_median", f"{part}_torque_high", f"two_bar_{part}_torque")
-        median, high, two = (np.array([getattr(n, name) for n in rows]) for name in names)
-        sizes = np.concatenate([median, high, two])
+        median, high, bars = (np.array([getattr(n, name) for n in rows]) for name in names)
+        sizes = np.concatenate([median, high, bars])
         wide = float(np.nanmax(sizes)) > WIDE * max(float(np.nanmin(sizes)), 1e-9)
         quantile = fig.Between(f"chains, up to the {100 * HIGH:g} % quantile", speed, median, high)
         y = fig.Axis(f"{part} torque, peak", "N.m", low=None if wide else 0.0, log=wide)
-        panels.append((y, [quantile, *pair(median, two), *([] if panels else labels)]))
+        panels.append((y, [quantile, *pair(median, bars), *([] if panels else labels)]))
     slack = pair([n.slack_time for n in rows], [n.two_bar_slack_time for n in rows])
     panels.append((fig.Axis("time slack", "1", "percent", low=-0.04, high=1.04), slack))
     return fig.Figure(

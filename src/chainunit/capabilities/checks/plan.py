@@ -133,11 +133,11 @@ def _check_coupling(entry: Entry, designations: Collection[str]) -> None:
     """Refuse a designation that is not one of these of the catalogues, and beside them the values of a row."""
     name = entry.given.get("designation", "")
     if name and name not in designations:
-        some = f"must be one of {', '.join([*designations][:5])}{near_name(name, designations)}"
+        choices = f"must be one of {', '.join([*designations][:5])}{near_name(name, designations)}"
         entry.wrong(
             "designation",
             name,
-            f"not in the catalogue; {some if designations else 'no catalogue has flexible couplings'}",
+            f"not in the catalogue; {choices if designations else 'no catalogue has flexible couplings'}",
         )
     for key in t.OF_ROW if designations else ():
         if key in entry.given:
@@ -162,7 +162,7 @@ def _check_keys(
 def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, BearingPlan]:
     """By title of its pin, the bearing of each of the `tables` [bearing.name]: a name that several pins begin with
     stands for a bearing in each of them."""
-    taken: dict[str, str] = {}
+    name_by_pin: dict[str, str] = {}
 
     def read(entry: Entry, name: str) -> tuple[list[str], BearingPlan]:
         """The pins that the name of a table stands for, and the bearing in each of them."""
@@ -175,11 +175,12 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
             entry.refuse()
         _check_keys(entry, "kind", kind, t.NEEDED[kind], t.BEARING_KEYS)
         for pin in pins:
-            if pin in taken:
+            if pin in name_by_pin:
                 entry.fault(
-                    "", f"the pin {pin} has its bearing in bearing.{taken[pin]}; leave out one of the two"
+                    "",
+                    f"the pin {pin} has its bearing in bearing.{name_by_pin[pin]}; leave out one of the two",
                 )
-            taken[pin] = name
+            name_by_pin[pin] = name
         table = instance(t.BearingTable, entry.raw)
         if table.static_safety is None and kind != t.PLAIN:
             table = replace(table, static_safety=t.STATIC_SAFETY[kind])

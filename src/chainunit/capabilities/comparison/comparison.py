@@ -240,9 +240,13 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
 
 def _spoken(name: str, descriptions: Mapping[str, str]) -> str:
     """The name of a number in words: ``crank_torque_peak.q95`` -> crank torque, peak, 95 %."""
-    first, _, rest = name.partition(".")
-    rest = f"{rest[1:]} % of runs below" if rest[1:].isdigit() and rest[0] == "q" else rest.replace(".", ", ")
-    return ", ".join(filter(None, (descriptions.get(first, first.replace("_", " ")), rest)))
+    first, _, suffix = name.partition(".")
+    suffix = (
+        f"{suffix[1:]} % of runs below"
+        if suffix[1:].isdigit() and suffix[0] == "q"
+        else suffix.replace(".", ", ")
+    )
+    return ", ".join(filter(None, (descriptions.get(first, first.replace("_", " ")), suffix)))
 
 
 def _title(stored: StoredResult, run: str) -> str:

@@ -106,8 +106,8 @@ def _digits(compared: ComparedValue) -> int:
 
 
 def _only(comparison: StudyComparison) -> Iterator[b.Block]:
-    for side, alone in comparison.only.items():
-        for noun, titles in (("runs", alone.runs), ("measures", alone.measures)):
+    for side, single in comparison.only.items():
+        for noun, titles in (("runs", single.runs), ("measures", single.measures)):
             if titles:
                 yield b.Text(f"Only {side.upper()} has the {noun}: {'; '.join(titles)}.")
 

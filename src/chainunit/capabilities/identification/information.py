@@ -216,8 +216,8 @@ def _null_space(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
 def _rest(covariance: Any, first: int, others: Sequence[int]) -> float:
     """The variance of a number that remains if the others were known."""
     cross = covariance[np.ix_(others, [first])][:, 0]
-    rest = covariance[first, first] - cross @ np.linalg.solve(covariance[np.ix_(others, others)], cross)
-    return max(float(rest), 0.0)
+    variance = covariance[first, first] - cross @ np.linalg.solve(covariance[np.ix_(others, others)], cross)
+    return max(float(variance), 0.0)
 
 
 def _proposals(
@@ -254,10 +254,10 @@ def _sparse(problem: Problem, run: RecordedRun) -> tuple[RecordedRun, dict[tuple
     several."""
     step = min(SPARSE, 2.0 * math.pi / (SPARSE_ROWS * run.crank_speed))
     (sparse,) = Problem(problem.plant, (run,), problem.sought, problem.sensors).thinned(step).runs
-    every = sparse.recording.step / run.recording.step
+    thinning = sparse.recording.step / run.recording.step
     # the instant of a mark is known up to the time between two rows
     return sparse, {
-        (run.name, name): 1.0 / every if name == "mark" else 1.0 / math.sqrt(every)
+        (run.name, name): 1.0 / thinning if name == "mark" else 1.0 / math.sqrt(thinning)
         for name in run.recording.columns
     }
 

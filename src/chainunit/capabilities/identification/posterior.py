@@ -154,8 +154,8 @@ class _CurvedDensity:
         follow = covariance[:, :count] @ np.linalg.inv(covariance[:count, :count])
         ridges = follow @ (spread[:count, None] * directions) * np.sqrt(sizes)
         self._across = ridges[:, wide]
-        rest = [k for k in range(count) if k not in wide]
-        self._along = np.hstack([ridges[:, rest], np.eye(size)[:, count:] * spread[count:]])
+        narrow = [k for k in range(count) if k not in wide]
+        self._along = np.hstack([ridges[:, narrow], np.eye(size)[:, count:] * spread[count:]])
         self._pairs = list(itertools.combinations_with_replacement(range(len(wide)), 2))
         self._reduce(best, workers, stiff)
 
@@ -197,22 +197,22 @@ class _CurvedDensity:
             ahead, behind = (_largest_factor(best.z, sign * step, low, high) for sign in (1.0, -1.0))
             size = max(min(ahead, 1.0), 0.1) if ahead >= behind else -max(min(behind, 1.0), 0.1)
             size, moved = _moved(problem, best.z, step, size, workers)
-            for n, (here, there) in enumerate(zip(base, moved, strict=True)):
-                seconds[n, k] = (there.slopes - here.slopes) @ self._across[list(here.places)] / size
+            for n, (at_best, beyond) in enumerate(zip(base, moved, strict=True)):
+                seconds[n, k] = (beyond.slopes - at_best.slopes) @ self._across[list(at_best.places)] / size
         total = np.zeros((1 + wide + len(self._pairs) + self._along.shape[1],) * 2)
-        for here, second, full in zip(base, seconds, best.comparisons, strict=True):
-            table = np.zeros((len(here.slopes), len(total)))
-            table[:, linear] = here.slopes @ basis[list(here.places)]
+        for at_best, second, full in zip(base, seconds, best.comparisons, strict=True):
+            table = np.zeros((len(at_best.slopes), len(total)))
+            table[:, linear] = at_best.slopes @ basis[list(at_best.places)]
             for n, (i, j) in enumerate(self._pairs):
                 # half of the second derivative; of a mixed one, the mean of both
                 table[:, 1 + wide + n] = 0.5 * (second[i][:, j] + (second[j][:, i] if i != j else 0.0))
             # in the thinned columns, the sizes of the noise are others by a trifle
-            table *= best.weights[here.run, here.column] * here.size / full.size
+            table *= best.weights[at_best.run, at_best.column] * at_best.size / full.size
             edges = np.linspace(0, len(full.residuals), len(table) + 1).round().astype(int)
             rows = np.diff(edges)
             # where a bound holds a number, the residuals have a part along the second derivatives
-            left = np.add.reduceat(np.clip(full.residuals, -OUTLIER, OUTLIER), edges[:-1])
-            total[0] -= best.weights[here.run, here.column] * (left @ table)
+            sums = np.add.reduceat(np.clip(full.residuals, -OUTLIER, OUTLIER), edges[:-1])
+            total[0] -= best.weights[at_best.run, at_best.column] * (sums @ table)
             total += np.mean(rows) * (table.T @ table)
         # those along the first derivatives are in the gradient
         total[1:, 0] = total[0, 1:]
@@ -245,18 +245,18 @@ class _CurvedDensity:
             return self._draw(np.zeros((CHAINS * KEPT, 0)), rng)[1]
         a = rng.standard_normal((CHAINS, wide))
         density, z = self._draw(a, rng)
-        kept = []
+        samples = []
         for step in range(STEPS):
             others = np.array([rng.permutation(CHAINS) for _ in range(2)])
             jump = 1.0 if step % 10 == 9 else 1.7 / math.sqrt(2.0 * wide)
             tried = a + jump * (a[others[0]] - a[others[1]]) + 1e-3 * rng.standard_normal(a.shape)
-            new, there = self._draw(tried, rng)
-            taken = np.log(rng.random(CHAINS)) < new - density
-            a, z = np.where(taken[:, None], tried, a), np.where(taken[:, None], there, z)
-            density = np.where(taken, new, density)
+            new, new_z = self._draw(tried, rng)
+            accepted = np.log(rng.random(CHAINS)) < new - density
+            a, z = np.where(accepted[:, None], tried, a), np.where(accepted[:, None], new_z, z)
+            density = np.where(accepted, new, density)
             if step >= STEPS // 2 and (step + 1) % (STEPS // 2 // KEPT) == 0:
-                kept.append(z)
-        return np.concatenate(kept)
+                samples.append(z)
+        return np.concatenate(samples)
 
 
 def _moved(problem: Problem, z: Any, step: Any, size: float, workers: int) -> tuple[float, list[Comparison]]:

@@ -282,10 +282,10 @@ def _courses(machine: IdentifiedMachine, run: str) -> dict[str, dict[str, InUnit
         edges = np.linspace(ends[0], ends[1], (CLASSES if steady else CLASSES_OF_TIME) + 1)
         place, size = np.digitize(x, edges[1:-1]), len(edges) - 1
         count = np.bincount(place, minlength=size)
-        some = count > 0
-        means = [np.bincount(place, y, size)[some] / count[some] for y in (measured, simulated)]
+        filled = count > 0
+        means = [np.bincount(place, y, size)[filled] / count[filled] for y in (measured, simulated)]
         unit = MEASURANDS[comparison.column].unit
-        middle = 0.5 * (edges[1:] + edges[:-1])[some]
+        middle = 0.5 * (edges[1:] + edges[:-1])[filled]
         courses[comparison.column] = {
             "angle" if steady else "time": InUnit(middle, "rad" if steady else "s"),
             "measured": InUnit(means[0], unit),

@@ -381,8 +381,8 @@ class _Freed:
         values = self.values(names)
         pairs = zip(self._more, self._now, strict=True)
         steps = [values.get(u.name, u.start) - u.start - now for u, now in pairs]
-        alone, following = self._others
-        changes = alone - following @ np.array(steps)
+        steps_alone, following = self._others
+        changes = steps_alone - following @ np.array(steps)
         others = zip(self._free.items(), changes, strict=True)
         return {name: x + float(change) for (name, x), change in others} | values
 
@@ -456,5 +456,5 @@ def _secants(
     except RunError:
         return None
     pairs = zip(best.comparisons, comparisons, strict=True)
-    change = max(float(np.max(np.abs(there.angle - here.angle))) for here, there in pairs)
+    change = max(float(np.max(np.abs(other_law.angle - fitted.angle))) for fitted, other_law in pairs)
     return (x, comparisons) if change <= NEAR else None

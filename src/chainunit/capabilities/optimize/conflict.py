@@ -92,12 +92,12 @@ def _together(
     """A smallest set of the limits `names` that conflict, by deletion, and the nearest machine under it; the limits
     `out` are left out."""
     # limits that the nearest machine meets are the first to be taken out
-    rest, last = sorted(names, key=lambda name: first.misses.get(name, 0.0)), first
-    for name in list(rest):
-        if len(rest) == 1:
+    left_in, closest = sorted(names, key=lambda name: first.misses.get(name, 0.0)), first
+    for name in list(left_in):
+        if len(left_in) == 1:
             break
         answer, met = nearest(search, starts, out | {name})
         if not met and answer is not None:
-            out, last = out | {name}, answer
-            rest.remove(name)
-    return last, tuple(rest)
+            out, closest = out | {name}, answer
+            left_in.remove(name)
+    return closest, tuple(left_in)

@@ -36,21 +36,21 @@ def effective_search(wishes: Wishes) -> tuple[Search, dict[str, tuple[float, flo
     }
     if not idle:
         return search, idle
-    rest = {name: bounds for name, bounds in wishes.free.items() if name not in idle}
-    if not rest:
-        wanted = ", ".join(q.name for q in wishes.objectives)
+    effective = {name: bounds for name, bounds in wishes.free.items() if name not in idle}
+    if not effective:
+        objectives = ", ".join(q.name for q in wishes.objectives)
         raise InputError(
-            f"optimize.free: {no_effect(wishes, tuple(idle))}; free a parameter on which {wanted} depends",
+            f"optimize.free: {no_effect(wishes, tuple(idle))}; free a parameter on which {objectives} depends",
             "optimize.free",
         )
-    return Search(replace(wishes, free=rest)), idle
+    return Search(replace(wishes, free=effective)), idle
 
 
 def no_effect(wishes: Wishes, names: tuple[str, ...]) -> str:
     """Words on parameters without an effect: ``ratio has no effect on peak(crank_torque)``."""
-    wanted = ", ".join(q.name for q in wishes.objectives)
+    objectives = ", ".join(q.name for q in wishes.objectives)
     limits = " and the limits" if wishes.limits or wishes.slack_free_speed else ""
-    return f"{', '.join(names)} {'have' if len(names) > 1 else 'has'} no effect on {wanted}{limits}"
+    return f"{', '.join(names)} {'have' if len(names) > 1 else 'has'} no effect on {objectives}{limits}"
 
 
 def _changes(search: Search) -> np.ndarray:

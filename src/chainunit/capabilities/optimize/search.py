@@ -104,13 +104,13 @@ class Search:
             if there is none.
         """
         low, span = self.columns.low, self.columns.span
-        inside = np.clip(self.today, low, low + span)
-        for x in (inside, *(low + span * _sobol(len(low), 4096, self.wishes.seed))):
+        clipped = np.clip(self.today, low, low + span)
+        for x in (clipped, *(low + span * _sobol(len(low), 4096, self.wishes.seed))):
             if self.turns(x):
                 return x
         obstacle = " cannot be assembled at each angle."
         try:
-            self.wishes.machine.replace(dict(zip(self.wishes.names, map(float, inside), strict=True)))
+            self.wishes.machine.replace(dict(zip(self.wishes.names, map(float, clipped), strict=True)))
         except InputError as error:
             obstacle = f": {error}"
         raise RunError(
@@ -240,8 +240,8 @@ class Search:
         lanes, worst = Lanes(np.zeros((number, 0, 3)), nodes), math.inf
         point = self._run(rows, costs, z, lanes, None)
         # a start that ends where another one did has its answer
-        begun = self._answers.setdefault((tuple(rows.rows), costs), [])
-        for z, answer in begun:
+        earlier = self._answers.setdefault((tuple(rows.rows), costs), [])
+        for z, answer in earlier:
             if np.max(np.abs(point.z - z)) < _SAME:
                 return answer
         rough = point.z
@@ -261,8 +261,8 @@ class Search:
             if not more:
                 break
             point = self._run(rows, costs, z, lanes, point)
-        begun.append((rough, self._answer(objective, slacks, rows.rows, point, worst)))
-        return begun[-1][1]
+        earlier.append((rough, self._answer(objective, slacks, rows.rows, point, worst)))
+        return earlier[-1][1]
 
     def _run(
         self, rows: LimitRows, costs: tuple[int, ...], z: Any, lanes: Lanes, last: Solution | None

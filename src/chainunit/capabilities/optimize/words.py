@@ -134,13 +134,13 @@ def conflict_sentences(best: Best) -> Iterator[str]:
         for name, value in values.items()
         if name in quantities and not math.isnan(value)
     )
-    which = "machine that comes nearest has"
+    machines = "machine that comes nearest has"
     if several and len(conflict.alone) == 1:
-        which = "machine that comes nearest to the first of these limits alone has"
+        machines = "machine that comes nearest to the first of these limits alone has"
     elif several:
-        which = "machines that come nearest to each of these limits alone have"
+        machines = "machines that come nearest to each of these limits alone have"
     if reached:
-        yield f"The {which} {reached}."
+        yield f"The {machines} {reached}."
     if conflict.bounds:
         units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
         bounds = (

@@ -169,16 +169,16 @@ class SizingFindings(Findings):
         best = self.best
         if study.setup.insufficient or (best.sold is None and best.motor.is_packaged):
             return None
-        items, wanted = best.parts, ""
+        items, limiter = best.parts, ""
         if setting is not None and setting.torque is not None:
             if sold := coupling_of(study.runs, setting, self.couplings):
                 items = [*items, OrderedPart.of("torque limiter", sold)]
             else:
                 torque = number(study.setup.drive.at_motor_shaft(setting.torque), "N.m")
-                wanted = f"a torque limiter that opens at {torque} on the motor's shaft"
+                limiter = f"a torque limiter that opens at {torque} on the motor's shaft"
         unknown = [] if best.sold is None else unknown_limits(best.sold)
         flywheel = f"a flywheel of {best.flywheel_words}" if best.disc else ""
-        listed = parts_list(items, unknown, flywheel, wanted)
+        listed = parts_list(items, unknown, flywheel, limiter)
         if (needed := self._gear_needed(study, setting)) is not None:
             order, remedy = needed
             decides = order.decides

@@ -202,7 +202,7 @@ class MotorTrials:
         a load changes faster than the cage of the motor follows, a small flywheel may make its torque less even."""
         numbers = self.duty.numbers
         at_motor = bare.drive.flywheel_ratio**2
-        there = bare.drive.rotor_inertia + numbers.inertia_mean / bare.drive.ratio**2
+        present = bare.drive.rotor_inertia + numbers.inertia_mean / bare.drive.ratio**2
         trials: list[Candidate] = []
 
         def trial_with(flywheel: float) -> Candidate:
@@ -224,7 +224,7 @@ class MotorTrials:
             first.stop = MEAN
             return first
         heaviest = heaviest_started(first)
-        below, flywheel = 0.0, min(_SMALL * there, heaviest)
+        below, flywheel = 0.0, min(_SMALL * present, heaviest)
         last = trial_with(flywheel)
         while flywheel < heaviest and not (heavy_enough(last) or _has_even_torque(last)):
             below, flywheel = flywheel, min(_LARGER * flywheel, heaviest)

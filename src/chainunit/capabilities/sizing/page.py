@@ -131,8 +131,8 @@ def judgements(findings: StudyFindings) -> Iterator[b.Block]:
     sizing = SizingFindings.found_in(findings)
     if sizing is not None and sizing.nearest is not None:
         best = cited(sizing, "findings.sizing").candidates[0]
-        rest = line(" All runs are with ", best.designation, ", which is insufficient: ", best.reason, ".")
-        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), rest), form="long")
+        nearest = line(" All runs are with ", best.designation, ", which is insufficient: ", best.reason, ".")
+        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), nearest), form="long")
 
 
 def _gear(candidate: Candidate, x: Candidate) -> Line:

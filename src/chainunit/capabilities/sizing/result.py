@@ -371,5 +371,5 @@ def _tolerance(study: StudyRecord) -> str | None:
     if holding <= HEAVIEST:
         phrase, late = f"one of {class_words(holding)} holds", ", but trips too late with the rotor locked"
     more = number(MORE_CURRENT - 1.0, "1", "percent", full=False)
-    said = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; {phrase}{late}"
-    return None if holding == study.runs.relay_class else said
+    text = f"{more} more current, the tolerance of IEC 60034-1, may trip it in a start; {phrase}{late}"
+    return None if holding == study.runs.relay_class else text

@@ -183,9 +183,11 @@ def check_ratios(
         if any((1.0 - SPEED_DEVIATION) * least <= x <= (1.0 + SPEED_DEVIATION) * most for x in ratios):
             return
         needed.setdefault(plate.poles, least)
-    wanted = sorted((ratio, poles) for poles, ratio in needed.items())
-    near, _ = min(wanted, key=lambda pair: abs(math.log(pair[0] / nearest(pair[0], ratios))))
-    choices = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
+    ratios_needed = sorted((ratio, poles) for poles, ratio in needed.items())
+    near, _ = min(ratios_needed, key=lambda pair: abs(math.log(pair[0] / nearest(pair[0], ratios))))
+    choices = " or ".join(
+        f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in ratios_needed
+    )
     if key == "sizing.gear_kind":
         raise InputError(
             f'{key} = "none": no motor of the catalogue turns at {number(w, "rad/s", "speed")} on the line: '
@@ -375,8 +377,8 @@ def _would_do(other: Candidate, best: Candidate) -> str:
         return text
     starts = [c.checks["gear_start"].value for c in (best, other) if "gear_start" in c.checks]
     if len(starts) == 2:
-        here, there = (number(torque, "N.m") for torque in starts)
-        text += f", and its start would put {there} on the gear in place of {here}"
+        best_start, other_start = (number(torque, "N.m") for torque in starts)
+        text += f", and its start would put {other_start} on the gear in place of {best_start}"
     if best.price is not None and other.price is not None:
         text += f", at a price of {other.price:g} in place of {best.price:g}"
     return text
@@ -386,8 +388,8 @@ def _wishes_of(c: Candidate) -> set[str]:
     """The checks of wishes that alone reject a candidate, or for which it has its flywheel."""
     over = {name for name in c.checks if c.exceeds(name)}
     sized = {max((c.sizes.get(name, 0.0), name) for name in EVENED)[1]} if c.drive.added_inertia else set()
-    rest = over - set(_WISHES) - (set(WORSE_WITH_INERTIA) if c.drive.added_inertia else set())
-    return set() if rest else (over | sized) & set(_WISHES)
+    other_limits = over - set(_WISHES) - (set(WORSE_WITH_INERTIA) if c.drive.added_inertia else set())
+    return set() if other_limits else (over | sized) & set(_WISHES)
 
 
 def _value(demands: Sizing, key: str) -> str:

@@ -77,8 +77,8 @@ def _wide_levels(low: float, high: float) -> tuple[float, ...]:
         last = min(k for k, x in enumerate(levels) if x >= high)
         if last - first <= _CLASSES:
             return tuple(levels[first : last + 1])
-    some = {*levels[first : last : -(-(last - first) // _CLASSES)], levels[last]}
-    return tuple(sorted(some))
+    thinned = {*levels[first : last : -(-(last - first) // _CLASSES)], levels[last]}
+    return tuple(sorted(thinned))
 
 
 def _map(summary: SweepSummary, name: str) -> fig.Figure:
@@ -140,13 +140,13 @@ def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
     ]
     dots = "o" if len(x) <= 40 else ""
     names = [name for name in findings.results if name in summary.extremes]
-    for figure_name, file, some in _numbered("curves", names, _MOST_ROWS):
+    for figure_name, file, shown_names in _numbered("curves", names, _MOST_ROWS):
         rows = (
             (
                 _axis(findings.variables[name]),
                 [fig.Curve(name, x, part[name].values, 0, dots, in_legend=False), *marks],
             )
-            for name in some
+            for name in shown_names
         )
         yield fig.Figure(
             figure_name,
@@ -178,9 +178,11 @@ def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
     """Bars of the rank correlation of each result with each parameter, the largest share of the variance first; none
     of two parameters."""
     parameters, results = summary.findings.plan.parameters, list(summary.influences.items())
-    for figure_name, file, some in _numbered("tornado", results if len(parameters) > 2 else [], _MOST_PANELS):
+    for figure_name, file, shown_results in _numbered(
+        "tornado", results if len(parameters) > 2 else [], _MOST_PANELS
+    ):
         panels = []
-        for name, influences in some:
+        for name, influences in shown_results:
             size = {
                 parameter: (influence.share.value if influence.share else 0.0, abs(influence.rank))
                 for parameter, influence in influences.items()
@@ -209,9 +211,9 @@ def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
     """The share of the points below each value of each result; none of a sweep without a spread."""
     shares, sample = np.linspace(0.0, 1.0, 201), summary.sample
     names = [name for name in summary.influences if summary.spread.spread and len(sample[name])]
-    for figure_name, file, some in _numbered("spread", names, _MOST_PANELS):
+    for figure_name, file, shown_names in _numbered("spread", names, _MOST_PANELS):
         panels = []
-        for name in some:
+        for name in shown_names:
             x = np.quantile(sample[name][np.isfinite(sample[name])], shares)
             items: list[fig.Item] = [fig.Curve("share of the points below", x, shares, in_legend=False)]
             items += [fig.Mark(q, "5 %, 95 %", axis="y", look="thin") for q in (0.05, 0.95)]

@@ -52,9 +52,9 @@ def shares_on_grid(y: Any) -> list[Shares]:
     whole, axes = float(np.var(y)), range(y.ndim)
     exact = []
     for i in axes:
-        alone = float(np.var(np.mean(y, axis=tuple(k for k in axes if k != i)))) / whole
+        by_itself = float(np.var(np.mean(y, axis=tuple(k for k in axes if k != i)))) / whole
         in_all = float(np.mean(np.var(y, axis=i))) / whole
-        exact.append(Shares(_share(alone, alone, alone), _share(in_all, in_all, in_all)))
+        exact.append(Shares(_share(by_itself, by_itself, by_itself), _share(in_all, in_all, in_all)))
     return exact
 
 
