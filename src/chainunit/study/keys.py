@@ -165,7 +165,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         *(KeyTable(name, entry.title, tuple(_of_entry(entry))) for name, entry in entry_tables().items()),
         KeyTable("report", "Report", tuple(_of_report())),
         *(
-            KeyTable("event", _first_sentence(event_type), tuple(_of_event(event_type)), name)
+            KeyTable("event", (event_type.__doc__ or "").split(".")[0], tuple(_of_event(event_type)), name)
             for name, event_type in TYPES.items()
         ),
     )
@@ -357,7 +357,3 @@ def _choices(annotation: Any) -> tuple[str, ...]:
     if typing.get_origin(annotation) is typing.Literal:
         return tuple(f'"{word}"' for word in typing.get_args(annotation))
     return ("true", "false") if annotation is bool else ()
-
-
-def _first_sentence(cls: type) -> str:
-    return (cls.__doc__ or "").split(".")[0]

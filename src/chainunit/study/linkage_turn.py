@@ -217,9 +217,8 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     equilibria = machine.equilibria()
     if machine.model.turns:
         return _findings(machine, speed, equilibria)
-    return replace(
-        _findings(machine, abs(speed), equilibria), back=_findings(machine, -abs(speed), equilibria)
-    )
+    forth, back = (_findings(machine, sign * abs(speed), equilibria) for sign in (1.0, -1.0))
+    return replace(forth, back=back)
 
 
 def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindings:

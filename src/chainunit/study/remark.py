@@ -85,10 +85,9 @@ class RemarkCode:
                 x, size = self._sized(name, value)
                 quantities[name] = InUnit(x, size.unit, size.kind, of_driver(size.title, driver))
                 texts[name] = None if x is None else number(x, size.unit, size.kind, size.digits)
-        sentences = [_said(of_driver(sentence, driver), texts) for sentence in (*self.sentences, self.remedy)]
-        return Remark(
-            self.code, self.severity, " ".join(filter(None, sentences)), sentences[-1], runs, quantities
-        )
+        *sentences, remedy = (_said(of_driver(x, driver), texts) for x in (*self.sentences, self.remedy))
+        text = " ".join(filter(None, (*sentences, remedy)))
+        return Remark(self.code, self.severity, text, remedy, runs, quantities)
 
     def _sized(self, name: str, value: float | Amount) -> tuple[float | None, Size]:
         """The number in a value, and its size: the one that comes with it, or else the declared one of its name."""

@@ -160,14 +160,12 @@ def _critical(chain: ChainResult, x: ChainResult) -> Iterator[b.Block]:
     orders = (filled("order {}", exact(shown.order)) for shown in next(iter(modes.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
-    within_sweep = [
+    swept = [
         line(number(modes[speed.mode][speed.order].speed), f" (mode {speed.mode}, order {speed.order})")
         for speed in sorted(chain.within_speeds(), key=lambda speed: speed.speed)
     ]
-    if within_sweep:
-        yield b.Text(
-            line("Critical speeds within the sweep: ", join(within_sweep), f". {_ORDERS}"), form="short"
-        )
+    if swept:
+        yield b.Text(line("Critical speeds within the sweep: ", join(swept), f". {_ORDERS}"), form="short")
 
 
 @PICTURES.declare(lambda study: len(ChainResult.of_study(study.findings).speeds) > 1, "chain_sweep.png")

@@ -162,7 +162,7 @@ def _check_keys(
 def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, BearingPlan]:
     """By title of its pin, the bearing of each of the `tables` [bearing.name]: a name that several pins begin with
     stands for a bearing in each of them."""
-    name_by_pin: dict[str, str] = {}
+    owner: dict[str, str] = {}
 
     def read(entry: Entry, name: str) -> tuple[list[str], BearingPlan]:
         """The pins that the name of a table stands for, and the bearing in each of them."""
@@ -175,12 +175,11 @@ def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> d
             entry.refuse()
         _check_keys(entry, "kind", kind, t.NEEDED[kind], t.BEARING_KEYS)
         for pin in pins:
-            if pin in name_by_pin:
+            if pin in owner:
                 entry.fault(
-                    "",
-                    f"the pin {pin} has its bearing in bearing.{name_by_pin[pin]}; leave out one of the two",
+                    "", f"the pin {pin} has its bearing in bearing.{owner[pin]}; leave out one of the two"
                 )
-            name_by_pin[pin] = name
+            owner[pin] = name
         table = instance(t.BearingTable, entry.raw)
         if table.static_safety is None and kind != t.PLAIN:
             table = replace(table, static_safety=t.STATIC_SAFETY[kind])

@@ -241,11 +241,8 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
 def _spoken(name: str, descriptions: Mapping[str, str]) -> str:
     """The name of a number in words: ``crank_torque_peak.q95`` -> crank torque, peak, 95 %."""
     first, _, suffix = name.partition(".")
-    suffix = (
-        f"{suffix[1:]} % of runs below"
-        if suffix[1:].isdigit() and suffix[0] == "q"
-        else suffix.replace(".", ", ")
-    )
+    is_quantile = suffix[1:].isdigit() and suffix[0] == "q"
+    suffix = f"{suffix[1:]} % of runs below" if is_quantile else suffix.replace(".", ", ")
     return ", ".join(filter(None, (descriptions.get(first, first.replace("_", " ")), suffix)))
 
 

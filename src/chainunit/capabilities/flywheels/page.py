@@ -90,16 +90,15 @@ def _figure(setup: StudySetup, findings: FlywheelFindings, running: list[Wheel])
     """Speed, torque and current over the last turn with each flywheel, and the ripple over the inertia."""
     drive, plate = setup.drive, setup.config.plate
     # at most as many flywheels as there are distinct looks of a line, from the least to the largest
-    shown_wheels = [
-        running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))
-    ]
+    count = min(len(running), len(LINES))
+    wheels = [running[round(k)] for k in np.linspace(0, len(running) - 1, count)]
     speed = fig.Axis(f"{setup.driver_noun} speed", "rad/s", "speed")
     torque, current = fig.Axis("motor torque, air gap", "N.m"), fig.Axis("motor current", "A")
     items: dict[fig.Axis, list[fig.Item]] = {speed: [], torque: [], current: []}
     if plate is not None:
         items[torque].append(fig.Mark(plate.nameplate.torque, "rated", axis="y", look="reference"))
         items[current].append(fig.Mark(plate.nameplate.rated_current, "rated", axis="y", look="reference"))
-    for look, wheel in enumerate(shown_wheels):
+    for look, wheel in enumerate(wheels):
         run = wheel.turns
         angle, w = crank_motion(drive, run)
         series = {

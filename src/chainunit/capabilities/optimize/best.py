@@ -120,13 +120,11 @@ def find_best(wishes: Wishes, progress: TaskProgress = quiet) -> Best:
     if not good:
         progress("a machine that meets all limits", 0.0, 1.0)
         good, failure = _repaired(search, starts)
-    result = Best(wishes, len(starts), moved, _values(search, search.today), search.effort, idle)
+    base = Best(wishes, len(starts), moved, _values(search, search.today), search.effort, idle)
     if not good:
         assert failure is not None
         closest = failure.nearest.x
-        return replace(
-            result, conflict=failure, found=_values(search, closest), pulls=_pulls(search, closest)
-        )
+        return replace(base, conflict=failure, found=_values(search, closest), pulls=_pulls(search, closest))
     best = min(good, key=lambda answer: answer.value)
     front: tuple[FrontPoint, ...] = ()
     if len(wishes.objectives) > 1:
@@ -137,7 +135,7 @@ def find_best(wishes: Wishes, progress: TaskProgress = quiet) -> Best:
     objective, limits = _checked(wishes, best, search)
     around = neighbours(search, best.x, objective, limits, search.value(objective, best.x))
     return replace(
-        result,
+        base,
         answer=best,
         found=_values(search, best.x),
         pulls=_pulls(search, best.x),

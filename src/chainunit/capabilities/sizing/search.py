@@ -183,11 +183,9 @@ def check_ratios(
         if any((1.0 - SPEED_DEVIATION) * least <= x <= (1.0 + SPEED_DEVIATION) * most for x in ratios):
             return
         needed.setdefault(plate.poles, least)
-    ratios_needed = sorted((ratio, poles) for poles, ratio in needed.items())
-    near, _ = min(ratios_needed, key=lambda pair: abs(math.log(pair[0] / nearest(pair[0], ratios))))
-    choices = " or ".join(
-        f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in ratios_needed
-    )
+    needs = sorted((ratio, poles) for poles, ratio in needed.items())
+    near, _ = min(needs, key=lambda pair: abs(math.log(pair[0] / nearest(pair[0], ratios))))
+    choices = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in needs)
     if key == "sizing.gear_kind":
         raise InputError(
             f'{key} = "none": no motor of the catalogue turns at {number(w, "rad/s", "speed")} on the line: '

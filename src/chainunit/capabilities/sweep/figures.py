@@ -177,10 +177,9 @@ def _in_pairs(panels: list[fig.Panel]) -> tuple[tuple[fig.Panel | None, ...], ..
 def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
     """Bars of the rank correlation of each result with each parameter, the largest share of the variance first; none
     of two parameters."""
-    parameters, results = summary.findings.plan.parameters, list(summary.influences.items())
-    for figure_name, file, shown_results in _numbered(
-        "tornado", results if len(parameters) > 2 else [], _MOST_PANELS
-    ):
+    parameters = summary.findings.plan.parameters
+    results = list(summary.influences.items()) if len(parameters) > 2 else []
+    for figure_name, file, shown_results in _numbered("tornado", results, _MOST_PANELS):
         panels = []
         for name, influences in shown_results:
             size = {
