@@ -154,12 +154,8 @@ def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         for part in capabilities()
         for name in part.unused_values(study.setup.config.machine, study.setup.config.plans[part.name])
     ]
-    yield b.Given(
-        tuple(
-            (section.title, tuple(_values(s, study.setup, section, unused_names)))
-            for section in given_sections(study)
-        )
-    )
+    sections = given_sections(study)
+    yield b.Given(tuple((x.title, tuple(_values(s, study.setup, x, unused_names))) for x in sections))
 
 
 def _values(

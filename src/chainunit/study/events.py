@@ -175,12 +175,10 @@ class OneSidedFeed(Event):
     def ends(self, normal: Mapping[str, float]) -> dict[str, float]:
         """The inputs of both sides after a share of each load has moved to the side of the event; on a machine with a
         width, the load there lies in the middle of both."""
-        ends, share = {}, self.p.share
+        ends, share, opposite = {}, self.p.share, filled("{other}", self.side)
         for load, place_name in PLACES.items():
-            (load_here, place_here), (load_there, place_there) = (
-                (f"{side}.{load}", f"{side}.{place_name}")
-                for side in (self.side, filled("{other}", self.side))
-            )
+            load_here, load_there = f"{self.side}.{load}", f"{opposite}.{load}"
+            place_here, place_there = f"{self.side}.{place_name}", f"{opposite}.{place_name}"
             moved = share * normal[load_there]
             ends[load_there] = (1.0 - share) * normal[load_there]
             ends[load_here] = normal[load_here] + moved
@@ -406,9 +404,9 @@ class Surge(_Pulses):
     def fault(self, normal: Values) -> str:
         """Why the event cannot act on the input; empty where it can."""
         name = self.input
-        return (
-            "" if normal[name] else f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
-        )
+        if normal[name]:
+            return ""
+        return f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
 
     def _height(self, usual: float) -> Any:
         return (self.p.factor - 1.0) * usual

@@ -442,24 +442,16 @@ def _limit(wheel: Wheel, name: str, setup: StudySetup) -> str:
 
 def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
     """Warn where the flywheel of the study, or every flywheel, does not keep the permitted fluctuation."""
-    limit = number(findings.permitted_fluctuation, "1", "percent")
-    study_wheel = next((wheel for wheel in findings.wheels if wheel.flywheel == findings.own), None)
-    if (
-        study_wheel is not None
-        and study_wheel.answers.speed_ripple is not None
-        and study_wheel.answers.speed_ripple > findings.permitted_fluctuation
-    ):
+    permitted = findings.permitted_fluctuation
+    wheel = next((wheel for wheel in findings.wheels if wheel.flywheel == findings.own), None)
+    ripple = None if wheel is None else wheel.answers.speed_ripple
+    if wheel is not None and ripple is not None and ripple > permitted:
         study.findings.say(
-            _FLUCTUATION,
-            STEADY,
-            speed_ripple=study_wheel.answers.speed_ripple,
-            flywheel=study_wheel.flywheel,
-            permitted=findings.permitted_fluctuation,
+            _FLUCTUATION, STEADY, speed_ripple=ripple, flywheel=wheel.flywheel, permitted=permitted
         )
     # flywheels without a run are not judged
-    if findings.is_searched and not any(
-        wheel.keeps(findings.permitted_fluctuation) for wheel in findings.wheels
-    ):
+    if findings.is_searched and not any(wheel.keeps(permitted) for wheel in findings.wheels):
+        limit = number(permitted, "1", "percent")
         study.findings.say(_NONE_KEEPS, limit=limit, larger="" if findings.least is None else None)
         _on_line(findings, study)
     _on_heavier(findings, study)

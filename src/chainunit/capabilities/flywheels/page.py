@@ -60,29 +60,22 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
 def _table(setup: StudySetup, findings: FlywheelFindings) -> b.Table:
     """A row for each flywheel, with the answers that any of them has."""
     x = cited(findings, PATH)
-    rows = [(remark, cited(wheel.answers, path)) for remark, wheel, path in findings.rows]
+    all_answers = [wheel.answers for _, wheel, _ in findings.rows]
     columns = [
         v
         for v in Layout(FlywheelAnswers).variables
-        if v.name in _HEADS
-        and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in findings.rows)
+        if v.name in _HEADS and any(getattr(answers, v.name) is not None for answers in all_answers)
     ]
+    rows = []
+    for remark, wheel, path in findings.rows:
+        answers = cited(wheel.answers, path)
+        numbers = (number(getattr(answers, v.name), none="-") for v in columns)
+        rows.append(b.TableRow((line(number(answers.flywheel), f" ({remark})" if remark else ""), *numbers)))
     heads = (b.Column(v.described(setup.driver_noun), _HEADS[v.name]) for v in columns)
+    shaft = setup.drive.flywheel_shaft.words(setup.driver_noun)
+    title = f"Flywheels on the {shaft}; permitted ripple of the speed "
     return b.Table(
-        tuple(
-            b.TableRow(
-                (
-                    line(number(answers.flywheel), f" ({remark})" if remark else ""),
-                    *(number(getattr(answers, v.name), none="-") for v in columns),
-                )
-            )
-            for remark, answers in rows
-        ),
-        (b.Column("flywheel"), *heads),
-        title=line(
-            f"Flywheels on the {setup.drive.flywheel_shaft.words(setup.driver_noun)}; permitted ripple of the speed ",
-            exact(x.permitted_fluctuation),
-        ),
+        tuple(rows), (b.Column("flywheel"), *heads), title=line(title, exact(x.permitted_fluctuation))
     )
 
 

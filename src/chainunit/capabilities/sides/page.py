@@ -34,12 +34,10 @@ def _factors(setup: StudySetup, x: OrganFindings) -> b.Table:
     by = f", of {organs}" if (organs := setup.drive.machine.in_place) else ""
     title = line("Overload factor, one side against both, at ", asked_speed(setup), by)
     first = next(iter(sides.values()))
-    rows = (
-        b.TableRow(
-            (v.description, *(number(factors[v.name].value) for factors in sides.values()), first[v.name].use)
-        )
-        for v in Layout(OverloadFactors).variables
-    )
+    rows = []
+    for v in Layout(OverloadFactors).variables:
+        sizes = (number(factors[v.name].value) for factors in sides.values())
+        rows.append(b.TableRow((v.description, *sizes, first[v.name].use)))
     return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
 

@@ -95,24 +95,15 @@ def _parts(drive: SizedDrive, x: SizedDrive) -> Iterator[b.Block]:
         )
         yield b.Text(sentence, "note", "long")
         return
-    rows = [
-        b.TableRow(
-            (
-                capital(item.kind),
-                shown.designation,
-                shown.order_number if item.order_number else "-",
-                exact(shown.price, none="-"),
-            )
-        )
-        for item, shown in zip(drive.parts.items, x.parts.items, strict=True)
-    ]
+    rows, sources = [], {}
+    for item, shown in zip(drive.parts.items, x.parts.items, strict=True):
+        order_number, price = shown.order_number if item.order_number else "-", exact(shown.price, none="-")
+        rows.append(b.TableRow((capital(item.kind), shown.designation, order_number, price)))
+        sources[item.source] = shown.source
     if len(rows) > 1 and drive.parts.total is not None:
         rows.append(b.TableRow(("These parts together", "", "", exact(x.parts.total))))
     columns = b.heads("part", "designation", "order number", "price")
     yield b.Table(tuple(rows), columns, title="Parts to order", numeric=False, form="long")
-    sources = {
-        item.source: shown.source for item, shown in zip(drive.parts.items, x.parts.items, strict=True)
-    }
     yield b.Text(line("Source of their values: ", *join(sources.values()), "."), "note", "long")
     yield from (b.Text(remark, form="long") for remark in x.parts.open)
 
@@ -321,24 +312,16 @@ def _candidates(findings: SizingFindings, x: SizingFindings, row_count: int) -> 
     if any(candidate.sold is not None for candidate in findings.candidates):
         # the gears have a table of their own
         titles = {name: title for name, title in titles.items() if not name.startswith("gear")}
-    rows = [
-        b.TableRow(
-            (
-                line(shown.designation, Aside(_behind(candidate, shown))),
-                shown.verdict or "",
-                _flywheel(candidate, shown),
-                number(shown.numbers.mass),
-                *(
-                    _share(candidate.checks[name], shown.checks[name]) if name in candidate.checks else ""
-                    for name in titles
-                ),
-            ),
-            line(f"{_SIGN.get(candidate.verdict or Standing.REJECTED, '✗')} ", shown.reason),
-            _SEVERITY.get(candidate.verdict, "bad"),
-            "both" if i < row_count else "long",
-        )
-        for i, (candidate, shown) in enumerate(zip(findings.candidates, x.candidates, strict=True))
-    ]
+    rows = []
+    for k, (candidate, shown) in enumerate(zip(findings.candidates, x.candidates, strict=True)):
+        checks = candidate.checks
+        shares = (_share(checks[name], shown.checks[name]) if name in checks else "" for name in titles)
+        drive = line(shown.designation, Aside(_behind(candidate, shown)))
+        mass = number(shown.numbers.mass)
+        cells = (drive, shown.verdict or "", _flywheel(candidate, shown), mass, *shares)
+        reason = line(f"{_SIGN.get(candidate.verdict or Standing.REJECTED, '✗')} ", shown.reason)
+        severity = _SEVERITY.get(candidate.verdict, "bad")
+        rows.append(b.TableRow(cells, reason, severity, "both" if k < row_count else "long"))
     long = (b.Column(title, form="long") for title in ("flywheel", "mass", *titles.values()))
     return b.Table(
         tuple(rows),

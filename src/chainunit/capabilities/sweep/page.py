@@ -125,19 +125,16 @@ def _best(x: SweepSummary) -> Iterator[b.Block]:
 
 def _extremes(x: SweepSummary) -> Iterator[b.Block]:
     """The points with the least and with the largest value of each result."""
-    rows = tuple(
-        b.TableRow(
-            (
-                line(Name(name), f", {end}"),
-                *(number(point[column], x.digits(column)) for column in (name, *x.parameters)),
-            )
-        )
-        for name, ends in x.extremes.items()
-        for end, point in ends.items()
-    )
+    rows = []
+    for name, ends in x.extremes.items():
+        for end, point in ends.items():
+            numbers = (number(point[column], x.digits(column)) for column in (name, *x.parameters))
+            rows.append(b.TableRow((line(Name(name), f", {end}"), *numbers)))
     if rows:
         heads = (b.Column("result"), b.Column("value"), *_columns(x.parameters))
-        yield b.Table(rows, heads, title="Least and largest values, and the points at which they stand")
+        yield b.Table(
+            tuple(rows), heads, title="Least and largest values, and the points at which they stand"
+        )
 
 
 def _influences(x: SweepSummary) -> Iterator[b.Block]:
@@ -146,11 +143,7 @@ def _influences(x: SweepSummary) -> Iterator[b.Block]:
     if not x.influences or len(x.parameters) < 2:
         return
     for name, row in x.influences.items():
-        shares = {
-            parameter: number(influence.share.value)
-            for parameter, influence in row.items()
-            if influence.share
-        }
+        shares = {key: number(influence.share.value) for key, influence in row.items() if influence.share}
         if len(shares) == len(row):
             most = max(shares, key=lambda parameter: shares[parameter].value or 0.0)
             sentence = "{}: {} moves it most; alone it explains {} of the variance."
@@ -197,16 +190,12 @@ def _influence_table(
 ) -> b.Table:
     """A table with a column for each result, and for each parameter a row for each kind of cell; `cells` has them by
     the words behind the name of the parameter."""
-    rows = (
-        b.TableRow(
-            (
-                line(Name(parameter), kind) if kind else Name(parameter),
-                *(cell(row[parameter]) if parameter in row else "-" for row in x.influences.values()),
-            )
-        )
-        for parameter in x.parameters
-        for kind, cell in cells.items()
-    )
+    rows = []
+    for parameter in x.parameters:
+        for kind, cell in cells.items():
+            title = line(Name(parameter), kind) if kind else Name(parameter)
+            values = (cell(row[parameter]) if parameter in row else "-" for row in x.influences.values())
+            rows.append(b.TableRow((title, *values)))
     return b.Table(tuple(rows), (b.Column("parameter"), *_columns(x.influences)), **more)
 
 
@@ -216,21 +205,13 @@ def _spread(x: SweepSummary) -> Iterator[b.Block]:
     if not spread:
         return
     keys = list(dict.fromkeys(key for numbers in spread.values() for key in numbers.quantiles))
-    rows = (
-        b.TableRow(
-            (
-                Name(name),
-                number(x.nominal[name], x.digits(name)) if name in x.nominal else "-",
-                number(numbers.mean, x.digits(name)),
-                number(numbers.deviation),
-                *(
-                    number(numbers.quantiles[key].value, x.digits(name)) if key in numbers.quantiles else "-"
-                    for key in keys
-                ),
-            )
-        )
-        for name, numbers in spread.items()
-    )
+    rows = []
+    for name, numbers in spread.items():
+        digits, quantiles = x.digits(name), numbers.quantiles
+        nominal = number(x.nominal[name], digits) if name in x.nominal else "-"
+        cells = (number(quantiles[key].value, digits) if key in quantiles else "-" for key in keys)
+        mean, deviation = number(numbers.mean, digits), number(numbers.deviation)
+        rows.append(b.TableRow((Name(name), nominal, mean, deviation, *cells)))
     columns = (
         b.Column("result"),
         b.Column("at the study's values", "study"),
