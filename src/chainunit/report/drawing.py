@@ -87,12 +87,10 @@ class _Canvas:
         room."""
         boxes = [_box(text, place) for place in places]
         nearest, nearest_own = _from_lines(boxes, lines or ()), _from_lines(boxes, own_lines)
-        clear = [
-            min(
-                *(_gap(box, other) for other in self.label_boxes), room, box[0] - 4.0, WIDTH + COLUMN - box[2]
-            )
-            for box, room in zip(boxes, nearest, strict=True)
-        ]
+        clear = []
+        for box, room in zip(boxes, nearest, strict=True):
+            gaps = [_gap(box, other) for other in self.label_boxes]
+            clear.append(min(*gaps, room, box[0] - 4.0, WIDTH + COLUMN - box[2]))
         free = [k for k, room in enumerate(clear) if room >= 3.0]
         beside = (k for k in free if own_lines and nearest_own[k] <= nearest[k])
         best = next(beside, free[0] if free else int(np.argmax(clear)))

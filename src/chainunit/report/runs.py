@@ -80,17 +80,15 @@ def table_of_runs(study: StudyRecord) -> b.Table:
     """The table of all answers, with a column for each run."""
     setup, runs, answers = study.setup, study.runs, study.runs.answers
     names, unknown_names = by_side(runs, answers), runs.not_known
-    rows = (
-        b.TableRow(
-            (v.described(setup.driver_noun), *(number(runs, run, v.name) for run in names)),
-            form="long" if MEASURES[v.name].minor else "both",
-        )
-        for v in Layout(Answers).variables
+    rows = []
+    for v in Layout(Answers).variables:
+        has_value = any(finite(getattr(answers[run], v.name)) is not None for run in names)
+        is_recovery = v.name == "recovery_time" and runs.returns and runs.overloads
         # a coupling that is absent or stayed shut has no row; an answer that the motor does not give has dashes
-        if v.name in unknown_names
-        or any(finite(getattr(answers[run], v.name)) is not None for run in names)
-        or (v.name == "recovery_time" and runs.returns and runs.overloads)
-    )
+        if has_value or is_recovery or v.name in unknown_names:
+            numbers = (number(runs, run, v.name) for run in names)
+            form: b.Form = "long" if MEASURES[v.name].minor else "both"
+            rows.append(b.TableRow((v.described(setup.driver_noun), *numbers), form=form))
     head: Line = ()
     if "steady" in answers:
         head = line(setup.driver_noun, " at ", number(runs, "steady", "speed_mean"))

@@ -268,6 +268,16 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
         energy_gap=float(np.max(gap) / max(np.max(np.abs(torque)), 1e-300)),
     )
     motions = list(_motions(description, way, q))
+    joint_turns = {}
+    for (name, variable), force_rms in zip(joints.items(), forces_rms, strict=True):
+        normal = f"{variable}.normal"
+        joint_turns[name] = JointTurn(
+            peak=top[f"force {name}"],
+            peak_at=peak_places[f"force {name}"],
+            rms=force_rms,
+            moment=top.get(f"{variable}.moment"),
+            least=-top[normal] if normal in machine.model.contacts else None,
+        )
     return LinkageFindings(
         machine,
         speed,
@@ -278,16 +288,7 @@ def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindin
             name: GroupTurn(margin=-top[f"-margin {name}"], margin_at=peak_places[f"-margin {name}"])
             for name in groups
         },
-        joints={
-            name: JointTurn(
-                peak=top[f"force {name}"],
-                peak_at=peak_places[f"force {name}"],
-                rms=force_rms,
-                moment=top.get(f"{variable}.moment"),
-                least=-top[least] if (least := f"{variable}.normal") in machine.model.contacts else None,
-            )
-            for (name, variable), force_rms in zip(joints.items(), forces_rms, strict=True)
-        },
+        joints=joint_turns,
         strokes={name: motion for name, motion, _ in motions if isinstance(motion, Stroke)},
         swings={name: motion for name, motion, _ in motions if isinstance(motion, Swing)},
         dead_centres={
@@ -451,10 +452,13 @@ def linkage_data(
     `remarks` on a drawing."""
     description, unit = f.description, f.machine.model.driver_port.unit
 
-    def limits(variable: str, limit_unit: str) -> InUnit:
-        """The least and the largest value of a variable."""
-        return InUnit(f.limits[variable], limit_unit)
-
+    angles, points = {}, {}
+    for name, entry in description.structure.links.items():
+        link = description.variable("link", name)
+        angles[name] = InUnit(f.limits[f"{link}.angle"], "rad")
+        for point in entry.points:
+            x, y = f.limits[f"{link}.{point}.x"], f.limits[f"{link}.{point}.y"]
+            points[f"{name}.{point}"] = {"x": InUnit(x, "m"), "y": InUnit(y, "m")}
     return LinkageData(
         chainunit=__version__,
         source=source,
@@ -467,18 +471,8 @@ def linkage_data(
         strokes=f.strokes,
         swings=f.swings,
         dead_centres={name: InUnit(places, unit("rad")) for name, places in f.dead_centres.items()},
-        angles={
-            link: limits(f"{description.variable('link', link)}.angle", "rad")
-            for link in description.structure.links
-        },
-        points={
-            f"{link}.{point}": {
-                axis: limits(f"{description.variable('link', link)}.{point}.{axis}", "m")
-                for axis in ("x", "y")
-            }
-            for link, entry in description.structure.links.items()
-            for point in entry.points
-        },
+        angles=angles,
+        points=points,
         over_the_way={"driver": InUnit(f.q, unit("rad")), **_over_the_way(f)},
         rest=_at_rest(f),
         back=WayBack(WayForces(f.back.turn, f.back.joints), _over_the_way(f.back)) if f.back else None,

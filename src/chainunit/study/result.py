@@ -199,13 +199,13 @@ def assumed_ranges(runs: StudyRuns, name: str) -> dict[str, InUnit]:
     """The range of the assumed quantities of an event, and the peaks over it."""
     spread = runs.spreads[name]
     units = {v.name: v.unit for v in variables(runs.events[name].Parameters)}
-    ranges = [(key, ends, units[key], "assumed") for key, ends in spread.ranges.items()]
-    ranges += [(key, ends, "N.m", "") for key, ends in spread.peaks.items()]
-    return {
-        f"{key}_{end}": InUnit(x, unit, kind)
-        for key, ends, unit, kind in ranges
-        for end, x in zip(("low", "high"), ends, strict=True)
-    }
+    data: dict[str, InUnit] = {}
+    for key, (low, high) in spread.ranges.items():
+        data |= {f"{key}_low": InUnit(low, units[key], "assumed")}
+        data |= {f"{key}_high": InUnit(high, units[key], "assumed")}
+    for key, (low, high) in spread.peaks.items():
+        data |= {f"{key}_low": InUnit(low, "N.m"), f"{key}_high": InUnit(high, "N.m")}
+    return data
 
 
 def _parts(study: StudyRecord) -> dict[str, Any]:

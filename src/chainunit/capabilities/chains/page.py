@@ -61,16 +61,12 @@ def blocks(study: StudyRecord) -> Iterator[b.Block]:
         ends = number(x.speeds[0].speed), number(x.speeds[-1].speed)
         yield b.Text(filled("No speed to avoid from {} to {}.", *ends), "fine")
     yield _at_study_speed(x)
-    slack = {
-        side: join(
-            filled("{}: {}", rod.rod, number(rod.share))
-            for rod in rods
-            if (number(rod.share).value or 0.0) > 0.0
-        )
-        for side, rods in x.slack_by_rod.items()
-    }
+    slack = {}
+    for side, rods in x.slack_by_rod.items():
+        slack_rods = (rod for rod in rods if (number(rod.share).value or 0.0) > 0.0)
+        slack[side] = join(filled("{}: {}", rod.rod, number(rod.share)) for rod in slack_rods)
     if any(slack.values()):
-        rows = tuple(b.TableRow((side, slack_rods or "none")) for side, slack_rods in slack.items())
+        rows = tuple(b.TableRow((side, shares or "none")) for side, shares in slack.items())
         yield b.Table(rows, title="Rods that go slack, share of the time", numeric=False)
     if len(chain.speeds) > 1:
         yield _sweep(x)
@@ -176,15 +172,12 @@ def _over_speed(study: StudyRecord) -> fig.Figure:
     speed = np.array([n.speed for n in rows])
     over = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
     # the least distance of 5 % keeps labels apart on a narrow screen, too
-    labels: list[fig.Item] = [
-        fig.Mark(
-            critical.speed,
-            words=f"mode {critical.mode}" + (f", order {critical.order}" if critical.order > 1 else ""),
-            look="thin",
-            upright=True,
+    labels: list[fig.Item] = []
+    for critical in result.within_speeds(0.05):
+        order = f", order {critical.order}" if critical.order > 1 else ""
+        labels.append(
+            fig.Mark(critical.speed, words=f"mode {critical.mode}{order}", look="thin", upright=True)
         )
-        for critical in result.within_speeds(0.05)
-    ]
     marks: list[fig.Item] = [
         *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
         *(fig.Mark(critical.speed, look="thin") for critical in result.within_speeds()),

@@ -224,15 +224,12 @@ def _runs(data: Mapping[str, Any]) -> dict[str, Numbers]:
     nodes = {run: data.get(run) for run in ("start_up", "settling")}
     nodes |= {f"{table}.{run}": node for table in _RUNS for run, node in tables[table].items()}
     nodes[_RANDOM] = tables["monte_carlo"].get("quantiles")
-    runs = {
-        run: {
-            name: value
-            for name, value in _leaves(node, "")
-            if isinstance(value, InUnit) and not isinstance(value.value, list)
-        }
-        for run, node in nodes.items()
-    }
-    return {run: numbers for run, numbers in runs.items() if numbers}
+    runs = {}
+    for run, node in nodes.items():
+        leaves = {name: value for name, value in _leaves(node, "") if isinstance(value, InUnit)}
+        if numbers := {name: x for name, x in leaves.items() if not isinstance(x.value, list)}:
+            runs[run] = numbers
+    return runs
 
 
 # -- their words
@@ -290,22 +287,18 @@ def _alone(
     descriptions: Mapping[str, str],
 ) -> Alone:
     """The runs, events and measures that one result has and the other has not."""
-    missing = [run for run in runs if run not in others]
-    # the further numbers of a run go with the run
-    whole = {run.removeprefix("answers.") for run in missing if run.startswith("answers.")}
+    answered = {
+        run.removeprefix("answers.") for run in runs if run.startswith("answers.") and run not in others
+    }
+    titles, measures = list[str](), list[str]()
+    for run, numbers in runs.items():
+        if run in others:
+            names = (name for name in numbers if name not in others[run])
+            measures += [f"{_title(mine, run)}: {_spoken(name, descriptions)}" for name in names]
+        elif run.startswith("answers.") or run.split(".")[-1] not in answered:
+            # the further numbers of a run go with its answers
+            titles.append(_title(mine, run))
     events = as_mapping(theirs.data.get("event"))
     return Alone(
-        [
-            _title(mine, run)
-            for run in missing
-            if run.startswith("answers.") or run.split(".")[-1] not in whole
-        ],
-        [name for name in as_mapping(mine.data.get("event")) if name not in events],
-        [
-            f"{_title(mine, run)}: {_spoken(name, descriptions)}"
-            for run, numbers in runs.items()
-            if run in others
-            for name in numbers
-            if name not in others[run]
-        ],
+        titles, [name for name in as_mapping(mine.data.get("event")) if name not in events], measures
     )

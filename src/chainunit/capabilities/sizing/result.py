@@ -292,14 +292,8 @@ def drive_protection(
         overloads=_peaks(study.runs, setting.overloads, "opens it", setting.opens),
         disturbances=_peaks(study.runs, setting.disturbances, "a nuisance trip", setting.nuisances),
         alternatives=[
-            TriedWay(
-                alternative.way,
-                way_words(study, alternative, setting),
-                alternative.numbers,
-                alternative.opens,
-                _effects(study.runs, alternative.effects),
-            )
-            for alternative in alternatives
+            TriedWay(x.way, way_words(study, x, setting), x.numbers, x.opens, _effects(study.runs, x.effects))
+            for x in alternatives
         ],
     )
 
@@ -317,15 +311,13 @@ def _peaks(
 def _effects(runs: StudyRuns, effects: Mapping[str, CouplingEffect]) -> dict[str, dict[str, InUnit]]:
     """The effects of a torque limiter as it was tried, by overload."""
     titles = {"without": "without a coupling", "with_coupling": "with it"}
-    return {
-        name: {
-            key: _torque(
-                getattr(effect, key), f"{runs.title_of(name)}: peak at the output of the gear, {phrase}"
-            )
-            for key, phrase in titles.items()
+    data = {}
+    for name, effect in effects.items():
+        title = f"{runs.title_of(name)}: peak at the output of the gear"
+        data[name] = {
+            key: _torque(getattr(effect, key), f"{title}, {words}") for key, words in titles.items()
         }
-        for name, effect in effects.items()
-    }
+    return data
 
 
 def _relay(study: StudyRecord, rated: float) -> MotorProtection:

@@ -62,18 +62,15 @@ _SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study.findings).notices, "observer.png")
 def _print(study: StudyRecord) -> fig.Figure:
-    """All events beside each other, for print."""
-    events = [_event(study, name) for name in ObserverFindings.of_study(study.findings).notices]
-    rows = zip(*(figure.panels for figure in events), strict=True)
-    panels = (
-        tuple(
-            panel and replace(panel, title="" if k else figure.title)
-            for figure, (panel,) in zip(events, row, strict=True)
-        )
-        for k, row in enumerate(rows)
-    )
+    """All events beside each other, for print: a column for each, with its title above."""
+    columns = []
+    for name in ObserverFindings.of_study(study.findings).notices:
+        figure = _event(study, name)
+        (first, *others) = (panel for (panel,) in figure.panels)
+        columns.append([first and replace(first, title=figure.title), *others])
     title = "The load observer in every event"
-    return fig.Figure("observers", title, f"{title}: loads and imbalances.", tuple(panels), on_page=False)
+    panels = tuple(zip(*columns, strict=True))
+    return fig.Figure("observers", title, f"{title}: loads and imbalances.", panels, on_page=False)
 
 
 @PICTURES.declare(lambda study: ObserverFindings.of_study(study.findings).notices)
