@@ -203,6 +203,7 @@ def _averages(steady: xr.Dataset, torque: np.ndarray) -> Iterator[fig.Mark]:
     "force_over_stroke.png",
 )
 def _stroke(study: StudyRecord) -> Iterator[fig.Figure]:
+    """The forces over the stroke in steady running and in each overload."""
     runs, drive = study.runs, study.setup.drive
     names = [name for name in run_names.motor_runs(runs) if run_names.event_time(runs, name) is not None]
     parts = {"steady": runs.steady} | {name: run_names.from_event(runs, name) for name in names}

@@ -155,6 +155,7 @@ def packed(data: Any) -> str:
 
 
 def _shortened(data: Any) -> Any:
+    """Data whose long series of numbers are packed, see `_series`."""
     if isinstance(data, dict):
         return {name: _shortened(x) for name, x in data.items()}
     if isinstance(data, list | tuple):

@@ -84,6 +84,7 @@ def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
 
 
 def _opening(f: LinkageFindings, x: LinkageData) -> Iterator[b.Block]:
+    """The groups and drivers in sentences, remarks on the file, and a drawing."""
     further = f.description.further
     lead = "The driver gives one degree of freedom: "
     if further.free:
@@ -348,6 +349,7 @@ def _along(f: LinkageFindings, name: str) -> Line:
 
 
 def _variables(f: LinkageFindings) -> Iterator[b.Block]:
+    """Parameters and inputs with their values."""
     model = f.machine.model
     for title, layout, values in (
         ("Parameters", model.parameter_layout, f.machine.by_name),

@@ -39,6 +39,7 @@ def _line(line: Line, units: Units) -> str:
 
 
 def _grid(rows: Iterable[Iterable[str]], head: Iterable[str]) -> Iterator[str]:
+    """The lines of a table in Markdown."""
     heads = list(head)
     yield f"| {' | '.join(heads)} |"
     yield "|---" * len(heads) + "|"

@@ -156,6 +156,7 @@ def _run(run: Clip, reach: float, units: Units) -> dict[str, Any]:
 
 
 def _reading(reading: Reading, units: Units) -> dict[str, Any]:
+    """A reading in the unit that is shown, as data of the page."""
     unit, factor, offset = scales(reading.unit, reading.kind, units)[0]
     values = factor * np.asarray(reading.values, float) + offset
     return {"title": reading.title, "unit": unit_text(unit), "values": _list(values, None, 4)}

@@ -225,6 +225,7 @@ def _bars(axis: Any, bars: Bars, size: float) -> None:
 
 
 def _field(axis: Any, field: Field) -> None:
+    """Draw a map of classes, with a line around the bold level."""
     shades = class_colours(len(field.names))
     z = np.ma.masked_invalid(classes(field))
     axis.contourf(field.x, field.y, z, levels=range(len(field.levels)), colors=shades)

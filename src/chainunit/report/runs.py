@@ -145,6 +145,7 @@ def _pins(runs: StudyRuns) -> b.Table:
     sizes = list(next(iter(tables.values())))
 
     def row(pin: str) -> b.TableRow:
+        """The forces of a pin, and the run with its largest peak."""
         worst = hardest_run(runs.pins, pin)
         numbers = (
             Number(tables[pin][size], "N", path=f"runs.pins.{reference}.{pin}.{size}") for size in sizes

@@ -92,6 +92,7 @@ def _speed(study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _title_block(setup: StudySetup, report: b.Report) -> dict[str, str]:
+    """The entries of the title block: labels of the file, machine, study file, status."""
     labels: dict[str, Any] = {name: setup.config.file.labels.get(name, "") for name in _LABELS}
     machine = f"{capital(setup.noun)}, {setup.drive.machine.model.name}"
     return {
@@ -159,6 +160,7 @@ def _is_used(value: b.GivenValue, setup: StudySetup) -> bool:
 
 
 def _unchecked(study: StudyRecord) -> Iterator[b.Block]:
+    """All that the study did not compute."""
     lines: list[Line] = [sentence for part in capabilities() for sentence in part.unchecked(study)]
     yield b.Text(
         "The following was not computed, and the numbers above say nothing about it:", "lead", "long"

@@ -162,6 +162,7 @@ def _first_rows(
 
     @cache
     def printed(count: int) -> str:
+        """The first rows of the table as they are printed, and how many are not shown."""
         part = replace(table, rows=table.rows[:count])
         text = _printed(console, partial(_show_table, part, console, units))
         lines = [line.rstrip() for line in text.splitlines()]
@@ -224,6 +225,7 @@ def _role(block: Block) -> str:
 
 
 def _sentences(block: Block, units: Units) -> list[str]:
+    """The sentences of a judgement or a text."""
     if isinstance(block, Judgement):
         return [plain_line(item, units) for item in block.items or (block.line,)]
     return [plain_line(block.line, units)] if isinstance(block, Text) else []

@@ -133,6 +133,7 @@ def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str
 
 @cache
 def _lists() -> tuple[str, ...]:
+    """The full names of the keys whose values are lists that a key of a fault may point into."""
     return tuple(
         f"{table}.{key}" for table, section in all_sections().items() for key in section.lists.single_keys
     )
@@ -196,6 +197,7 @@ def check_order(values: Mapping[str, Any]) -> Iterator[InputError]:
     """Refusals of limits with no value between them."""
 
     def value(name: str) -> tuple[float, str]:
+        """The value of a key by its full name, and as text with its unit."""
         section, _, key = name.partition(".")
         x, declaration = getattr(values[section], key), type(values[section])
         unit = next(v.unit for v in Layout(declaration).variables if v.name == key)

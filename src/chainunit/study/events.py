@@ -51,6 +51,7 @@ class _Pulses(Event):
         return {name: self._pulses(begin, normal[name], normal[name] + self._height(normal[name]))}
 
     def _pulses(self, begin: float, usual: float, height: float) -> Profile:
+        """The pulses of the event, from a `usual` value to the `height` and back."""
         p, changes = self.p, list[tuple[float, float, float]]()
         for pulse in self._begins(begin):
             changes += _spell(usual, height, pulse, p.rise, p.rise + p.duration).changes

@@ -62,6 +62,7 @@ class GivenSection:
 
 
 def _choice(value: Any) -> Any:
+    """A choice ready for JSON."""
     if isinstance(value, float):
         return entry(value, "1")
     return list(value) if isinstance(value, tuple) else value
@@ -86,6 +87,7 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
 
 
 def _of_study(file: FileContents) -> dict[str, Any]:
+    """The choices of no table, such as the kind of start, that a file of this kind may have."""
     # a key that a file of this kind may not have is not used either
     refused = {rule.key for rule in all_rules() if rule.refused is None and rule.on.holds(file.tables)}
     used = all_choices().keys() - refused

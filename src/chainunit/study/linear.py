@@ -360,6 +360,7 @@ def _run_to(simulation: Any, rig: Rig, time: float) -> Any:
 
 
 def _refuse_opened(simulation: Any, time: float) -> None:
+    """Refuse a point that a run does not reach, as the torque limiter ends it before."""
     if simulation.time < time * (1.0 - 1e-9) - 1e-9:
         raise RunError(
             f"the torque limiter opens at t = {simulation.time:.4g} s, before the point at {time:.4g} s; take an "

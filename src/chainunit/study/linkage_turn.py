@@ -315,6 +315,7 @@ def _means(
     variables, over the way of the driver from the begin to the end of its `span`."""
 
     def squares(q: Any) -> Any:
+        """Effort, its square, and the square of the force of each joint, shape (rows, places)."""
         state, outputs = way.state(q)
         bias = np.broadcast_to(state.bias, q.shape)
         forces = (outputs[f"{joint}.fx"] ** 2 + outputs[f"{joint}.fy"] ** 2 for joint in joints)

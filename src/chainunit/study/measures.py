@@ -126,6 +126,7 @@ def _slack_time(w: Window) -> float | None:
 
 
 def _fold(w: Window) -> float | None:
+    """Largest angle between two rods of a chain [rad]; None without chains."""
     if "machine.left.fold_largest" not in w.run:
         return None
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)

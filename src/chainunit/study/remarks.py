@@ -257,6 +257,7 @@ def _stall_speed(runs: StudyRuns, steady: Answers) -> float | None:
 
 
 def _speed_missed(code: str, why: str, remedy: str = "") -> RemarkCode:
+    """The remark on a crank that misses its speed, with the reason `why`."""
     missed = "In steady running the {driver} turns at {speed_mean} in place of {asked}."
     begin = "The overloads begin from this state{overloads}."
     return fault(code, missed, why, begin, remedy=remedy, sizes={("rad/s", "speed"): "speed_mean"})

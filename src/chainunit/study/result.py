@@ -158,6 +158,7 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
 
 
 def _motor(setup: StudySetup) -> dict[str, Any]:
+    """Kind, title, rating and parameters of the motor, as far as they are known."""
     kind, plate = setup.drive.graph.components["motor"].title, setup.plate
     titles = {"kind": kind, "title": setup.motor_title}
     rating = {} if plate is None else as_data(MotorRating.of(plate))
@@ -176,6 +177,7 @@ def _runs(runs: StudyRuns) -> RunData:
     """The events, and the numbers of each run."""
 
     def begin(phase: Phase, answers: Answers | None) -> dict[str, InUnit] | None:
+        """The measures of a part of the start."""
         if answers is None:
             return None
         return {v.name: InUnit(getattr(answers, v.name), v.unit, v.kind) for v in measures_of(phase)}

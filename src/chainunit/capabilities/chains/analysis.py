@@ -339,6 +339,8 @@ def study_chain(
     with stoppable() as is_stopped, closing(Fmu(file)) as fmu:
 
         def run_at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
+            """The numbers of the chains at the crank speed `w`, the one of number `k`."""
+
             def report_share(share: float) -> None:
                 progress(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 

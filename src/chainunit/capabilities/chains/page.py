@@ -185,6 +185,7 @@ def _over_speed(study: StudyRecord) -> fig.Figure:
     ]
 
     def pair(median: Any, bars: Any) -> list[fig.Item]:
+        """The curves of chains and of two bars, with the marks of all panels."""
         return [
             fig.Curve("chains, median", speed, median, 0, "o"),
             fig.Curve("two bars", speed, bars, 1, "s"),

@@ -213,6 +213,7 @@ def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _same(a: Any, b: Any) -> bool:
+    """Whether two given values are equal, numbers but for rounding."""
     if all(isinstance(x, InUnit) and _is_finite(x.value) for x in (a, b)):
         return a.unit == b.unit and math.isclose(a.value, b.value, rel_tol=_ROUNDING)
     return bool(a == b)

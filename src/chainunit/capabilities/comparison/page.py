@@ -106,6 +106,7 @@ def _digits(compared: ComparedValue) -> int:
 
 
 def _only(comparison: StudyComparison) -> Iterator[b.Block]:
+    """The runs and the measures that only one result has."""
     for side, single in comparison.only.items():
         for noun, titles in (("runs", single.runs), ("measures", single.measures)):
             if titles:

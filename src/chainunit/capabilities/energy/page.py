@@ -108,6 +108,7 @@ def verdict(comparison: MotorComparison, x: MotorComparison, years: Number) -> L
 
 
 def _figure(findings: EnergyFindings, titles: Mapping[str, str]) -> fig.Figure:
+    """Bars of the mean power by place."""
     names, mean = _known(findings), findings.own.mean
     sizes = [float(getattr(mean, name)) for name in names]
     y = fig.Axis("", names=tuple(titles[name] for name in names))

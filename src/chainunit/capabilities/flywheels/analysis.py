@@ -155,6 +155,7 @@ class FlywheelAnalysis(Analysis):
         sizes = sorted({table.J, *config.plans["flywheels"]})
 
         def run(flywheel: float) -> Wheel:
+            """Run the drive with a flywheel of this inertia [kg m2]."""
             finished = float(len(findings.wheels))
             work.progress(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
             return _run(study.setup, work.rig, findings, flywheel)

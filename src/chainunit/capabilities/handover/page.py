@@ -77,6 +77,7 @@ def _opening(x: HandedDrive) -> Iterator[b.Block]:
 
 
 def _left_open(sizing: HandedDrive) -> Iterator[b.Block]:
+    """The names of the values that the study does not know."""
     if not sizing.open:
         yield b.Text("Every value of sizing.json is known.")
         return

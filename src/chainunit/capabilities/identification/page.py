@@ -77,6 +77,7 @@ TASK: Task[Config, IdentifiedMachine] = Task(
 
 
 def _opening(x: IdentificationSummary, machine: IdentifiedMachine) -> Iterator[b.Block]:
+    """Whether the model describes the recordings, and how many numbers these determine."""
     if machine.is_described:
         sentence = (
             "The model describes the recordings: their residuals are noise. These recordings determine {} of {} "
@@ -254,6 +255,7 @@ def _figures(machine: IdentifiedMachine, summary: IdentificationSummary) -> Iter
 
 
 def _runs(x: IdentificationSummary) -> Iterator[b.Block]:
+    """A row for each run with its recording."""
     yield from table(
         x.runs.items(),
         ("run", lambda row: Name(row[0])),

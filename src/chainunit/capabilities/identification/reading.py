@@ -94,6 +94,7 @@ def read_identification(
     faults = Faults()
 
     def read_run(entry: Entry, name: str) -> PlannedRun:
+        """A run; an amount may be added to sought numbers alone."""
         run = _run(entry, name, crank_speed, numbers, source)
         for other in sorted(run.added.keys() - sought.keys()) if not faults.errors else ():
             entry.fault(f"added.{other}", "is not sought; add [[identify.parameter]] with this name")

@@ -159,6 +159,7 @@ def summary_of(machine: IdentifiedMachine) -> IdentificationSummary:
 
 
 def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
+    """All that the report and result.json say of an identification."""
     best, estimates, start = machine.best, machine.estimates, machine.information_at_start
     return IdentificationSummary(
         heading=Heading.of(machine.config.title, machine.config.file),
@@ -249,6 +250,7 @@ def _correlations(machine: IdentifiedMachine) -> Iterator[Correlation]:
 
 
 def _sum(machine: IdentifiedMachine, combination: Combination) -> DeterminedSum:
+    """A sum of sought numbers with its value."""
     # of temperatures, a sum is no temperature
     value, deviation = (difference(x, combination.unit) for x in machine.value_of_sum(combination))
     return DeterminedSum(str(combination), dict(combination.terms), value, deviation)

@@ -265,6 +265,7 @@ def _checked(wishes: Wishes, best: Answer, search: Search) -> tuple[CycleQuantit
 
 
 def _turns(wishes: Wishes, machine: Machine) -> dict[str, Any]:
+    """The crank torque over a turn of today's machine and of the best one."""
     today = cycle(wishes.machine, wishes.crank_speed, wishes.feed)
     then = cycle(machine, wishes.crank_speed, wishes.feed)
     return {"angle": today.angle, "today": today.crank_torque, "best": then.crank_torque}

@@ -62,6 +62,7 @@ def optimum_report(
 
 
 def _title(best: Best, title: str) -> str:
+    """The title of the report, which says whether a machine was found."""
     if best.met:
         return title or "The best machine"
     return f"{title}: no machine found" if title else "No machine found"
@@ -81,6 +82,7 @@ class OptimizedStudy(NamedTuple):
         return optimum_report(self.best, config.title, config.file, config.units, live)
 
     def _live(self) -> b.LiveMachine:
+        """The live machine of the study with the best machine."""
         source, tables = self.as_file()
         with scratch() as folder:
             return live_of_config(of_tables(tables, str(source)), folder)
@@ -159,6 +161,7 @@ def _opening(best: Best, x: BestMachine) -> Iterator[b.Block]:
 
 
 def _share(x: TodayAndBest) -> Line:
+    """The change from today in per cent, to follow a number; nothing without both numbers."""
     today, value = number(x.today).value, number(x.best).value
     if not today or value is None:
         return ()
@@ -167,6 +170,7 @@ def _share(x: TodayAndBest) -> Line:
 
 
 def _turns(best: Best) -> fig.Figure:
+    """The torque over the turn of the best machine and of that of today."""
     angle = fig.Axis("crank angle", "rad", step=45.0)
     curves = tuple(
         fig.Curve(name, best.turns["angle"], best.turns[key], look)
@@ -262,6 +266,7 @@ def _front(best: Best, x: BestMachine) -> Iterator[b.Block]:
 
 
 def _checks(best: Best, x: BestMachine) -> Iterator[b.Block]:
+    """How many starts agree, the effort, and whether a machine near the best one is better."""
     yield b.Text(x.starts.text)
     effort, counts = x.starts.effort, "{} programs, {} iterations, {} turns computed."
     sizes = map(exact, (effort.programs, effort.iterations, effort.evaluations))

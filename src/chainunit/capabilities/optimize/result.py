@@ -235,6 +235,7 @@ def _organs(best: Best) -> list[SpeedLimit]:
 
 
 def _conflict(best: Best) -> WhyNone | None:
+    """The limits that conflict, ready for the result; None where a machine meets all limits."""
     conflict = best.conflict
     if conflict is None:
         return None

@@ -160,6 +160,7 @@ class Search:
         from scipy.optimize import minimize_scalar
 
         def pulls(q: Any, shares: Any) -> Any:
+            """The least pull of all webs at these angles and shares of the slack-free speed."""
             w = np.repeat(np.atleast_1d(shares) * self.wishes.slack_free_speed, len(q))
             values = self.columns.values(x, np.tile(q, np.size(shares)), w, self.pulls)
             return np.min(values, axis=(0, 1)).reshape(np.size(shares), len(q))

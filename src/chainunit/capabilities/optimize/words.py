@@ -151,6 +151,7 @@ def conflict_sentences(best: Best) -> Iterator[str]:
 
 
 def _wish_words(best: Best, name: str) -> str:
+    """A limit, the slack-free speed, or the need to turn, in words."""
     if name == SLACK:
         return f"webs that keep their pull up to {number(best.wishes.slack_free_speed, 'rad/s', 'speed')}"
     if name == TURNS:

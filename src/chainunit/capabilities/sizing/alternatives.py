@@ -169,6 +169,7 @@ def _gentlest(
     too_hard: list[tuple[float, StarterTrial]] = []
 
     def is_permitted(trial: StarterTrial) -> bool:
+        """Whether all starts of a trial are permitted; then it is one of the `permitted`."""
         starts = starts_from_all(trial.rig, trial.failed_after, events)
         if not chosen.permits(study.setup, trial.rig, trial.tables, starts):
             return False

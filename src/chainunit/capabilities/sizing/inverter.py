@@ -24,6 +24,7 @@ def boosts(first: float, is_given: bool) -> list[float]:
 
 
 def _with_boost(c: Candidate, boost: float) -> Candidate:
+    """The candidate with this boost of its inverter."""
     p = c.drive.parameters
     p = dataclasses.replace(p, inverter=dataclasses.replace(p.inverter, boost=boost))
     return dataclasses.replace(c, drive=dataclasses.replace(c.drive, parameters=p))

@@ -206,12 +206,14 @@ class MotorTrials:
         trials: list[Candidate] = []
 
         def trial_with(flywheel: float) -> Candidate:
+            """The candidate with a flywheel of this inertia at the motor [kg m2], judged."""
             drive = with_inertia(self.task.tables, bare.drive, flywheel * at_motor)
             candidate = dataclasses.replace(bare, drive=drive)
             trials.append(self.judged(candidate))
             return candidate
 
         def heavy_enough(candidate: Candidate) -> bool:
+            """Whether a heavier flywheel is no use."""
             if candidate.checks and not candidate.starts:
                 # it stalls for want of inertia, unless it starts with less
                 return any(c.starts for c in trials if c.drive.added_inertia < candidate.drive.added_inertia)

@@ -412,6 +412,7 @@ def _behind(candidate: Candidate, x: Candidate) -> Line:
 
 
 def _flywheel(candidate: Candidate, x: Candidate) -> Line:
+    """The inertia of the flywheel of a candidate, and its disc."""
     if not candidate.drive.added_inertia:
         return "none"
     return line(number(x.flywheel_numbers.J), *map(Aside, _disc(candidate, x)))

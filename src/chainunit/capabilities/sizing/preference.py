@@ -293,6 +293,7 @@ def _units(c: Candidate) -> str:
 
 
 def _weakened(c: Candidate) -> str:
+    """The field weakening of a candidate, in words."""
     rated = number(c.motor.nameplate.frequency, "Hz")
     return (
         f"runs at {number(c.trial.frequency, 'Hz')} in field weakening, with less torque than at its {rated}"

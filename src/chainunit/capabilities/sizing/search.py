@@ -298,11 +298,13 @@ def _least_power(
         return sorted(same, key=lambda m: poles_rank(m.nameplate.poles))
 
     def suffices_bare(n: int) -> bool:
+        """Whether the best motor of the power number `n` is strong enough without a flywheel."""
         motor = motors_of(powers[n])[0]
         says(motor)
         return not _is_weak(trials.candidates_of(motor, trials.with_least_boost)[-1])
 
     def suffices(n: int) -> bool:
+        """Whether a motor of the power number `n` is strong enough, with or without a flywheel."""
         for motor in motors_of(powers[n]):
             says(motor)
             tries = trials.candidates_of(motor)

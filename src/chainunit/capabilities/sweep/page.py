@@ -93,6 +93,7 @@ def _opening(x: SweepSummary) -> Iterator[b.Block]:
 
 
 def _range(name: str, swept: SweptRange) -> Line:
+    """A parameter with the range that is swept, or with its tolerance."""
     tolerance = exact(swept.tolerance)
     if tolerance.value is None:
         return filled("{} {} to {}", Name(name), exact(swept.low), exact(swept.high))

@@ -286,6 +286,7 @@ def _ends(findings: SweepFindings) -> _Ends:
 
 
 def _range(parameter: SweptParameter, is_grid: bool) -> SweptRange:
+    """The range of a parameter, for the result."""
     v, (low, high) = parameter.variable, parameter.ends
     return SweptRange(
         description=v.description,

@@ -208,6 +208,7 @@ class Resonance:
         return self._ranges((self.motion.free_growth > DRIFT) & ~self.motion.unstable)
 
     def _ranges(self, inside: Any) -> list[tuple[float, float]]:
+        """The ranges of the speed at which `inside` is true, their ends halfway to the next speeds."""
         speed = self.speed
         middle = np.concatenate([speed[:1], 0.5 * (speed[1:] + speed[:-1]), speed[-1:]])
         return [(float(middle[a]), float(middle[b])) for a, b in stretches(inside)]

@@ -211,6 +211,7 @@ def _resonance(analysis: TorsionFindings) -> fig.Figure:
 
 
 def _ratio(analysis: TorsionFindings) -> fig.Figure:
+    """The ratio of the joints and the natural frequency over a turn of the shaft."""
     turn = fig.Axis(
         "angle of shaft 2 from the plane of the joint", "rad", low=0.0, high=2.0 * np.pi, step=45.0
     )

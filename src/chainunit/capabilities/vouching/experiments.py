@@ -117,6 +117,7 @@ def deviation(table: TimeTable, wanted: TimeTable, fmu: UnpackedFmu) -> Deviatio
 
 
 def _largest(gaps: Mapping[str, float], sizes: Mapping[str, float]) -> Deviation:
+    """The largest gap over the size of its variable; infinite for one that is no number."""
     shares = {name: float(gap / sizes[name]) for name, gap in gaps.items()}
     deviations = (Deviation(x if math.isfinite(x) else math.inf, name) for name, x in shares.items())
     return max(deviations, default=Deviation(0.0, ""))

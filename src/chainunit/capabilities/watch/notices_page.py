@@ -85,11 +85,13 @@ def _event(study: StudyRecord, name: str) -> fig.Figure:
     low = max(float(time[0]), -0.5 * math.pi / study.setup.config.run.crank_speed)
 
     def loads(load: str) -> Iterator[fig.Item]:
+        """The estimates of a load of both sides, and the true values."""
         for look, side in enumerate(SIDES):
             yield fig.Curve(f"{side}, estimated", time, run[f"observer.{side}.{load}"].values, look)
             yield fig.Curve("true", time, run[f"machine.{side}.{load}"].values, "path", in_legend=not look)
 
     def shares() -> Iterator[fig.Item]:
+        """The imbalances of feed and force in parts of their thresholds."""
         for look, ground in enumerate(("feed", "force")):
             yield fig.Curve(f"of the {ground}", time, run[f"observer.grounds.{ground}"].values, look + 2)
         yield from (fig.Mark(threshold, axis="y", look="limit") for threshold in (-1.0, 1.0))

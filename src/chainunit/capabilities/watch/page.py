@@ -67,6 +67,7 @@ TASK: Task[Config, WatchSummary] = Task(
 
 
 def _opening(x: WatchSummary) -> Iterator[b.Block]:
+    """The answer: the alarms, or that there is none, after all that makes them doubtful."""
     yield from _cautions(x)
     if not x.alarms:
         turns, duration = number(x.recording.turns, 3), number(x.recording.duration, 3)
