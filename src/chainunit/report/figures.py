@@ -428,26 +428,23 @@ def _reactions(study: StudyRecord) -> fig.Figure:
     largest = {pin: hardest_run(study.runs.pins, pin) for pin in pins}
     of_run, driver = run_names.title(study.runs, reference), study.setup.driver_noun
     places = np.arange(len(pins), dtype=float)
-    bars: list[tuple[str, float, list[float | None], float, int, bool, tuple[str, ...]]] = [
-        (f"{of_run}: peak", -0.2, [steady[pin]["peak"] for pin in pins], 0.38, 0, False, ()),
-        (f"{of_run}: RMS", -0.2, [steady[pin]["rms"] for pin in pins], 0.14, 0, True, ()),
+    peaks, rms = ([steady[pin][size] for pin in pins] for size in ("peak", "rms"))
+    bars = [
+        fig.Bars(f"{of_run}: peak", places - 0.2, peaks, 0.38, 0),
+        fig.Bars(f"{of_run}: RMS", places - 0.2, rms, 0.14, 0, slim=True),
     ]
     if len(study.runs.pins) > 1:
         titles = tuple(study.runs.title_of(largest[pin]) for pin in pins)
         peaks = [study.runs.pins[largest[pin]][pin]["peak"] for pin in pins]
-        bars.append(("largest peak of all runs", 0.2, peaks, 0.38, 1, False, titles))
-    items = tuple(
-        fig.Bars(name, places + shift, sizes, height, look, slim=slim, words=beside)
-        for name, shift, sizes, height, look, slim, beside in bars
-    )
-    most = max(size or 0.0 for _, _, sizes, *_ in bars for size in sizes)
+        bars.append(fig.Bars("largest peak of all runs", places + 0.2, peaks, 0.38, 1, words=titles))
+    most = max(size or 0.0 for sizes in (peaks, rms) for size in sizes)
     # beside the bars there is room for the names of runs
     x = fig.Axis("reaction", "N", low=0.0, high=(1.6 if len(study.runs.pins) > 1 else 1.05) * most or None)
     return fig.Figure(
         "reactions",
         "Forces in the pins",
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
-        ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
+        ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), tuple(bars)),),),
         f"RMS is taken over whole {driver} turns of {of_run}. Beside a bar: the run of the largest peak.",
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

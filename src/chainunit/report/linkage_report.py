@@ -196,8 +196,9 @@ def _animation(f: LinkageFindings) -> Animation:
     """The moving picture of a turn, or of the way there and back, at constant speed."""
     machine = f.machine
     low, _ = f.description.span
-    step = (2 if f.back else 1) * (len(f.q) - 1) // _PICTURES
-    q, speed = f.q[::step], np.full(_PICTURES // (2 if f.back else 1) + 1, f.speed)
+    ways = 2 if f.back else 1
+    step = ways * (len(f.q) - 1) // _PICTURES
+    q, speed = f.q[::step], np.full(_PICTURES // ways + 1, f.speed)
     time = (q - low) / f.speed
     if f.back:  # the last place is that of the way back, too
         q, speed = np.concatenate([q, q[-2::-1]]), np.concatenate([speed, -speed[1:]])

@@ -198,9 +198,11 @@ class _Drawing:
         }
         legend = _legend_rows(spec, _PHONE)
         if len(spec.panels[0]) == 1:
+            # panels that are below each other already: only the legend may take more rows
             more = max(0, legend - _legend_rows(spec))
             bottom = {"margin.b": 52 + _legend_rows(spec) + more} if more else {}
             return (changes or bottom) and {"height": height(spec) + more, **bottom, **changes}
+        # column by column; the domains of the axes are shares of the height, from the top
         places = sorted(self.places, key=lambda place: (place[1], place[0]))
         sizes = [_row(spec) * min(spec.row_heights[r], 1.1) for r, _ in places]
         gaps = [_gap(spec, self.places[a][0] == self.places[b][0]) for a, b in pairwise(places)]

@@ -41,9 +41,10 @@ def driver_bearing(drive: Drive) -> str:
     if drive.foreign_machine:
         return ""
     model = drive.simulated_machine.model
-    ((bearing, *_),) = model.topology.groups[0].joints
+    # the driver is the first group, and its bearing the only joint of it
+    ((driver_joint, *_),) = model.topology.groups[0].joints
     titles = {model.joints.get(output): title for title, output in model.pins.items()}
-    return titles.get(bearing, "")
+    return titles.get(driver_joint, "")
 
 
 def pin_force(drive: Drive, run: Dataset, title: str) -> Any:

@@ -285,16 +285,18 @@ class Search:
         return self.columns.low + self.columns.span * point.z[: self.columns.size]
 
     def _followed(self, rows: Sequence[Row], point: Solution, lanes: Lanes) -> tuple[Lanes, bool, float]:
-        """The lanes of a further program; whether there must be one: a limit is exceeded between the angles, a peak
-        has moved too far, or a mean is rough; and the most by which a limit is exceeded, over its scale."""
+        """The lanes of a further program, with the peaks of its rows at this solution; whether there must be one: a
+        limit is exceeded between the angles, a peak has moved too far, or a mean is rough; and the most by which a
+        limit is exceeded, over its scale."""
         x, over_turn = self._x(point), [k for k, row in enumerate(rows) if row.kind in OVER_TURN]
         tops, more = [], not lanes.sizes[0]
-        for k, before in zip(over_turn, lanes.peaks, strict=True):
+        for k, peaks_before in zip(over_turn, lanes.peaks, strict=True):
             tops.append(self._tops(rows[k], x, point.z[self.columns.size :]))
-            if len(before):
-                angle, speed, inverse_bend = before.T
+            if len(peaks_before):
+                angle, speed, inverse_bend = peaks_before.T
                 ((_, column, _),) = rows[k].terms
                 _, (slopes,) = self.columns.values(x, angle, speed, [column], 1)
+                # slope over curvature is the way to the extreme
                 has_moved = np.abs(slopes * inverse_bend) > _WAY
                 more |= bool(np.any((point.exceeded[k] > -_MET) & has_moved))
         worst = max((float(np.max(top[:, 0])) for top in tops), default=-math.inf)
