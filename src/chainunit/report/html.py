@@ -253,6 +253,7 @@ class Page:
         return "".join(map(self._piece, pieces(line)))
 
     def _piece(self, piece: Piece) -> str:
+        """A piece of a line."""
         match piece:
             case Number():
                 return self.number(piece)
@@ -316,6 +317,7 @@ class Page:
         return f'<p class="lead">{escape(block.lead)}</p>\n{resource("live/live.html")}'
 
     def _verdict(self, verdict: b.Judgement) -> str:
+        """A judgement, with its sign; a warning is an entry of a list."""
         text = self.line(verdict.line)
         items = "".join(f"<li>{self.line(item)}</li>" for item in verdict.items)
         if verdict.severity in ("alarm", "remark"):
@@ -326,6 +328,7 @@ class Page:
         return f'<p class="judged {verdict.severity}">{sign} {text}</p>'
 
     def _card(self, card: b.Card) -> str:
+        """A card: large numbers with their nouns, and further lines."""
         figures = "".join(
             f'<div class="figure"><span class="large{"" if isinstance(value, Number) else " name"}">'
             f'{self.line(value)}</span><span class="which">{escape(which)}</span></div>'
@@ -338,6 +341,7 @@ class Page:
         )
 
     def _table(self, table: b.Table) -> str:
+        """A table, which a narrow screen scrolls."""
         marks = [' class="text"' if column.of_text else "" for column in table.columns] or [""] * table.width
         heads = "".join(
             f'<th scope="col"{mark}>{self.line(column.title)}</th>'
@@ -357,6 +361,7 @@ class Page:
         )
 
     def _row(self, row: b.TableRow, marks: Sequence[str]) -> str:
+        """A row; one with a note has it in a second row."""
         first, *others = row.cells
         span = ' rowspan="2"' if row.note else ""
         cells = (
@@ -374,6 +379,7 @@ class Page:
         return f"<td{css}>{self._inside(cell)}</td>"
 
     def _inside(self, cell: b.Cell) -> str:
+        """The content of a cell; a share has a bar."""
         if not isinstance(cell, b.Share):
             return self.line(cell)
         share = cell.utilisation.value or 0.0
@@ -383,6 +389,7 @@ class Page:
         return self.number(cell.utilisation) + bar + suffix
 
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
+        """A section of given values."""
         rows = ""
         for value in values:
             name_and_line = f"{value.name}: {value.place}" if value.place else value.name
@@ -401,6 +408,7 @@ class Page:
         return f'<abbr class="from" title="{escape(_origin_words(value.origin))}">{escape(mark)}</abbr>'
 
     def _figure(self, figure: Figure) -> str:
+        """The box in which the script of the page draws a figure."""
         from .page_figures import height
 
         return (

@@ -74,6 +74,8 @@ def linkage_report(
 
 
 def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
+    """The live machine of the linkage."""
+
     def make() -> b.LiveMachine:
         # a page alone needs it
         from .live.machine import of_linkage

@@ -92,6 +92,7 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
 
 
 def _table(table: Table, units: Units) -> list[str]:
+    """The lines of a table, with its title and its notes."""
     heads = [_line(column.title, units) for column in table.columns] or [
         "quantity",
         *[""] * (table.width - 1),

@@ -258,6 +258,7 @@ class _Drawing:
         return {"name": name or " ", "legendgroup": name, "showlegend": new}
 
     def _draw(self, item: Item, panel: Panel, x: str, y: str) -> None:
+        """Draw an item of a panel with the axes `x` and `y`."""
         place = {"xaxis": x, "yaxis": y}
         match item:
             case Curve():
@@ -291,6 +292,7 @@ class _Drawing:
                 self._hatch(item, place)
 
     def _curve(self, curve: Curve, panel: Panel, place: dict[str, Any]) -> None:
+        """Draw a curve; long ones are thinned."""
         samples = self.samples[id(curve.x)] if curve.has_line and not curve.marker else slice(None)
         look = look_of(curve.look)
         mode = "+".join(
@@ -316,6 +318,7 @@ class _Drawing:
             self._trace("scatter", x=[None], y=[None], **style, **legend, **place)
 
     def _mark(self, mark: Mark, place: dict[str, Any]) -> None:
+        """Draw a line across a panel, with its words."""
         x, y = place["xaxis"], place["yaxis"]
         look = look_of(mark.look)
         style = {"color": look["color"], "width": look["linewidth"], "dash": _dash(look["linestyle"])}
@@ -326,6 +329,7 @@ class _Drawing:
         self._sample(mark.name, place, mode="lines", line=style)
 
     def _bars(self, bars: Bars, panel: Panel, place: dict[str, Any]) -> None:
+        """Draw horizontal bars."""
         look = BARS[bars.look % len(BARS)]
         pattern = {"shape": look["pattern"], "fgcolor": "#666666", "size": 6} if not bars.slim else {}
         colour = INK if bars.slim else look["color"]
@@ -339,6 +343,7 @@ class _Drawing:
         )  # fmt: skip
 
     def _field(self, field: Field, place: dict[str, Any]) -> None:
+        """Draw a map of classes, with a line around the bold level."""
         count, z = len(field.names), _small(classes(field))
         shades = [[i / max(1, count - 1), colour] for i, colour in enumerate(class_colours(count))]
         common = {"x": _small(field.x), "y": _small(field.y), "z": z, "showscale": False, "hoverinfo": "skip"}

@@ -118,6 +118,7 @@ class _PrintedPage(Page):
             return float(picture.height / picture.width)
 
     def _printed(self, figure: Figure) -> str:
+        """A figure as a picture within the page; empty without its file."""
         file = self._pictures.get(figure.file or "")
         if file is None:
             return ""

@@ -174,6 +174,7 @@ def _name(axis: Any, name: str) -> str | None:
 
 
 def _draw(axis: Any, item: Item, size: float = 1.0) -> None:
+    """Draw an item of a panel."""
     match item:
         case Curve():
             look = look_of(item.look) | ({} if item.has_line else {"linestyle": ""})
@@ -213,6 +214,7 @@ def _draw(axis: Any, item: Item, size: float = 1.0) -> None:
 
 
 def _bars(axis: Any, bars: Bars, size: float) -> None:
+    """Draw horizontal bars."""
     look = BARS[bars.look % len(BARS)]
     lying = axis.barh(
         bars.at, bars.size, bars.height, label=bars.name or None, edgecolor=INK, linewidth=0.6,

@@ -33,6 +33,7 @@ def plain_line(line: Line, units: Units = DEFAULT_UNITS) -> str:
 
 
 def _plain(piece: Piece, units: Units) -> str:
+    """A piece of a line as text."""
     match piece:
         case Number():
             digits = piece.digits or (6 if piece.as_given else 3)

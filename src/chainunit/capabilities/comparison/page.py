@@ -122,16 +122,13 @@ def _runs(x: StudyComparison, comparison: StudyComparison) -> Iterator[b.Block]:
         short = {name for name in different if _is_short(run, name)}
         if not different:
             equal.append(compared.title)
-        rows = tuple(
-            b.TableRow(
-                (str(shown.title), *map(number, (shown.a, shown.b, shown.difference, shown.relative))),
-                form="both" if name in short else "long",
-            )
-            for name, shown in x.runs[run].measures.items()
-        )
+        rows = []
+        for name, shown in x.runs[run].measures.items():
+            numbers = map(number, (shown.a, shown.b, shown.difference, shown.relative))
+            rows.append(b.TableRow((str(shown.title), *numbers), form="both" if name in short else "long"))
         if rows:
             heads, title = b.heads("", "A", "B", "B - A", "relative"), capital(compared.title)
-            yield b.Table(rows, heads, title=title, form="both" if short else "long")
+            yield b.Table(tuple(rows), heads, title=title, form="both" if short else "long")
     if equal:
         yield b.Text(f"Every number is the same in: {'; '.join(equal)}.")
 

@@ -141,13 +141,10 @@ def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
     dots = "o" if len(x) <= 40 else ""
     names = [name for name in findings.results if name in summary.extremes]
     for figure_name, file, shown_names in _numbered("curves", names, _MOST_ROWS):
-        rows = (
-            (
-                _axis(findings.variables[name]),
-                [fig.Curve(name, x, part[name].values, 0, dots, in_legend=False), *marks],
-            )
-            for name in shown_names
-        )
+        rows = []
+        for name in shown_names:
+            curve = fig.Curve(name, x, part[name].values, 0, dots, in_legend=False)
+            rows.append((_axis(findings.variables[name]), [curve, *marks]))
         yield fig.Figure(
             figure_name,
             f"Results over {parameter.name}: {parameter.variable.description}",

@@ -110,18 +110,15 @@ def _columns(names: Iterable[str]) -> tuple[b.Column, ...]:
 def _best(x: SweepSummary) -> Iterator[b.Block]:
     """The best points with their parameters and results."""
     names = [*x.parameters, *x.results]
-    rows = tuple(
-        b.TableRow(
-            (exact(point["point"]), *(number(point[name], x.digits(name)) for name in names)),
-            form="both" if k < 5 else "long",
-        )
-        for k, point in enumerate(x.best)
-    )
+    rows = []
+    for k, point in enumerate(x.best):
+        numbers = (number(point[name], x.digits(name)) for name in names)
+        rows.append(b.TableRow((exact(point["point"]), *numbers), form="both" if k < 5 else "long"))
     if rows:
         first = 1 + len(x.parameters)
         groups = (tuple(range(1, first)), tuple(range(first, 1 + len(names))))
         title = filled("Points with the {} first", x.best_by)
-        yield b.Table(rows, (b.Column("point"), *_columns(names)), title=title, groups=groups)
+        yield b.Table(tuple(rows), (b.Column("point"), *_columns(names)), title=title, groups=groups)
 
 
 def _extremes(x: SweepSummary) -> Iterator[b.Block]:

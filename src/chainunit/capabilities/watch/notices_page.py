@@ -40,6 +40,7 @@ def _who_notices(runs: StudyRuns, x: ObserverFindings) -> b.Table:
     names = by_side(runs, x.notices)
 
     def rows() -> Iterator[b.TableRow]:
+        """Two rows for each device, and one with the side that the observer names."""
         for device, title in DEVICES.items():
             if device in x.notices[names[0]]:
                 notices = [x.notices[run][device] for run in names]
