@@ -223,7 +223,8 @@ def _rest(covariance: Any, first: int, others: Sequence[int]) -> float:
 def _proposals(
     problem: Problem, z: Any, fisher: Any, now: Sequence[Determination], workers: int
 ) -> Iterator[Proposal]:
-    """Further runs, the best first."""
+    """Further runs, the best first: for each the information of all runs with it (`then`), beside the present one
+    (`now`). A run is simulated with thinned rows."""
     ranked = []
     for title, run in _candidates(problem):
         more = Problem(problem.plant, (*problem.runs, run), problem.sought, problem.sensors)
@@ -231,21 +232,17 @@ def _proposals(
         for name, place in problem.place.items():
             point[more.place[name]] = z[place]
         sparse, scales = _sparse(problem, run)
-        single = Problem(
-            problem.plant, (_simulated(more, sparse, point, workers),), problem.sought, problem.sensors
-        )
-        single_fisher = normal_equations(
-            single, np.array([point[more.place[name]] for name in single.place]), workers, scales
-        ).fisher
+        simulated = _simulated(more, sparse, point, workers)
+        single = Problem(problem.plant, (simulated,), problem.sought, problem.sensors)
+        single_point = np.array([point[more.place[name]] for name in single.place])
+        single_fisher = normal_equations(single, single_point, workers, scales).fisher
         total = np.zeros((len(point), len(point)))
         for of_runs, matrix in ((problem, fisher), (single, single_fisher)):
             places = [more.place[name] for name in of_runs.place]
             total[np.ix_(places, places)] += matrix
         then = _determinations(more, total)
         factor = np.exp(np.mean([math.log(a.by_both / b.by_both) for a, b in zip(now, then, strict=True)]))
-        ranked.append(
-            Proposal(title, float(factor), sum(determination.is_determined for determination in then))
-        )
+        ranked.append(Proposal(title, float(factor), sum(x.is_determined for x in then)))
     yield from sorted(ranked, key=lambda proposal: -proposal.factor)
 
 

@@ -239,6 +239,7 @@ class Search:
         tight = [row for row in rows.rows if row.kind in _POWERS and row.owner and self._is_tight(row, x)]
         nodes, _ = self._nodes(tight, x, nodes)
         lanes, worst = Lanes(np.zeros((number, 0, 3)), nodes), math.inf
+        # a rough program with all angles of a grid, and then programs with the peaks of the solution before
         point = self._run(rows, costs, z, lanes, None)
         # a start that ends where another one did has its answer
         earlier = self._answers.setdefault((tuple(rows.rows), costs), [])

@@ -137,12 +137,12 @@ def size(
     notes += _needs(candidates[0], trials)
     tried = len({c.motor.designation for c in candidates})
     return SizingFindings(
-        task.plan,
-        duty,
-        candidates,
-        notes,
-        len(motors),
-        len(motors) - len(strong),
+        plan=task.plan,
+        duty=duty,
+        candidates=candidates,
+        notes=notes,
+        motors=len(motors),
+        weak=len(motors) - len(strong),
         tried=tried,
         gears=task.gears,
         couplings=task.couplings,
